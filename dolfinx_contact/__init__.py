@@ -1,0 +1,1 @@
+from dolfinx_contact import _kernel as _kernel
