@@ -1,0 +1,86 @@
+"""The paper's cylindrical punch as an O-grid of hexahedra, built by gmsh.
+
+Seen from below, a square core of ``divisions`` x ``divisions`` quadrilaterals and four blocks of
+as many around it; extruded in ``layers`` layers.  With 8 and 4 these are the 1280 hexahedra,
+1685 nodes and 337 contact nodes of [dSFMH07, Section 3]; how the paper divided its disc is not in
+its text, but a core and four blocks of 8 x 8 is the only O-grid with these numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import gmsh
+
+from dolfinx_contact._dolfinx import model_to_mesh
+
+CONTACT, TOP = 1, 2  # tags of the facets z = 0 and z = height
+
+
+def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4):
+    """Mesh of a punch standing on z = 0, its axis along z, distributed over ``comm``.
+
+    Args:
+        comm: MPI communicator; gmsh runs on its rank 0.
+        refine: Each level doubles ``divisions`` and ``layers``; 0 is the paper's mesh.
+        radius, height: Of the punch, length units.
+        divisions: Quadrilaterals along each side of each of the five blocks; even, so that the
+            axis of the punch is a line of nodes.
+        layers: Hexahedra along the height.
+
+    Returns:
+        A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
+
+    Raises:
+        ValueError: a negative ``refine``, an odd number of divisions, no layers, a size <= 0.
+    """
+    if refine < 0 or refine != int(refine):
+        raise ValueError(f"refine must be a whole number >= 0, got {refine!r}.")
+    if divisions < 2 or divisions % 2 or layers < 1:
+        raise ValueError(
+            f"divisions must be even and >= 2, layers >= 1; got {divisions!r} and {layers!r}."
+        )
+    if not (0 < radius < math.inf and 0 < height < math.inf):
+        raise ValueError(f"radius and height must be positive, got {radius!r} and {height!r}.")
+    gmsh.initialize()
+    try:
+        if comm.rank == 0:
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.model.add("punch")
+            _build(height / radius, divisions * 2**refine, layers * 2**refine)
+        punch = model_to_mesh(gmsh.model, comm, 0, gdim=3)
+    finally:
+        gmsh.finalize()
+    punch.mesh.geometry.x[:] *= radius
+    return punch
+
+
+def _build(height, divisions, layers):
+    """The punch of radius 1 (gmsh's tolerances are absolute), every block transfinite."""
+    geo = gmsh.model.geo
+    rim = 1 / math.sqrt(2)
+    core = 0.5 * 1.15 * rim  # half of the core's side
+    corners = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+    centre = geo.addPoint(0, 0, 0)
+    inner = [geo.addPoint(core * x, core * y, 0) for x, y in corners]
+    outer = [geo.addPoint(rim * x, rim * y, 0) for x, y in corners]
+    sides = [geo.addLine(inner[i - 1], inner[i]) for i in range(4)]
+    arcs = [geo.addCircleArc(outer[i - 1], centre, outer[i]) for i in range(4)]
+    spokes = [geo.addLine(inner[i], outer[i]) for i in range(4)]
+
+    loops = [sides] + [[spokes[i - 1], arcs[i], -spokes[i], -sides[i]] for i in range(4)]
+    blocks = [geo.addPlaneSurface([geo.addCurveLoop(loop)]) for loop in loops]
+    for curve in sides + arcs + spokes:
+        geo.mesh.setTransfiniteCurve(curve, divisions + 1)
+    for block in blocks:
+        geo.mesh.setTransfiniteSurface(block)
+        geo.mesh.setRecombine(2, block)
+    # extrude answers, for each surface, its copy, the volume and the sides
+    extruded = [geo.extrude([(2, b)], 0, 0, height, [layers], recombine=True) for b in blocks]
+    geo.synchronize()
+    gmsh.model.removeEntities([(0, centre)])  # or it would be meshed as a node of no element
+
+    gmsh.model.addPhysicalGroup(2, blocks, CONTACT)
+    gmsh.model.addPhysicalGroup(2, [copy[1] for copy, *_ in extruded], TOP)
+    gmsh.model.addPhysicalGroup(3, [volume[1] for _, volume, *_ in extruded], 1)
+    gmsh.model.mesh.generate(3)
