@@ -1,0 +1,67 @@
+"""All tests run alike on one rank and on several (tools/mpitest): no rank is left waiting.
+
+After each test the ranks meet. A rank that the others do not join within JOIN_SECONDS says so and
+aborts the run; one that hangs alone is found in the same way by the others.
+"""
+
+import os
+import sys
+import time
+
+import hypothesis
+import pytest
+
+import dolfinx_contact  # noqa: F401  (some DOLFINx wheels must be imported before mpi4py)
+from mpi4py import MPI
+
+JOIN_SECONDS = float(os.environ.get("JOIN_SECONDS", 120))
+comm = MPI.COMM_WORLD.Dup()  # never mistaken for a call of the tested code
+failures = []  # what this rank would print at the end
+
+# The same examples on every rank and in every run.
+hypothesis.settings.register_profile("mpi", derandomize=True, deadline=None, database=None)
+hypothesis.settings.load_profile("mpi")
+
+
+def meet(where):
+    request = comm.Ibarrier()
+    deadline = time.monotonic() + JOIN_SECONDS
+    while not request.Test():
+        if time.monotonic() > deadline:
+            print(
+                f"\nrank {comm.rank}: the other ranks did not come to the end of {where}"
+                f" within {JOIN_SECONDS:g} s; aborting",
+                *failures,
+                sep="\n",
+                file=sys.__stderr__,
+                flush=True,
+            )
+            comm.Abort(1)
+        time.sleep(1e-4)
+
+
+def pytest_sessionstart(session):
+    expected = os.environ.get("EXPECTED_RANKS")
+    if expected is not None and comm.size != int(expected):
+        pytest.exit(f"asked for {expected} ranks, MPI has {comm.size}", returncode=1)
+
+
+def pytest_report_header():
+    return f"MPI: rank {comm.rank} of {comm.size}"
+
+
+def pytest_runtest_logreport(report):
+    if report.failed:
+        failures.append(f"{report.nodeid} failed:\n{report.longreprtext}")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_logfinish(nodeid):
+    if comm.size > 1:
+        meet(nodeid)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure():
+    if comm.size > 1:
+        meet("the session")
