@@ -1,0 +1,41 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file norm.h
+/// Euclidean norm that neither overflows nor underflows, by exact scaling with powers of two.
+#pragma once
+
+#include "friction.h"
+#include <cmath>
+#include <cstring>
+
+namespace dolfinx_contact {
+/// Two powers of two whose product is one.
+struct PowerOfTwo {
+    double down, up;
+};
+
+/// The power of two for which magnitude * down lies in [1, 2); less for magnitude < 2^-1021, zero
+/// included. No branch and no library call, so that loops with it vectorise.
+inline PowerOfTwo power_of_two(double magnitude) {
+    constexpr std::uint64_t exponent = 0x7ffULL << 52U, twice_bias = 2046ULL << 52U;
+    const double clamped = std::min(std::max(magnitude, 0x1p-1021), 0x1p1021);
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &clamped, sizeof bits);
+    const std::uint64_t up_bits = bits & exponent, down_bits = twice_bias - up_bits;
+    PowerOfTwo scale{};
+    std::memcpy(&scale.up, &up_bits, sizeof bits);
+    std::memcpy(&scale.down, &down_bits, sizeof bits);
+    return scale;
+}
+
+/// |v|, for all finite v whose norm is representable.
+template <int T> double norm(const Tangent<T> &v) {
+    if constexpr (T == 1)
+        return std::abs(v[0]);
+    else {
+        const PowerOfTwo scale = power_of_two(std::max(std::abs(v[0]), std::abs(v[1])));
+        const double x = v[0] * scale.down, y = v[1] * scale.down;
+        return std::sqrt(x * x + y * y) * scale.up;
+    }
+}
+} // namespace dolfinx_contact

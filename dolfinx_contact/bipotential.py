@@ -1,0 +1,46 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The gap of the bi-potential on NumPy arrays: a certificate for any approximate solution.
+
+[dSFMH07]: see :mod:`dolfinx_contact.friction`. Needs NumPy alone, no DOLFINx.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.friction import Friction
+from dolfinx_contact.friction_cone import as_nodes
+
+
+def bipotential_gap(r, gap, slip_increment, friction: Friction):
+    """Gap ``b_c(-du, r) + du . r`` of the bi-potential of [dSFMH07, Section 1].
+
+    For a reaction in the friction cone and no penetration it is
+    ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, and zero exactly where the law holds. It is
+    computed as a sum of non-negative terms. Elsewhere the gap is infinite: project reactions and
+    clip gaps at zero first for a certificate, and report what was cut off by itself.
+
+    Args:
+        r: Reactions in the local frame, ``shape=(n, 3)``, or ``(n, 2)`` in two dimensions.
+        gap: Normal gap ``x_n`` at the end of the step, ``shape=(n,)``, a length.
+        slip_increment: ``du_t`` over the step, ``shape=(n, 2)`` or ``(n, 1)``, a length.
+        friction: The coefficients.
+
+    Returns:
+        ``shape=(n,)``, force times length. ``inf`` where ``r`` is outside the cone by more than
+        rounding (16 units of it) or ``gap`` is negative.
+
+    Raises:
+        ValueError: Wrong shape or type.
+    """
+    if not isinstance(friction, Friction):
+        raise ValueError(f"friction must be a Friction, not {friction!r}")
+    r = np.asarray(r)
+    dim = r.shape[1] if r.ndim == 2 and r.shape[1] == 2 else 3
+    r = as_nodes("r", r, dim)
+    gap = as_nodes("gap", gap, None, len(r))
+    slip = as_nodes("slip_increment", slip_increment, dim - 1, len(r))
+    law = friction.law(dim)
+    outside = law.load_function(r) > 16 * np.finfo(float).eps * np.abs(r[:, -1])
+    return np.where(outside | (gap < 0), np.inf, law.bipotential_gap(r, gap, slip))

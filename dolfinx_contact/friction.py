@@ -1,0 +1,170 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Coefficients of dry friction.
+
+[dSFMH07]: G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, "Comportement hystérétique du frottement
+anisotrope", 18e Congrès Français de Mécanique, 2007.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact import _kernel
+
+_SMALLEST, _LARGEST = 1e-50, 1e50
+
+
+def _coefficients(name: str, value) -> np.ndarray:
+    """``value`` as a finite float64 array of shape (), (2,) or (n, 2), or a ``ValueError``."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueError(
+            f"{name} must be numbers in an array without gaps, not {value!r}"
+        ) from None
+    has_bool = array.size < 4 and any(
+        isinstance(i, bool) for i in np.ravel(np.array(value, object))
+    )
+    if has_bool or array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be real numbers, not {value!r} of type {array.dtype}")
+    if array.shape != () and not (array.ndim in (1, 2) and array.size and array.shape[-1] == 2):
+        raise ValueError(
+            f"{name} must be one number, a pair, or an array of shape (n, 2) with a pair per node, "
+            f"not of shape {array.shape}: {value!r}"
+        )
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} must be finite, not {value!r}")
+    return array.astype(np.float64)
+
+
+class Friction:
+    """Orthotropic dry friction with a slip rule that need not be associated.
+
+    The cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip rule
+    ``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` with ``P = diag(p)`` [dSFMH07, Section 1]; x and y are
+    the principal friction directions. Only the ratio of the two ``p`` matters. Immutable.
+
+    Args:
+        mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
+            ``shape=(n, 2)`` with a pair for each node. Zero is frictionless.
+        p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
+        k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
+
+    Raises:
+        ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
+            of a pair ``mu`` is zero, ``p`` is not positive, ``p`` and ``k`` are both given.
+
+    Attributes:
+        mu: ``shape=(2,)`` or ``(n, 2)``.
+        p: Normalised to ``max(p / mu) = 1``, same shape as ``mu``; zero where ``mu`` is.
+        frictionless: All ``mu`` are zero.
+        isotropic: Both directions have the same ``mu`` and ``p`` everywhere.
+        associated: ``p`` is proportional to ``mu`` everywhere.
+    """
+
+    __slots__ = ("mu", "p", "frictionless", "isotropic", "associated", "_laws")
+
+    def __init__(self, mu, p=None, k=None):
+        given = f"mu={mu!r}, p={p!r}, k={k!r}"
+        mu_given = mu
+        mu = _coefficients("mu", mu)
+        if np.any(mu < 0):
+            raise ValueError(f"mu must not be negative, but is {mu_given!r}")
+        if mu.ndim == 0:
+            mu = np.full(2, mu)
+        if np.any((mu == 0).any(axis=-1) != (mu == 0).all(axis=-1)):
+            raise ValueError(
+                f"mu must be positive in both directions or zero in both, not {mu_given!r}; "
+                "for almost no friction in one direction give a small coefficient"
+            )
+        positive = mu > 0
+        if np.any(positive & ((mu < _SMALLEST) | (mu > _LARGEST))):
+            raise ValueError(
+                f"mu must be zero or between {_SMALLEST} and {_LARGEST}, not {mu_given!r}"
+            )
+
+        if p is not None and k is not None:
+            raise ValueError(f"give p or k, not both ({given})")
+        if k is not None:
+            q = _q_from_exponent(mu, k)
+        elif p is not None:
+            p_given, p = p, _coefficients("p", p)
+            if np.any(p <= 0):
+                raise ValueError(f"p must be positive, but is {p_given!r}; omit it for p = mu")
+            if p.ndim == 2 and mu.ndim == 2 and p.shape != mu.shape:
+                raise ValueError(f"p has shape {p.shape}, mu {mu.shape}: give both for each node")
+            if p.ndim > mu.ndim:
+                mu = np.tile(mu, (len(p), 1))
+                positive = mu > 0
+            p = p / p.max(axis=-1, keepdims=p.ndim > 0)
+            q = np.divide(p, mu, out=np.ones_like(mu), where=positive)
+        else:
+            q = np.ones_like(mu)
+        q = q / q.max(axis=-1, keepdims=True)
+        # p proportional to mu up to rounding is the associated rule
+        q[1.0 - q.min(axis=-1) <= 4 * np.finfo(float).eps] = 1.0
+        if q.min() < _SMALLEST:
+            raise ValueError(
+                f"p/mu must not differ by more than {_LARGEST} between the two directions, "
+                f"but does with {given}"
+            )
+
+        p = q * mu
+        for array in (mu, p):
+            array.flags.writeable = False
+        set_ = object.__setattr__
+        set_(self, "mu", mu)
+        set_(self, "p", p)
+        set_(self, "frictionless", not positive.any())
+        set_(self, "associated", bool(np.all(q == 1.0)))
+        set_(self, "isotropic", self.associated and bool(np.all(mu[..., 0] == mu[..., 1])))
+        set_(self, "_laws", {})
+
+    def __setattr__(self, name, value):
+        raise AttributeError(f"Friction is immutable: make a new one to change {name}")
+
+    __delattr__ = __setattr__
+
+    def __reduce__(self):
+        p = np.where(self.mu > 0, self.p, 1.0)
+        return Friction, (self.mu, p)
+
+    def __repr__(self):
+        if self.mu.ndim == 2:
+            return f"<Friction with coefficients for {len(self.mu)} nodes>"
+        mu, p = (tuple(map(float, array)) for array in (self.mu, self.p))
+        return f"Friction(mu={mu})" if self.associated else f"Friction(mu={mu}, p={p})"
+
+    def law(self, dim: int):
+        """The kernel's law in ``dim`` = 2 or 3 dimensions.
+
+        Raises:
+            ValueError: Friction is not isotropic and ``dim`` is 2, where there is only one
+                tangential direction.
+        """
+        if dim == 2 and not self.isotropic:
+            raise ValueError(
+                "in two dimensions there is one tangential direction: give mu as one number and no "
+                f"p, not {self!r}"
+            )
+        if dim not in self._laws:
+            mu = np.ascontiguousarray(self.mu[..., : dim - 1])
+            p = None
+            if not self.associated:
+                p = np.where(self.mu > 0, self.p, 1.0)
+            self._laws[dim] = _kernel.make_law(mu, p, dim)
+        return self._laws[dim]
+
+
+def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
+    """Q = P M^-1 up to a factor for ``p_y / p_x = (mu_y / mu_x)**k``, by logarithms: the powers alone
+    could overflow."""
+    exponent = np.asarray(k)
+    if exponent.dtype.kind not in "iuf" or exponent.shape != ():
+        raise ValueError(f"k must be one real number, not {k!r}")
+    if not np.isfinite(exponent):
+        raise ValueError(f"k must be finite, not {k!r}")
+    positive = np.where(mu > 0, mu, 1.0)
+    log_q = (float(exponent) - 1.0) * np.log(positive)
+    return np.exp(log_q - log_q.max(axis=-1, keepdims=True))

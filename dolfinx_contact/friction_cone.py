@@ -1,0 +1,72 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The elliptic friction cone on NumPy arrays: load function and Euclidean projection.
+
+[dSFMH07]: see :mod:`dolfinx_contact.friction`. Needs NumPy alone, no DOLFINx.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.friction import Friction
+
+
+def as_nodes(name: str, value, components: int | None, nodes: int | None = None) -> np.ndarray:
+    """``value`` as a float64 array with one row per node, without a copy where it is one already.
+
+    Raises:
+        ValueError: The shape is not ``(n, components)`` (``(n,)`` for None), or the type is not
+            real or has more digits than float64.
+    """
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
+        raise ValueError(
+            f"{name} must be real numbers of at most 64 bits, not {array.dtype}: "
+            "conversion to float64 would lose digits or the imaginary part"
+        )
+    wanted = "n" if nodes is None else str(nodes)
+    rows = array.ndim > 0 and nodes in (None, array.shape[0])
+    if not rows or array.shape[1:] != (() if components is None else (components,)):
+        tail = "," if components is None else f", {components}"
+        raise ValueError(f"{name} must have shape ({wanted}{tail}), not {array.shape}")
+    array = array.astype(np.float64, copy=False)
+    if any(stride % 8 for stride in array.strides) or not array.flags.aligned:
+        array = np.ascontiguousarray(array)
+    return array
+
+
+def project_cone(tau, mu):
+    """Euclidean projection on the friction cone ``|M^-1 r_t| <= r_n``, the corrector of
+    [dSFMH07, Section 2].
+
+    Args:
+        tau: Points in the local frame ``(t1, t2, n)``, ``shape=(n, 3)``, any unit.
+        mu: Coefficients of friction, a number, ``shape=(2,)`` or ``(n, 2)``. Zero: the cone is the
+            half line ``r_t = 0, r_n >= 0``.
+
+    Returns:
+        The projected points, ``shape=(n, 3)``. A row of ``tau`` that is infinite or NaN gives a row
+        of NaN; the others are not touched by it. (For a frictionless cone only ``tau_n`` counts.)
+
+    Raises:
+        ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.
+    """
+    return Friction(mu).law(3).project(as_nodes("tau", tau, 3))[0]
+
+
+def load_function(r, mu):
+    """Load function ``f = |M^-1 r_t| - r_n`` of [dSFMH07, Eq. (1)]: negative inside the friction
+    cone, zero on its boundary.
+
+    Args:
+        r: Reactions in the local frame ``(t1, t2, n)``, ``shape=(n, 3)``, any unit.
+        mu: As in :func:`project_cone`. Where it is zero everywhere, ``f = -r_n``.
+
+    Returns:
+        ``shape=(n,)``, in the unit of ``r``.
+
+    Raises:
+        ValueError: As :func:`project_cone`.
+    """
+    return Friction(mu).law(3).load_function(as_nodes("r", r, 3))
