@@ -1,0 +1,42 @@
+# make punch    the paper's punch: the table, a picture and ParaView files in results/punch
+# make test     all tests: the C++ ones, and the Python ones on 1, 2 and 3 MPI ranks
+# Both set up .venv first (tools/setup), when something it was made from has changed.
+
+.PHONY: punch test test-cpp test-python test-wheel format stubs clean
+
+RANKS = 1 2 3
+made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
+	$(wildcard cpp/*.cpp cpp/include/dolfinx_contact/*.h)
+python_files = dolfinx_contact demos tests tools/probe.py
+
+punch: .venv/ready
+	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
+
+test: test-cpp test-python
+
+test-cpp: .venv/ready
+	tools/ctest
+
+test-python: .venv/ready
+	for n in $(RANKS); do tools/mpitest .venv $$n $(ARGS) || exit 1; done
+
+# the same Python tests on the newest DOLFINx on PyPI
+test-wheel: .venv-wheel/ready
+	for n in $(RANKS); do tools/mpitest .venv-wheel $$n $(ARGS) || exit 1; done
+
+format: .venv/ready
+	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')
+	.venv/bin/ruff format $(python_files)
+	.venv/bin/ruff check --fix $(python_files)
+
+stubs: .venv/ready
+	tools/stubs
+
+.venv/ready: $(made_from)
+	tools/setup .venv
+
+.venv-wheel/ready: $(made_from)
+	tools/setup .venv-wheel wheel
+
+clean:
+	rm -rf .venv .venv-wheel build results
