@@ -1,1 +1,25 @@
-from dolfinx_contact import _kernel as _kernel
+"""Frictional contact of elastic bodies with rigid planes, for FEniCSx, by the bi-potential method."""
+
+from dolfinx_contact import _dolfinx  # first: some releases must be imported in a certain order
+from dolfinx_contact.bipotential import bipotential_gap
+from dolfinx_contact.contact import Contact, Status
+from dolfinx_contact.fixed_point import FixedPoint
+from dolfinx_contact.friction import Friction
+from dolfinx_contact.friction_cone import load_function, project_cone
+from dolfinx_contact.plane import RigidPlane
+from dolfinx_contact.problem import ContactProblem, Counts, NotConverged, Step
+
+__all__ = [
+    "Contact",
+    "ContactProblem",
+    "Counts",
+    "FixedPoint",
+    "Friction",
+    "NotConverged",
+    "RigidPlane",
+    "Status",
+    "Step",
+    "bipotential_gap",
+    "load_function",
+    "project_cone",
+]

@@ -136,6 +136,11 @@ class Friction:
         mu, p = (tuple(map(float, array)) for array in (self.mu, self.p))
         return f"Friction(mu={mu})" if self.associated else f"Friction(mu={mu}, p={p})"
 
+    @property
+    def Q(self) -> np.ndarray:
+        """Diagonal of Q = P M^-1, largest entry 1, same shape as ``mu``; zero where ``mu`` is."""
+        return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
+
     def law(self, dim: int):
         """The kernel's law in ``dim`` = 2 or 3 dimensions.
 

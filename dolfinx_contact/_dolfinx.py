@@ -1,0 +1,93 @@
+"""Today's DOLFINx names on yesterday's releases, 0.5 to 0.11.
+
+The only file of this project that knows which release is installed.  Package, demos and tests
+import from here what moved between releases, and read as present-day DOLFINx everywhere else.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+try:  # the wheel dolfinx-solver-real wants to be imported before DOLFINx, PETSc and MPI
+    import dolfinx_solver  # noqa: F401
+except ImportError:
+    pass
+
+import dolfinx
+import dolfinx.fem.petsc  # noqa: F401  (a submodule that newer releases do not import by themselves)
+import numpy as np
+from dolfinx import fem, la
+from petsc4py import PETSc
+
+if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+    raise ImportError(
+        "dolfinx_contact needs a real-valued PETSc: this one computes with complex numbers "
+        f"({PETSc.ScalarType.__name__}), and contact inequalities have no meaning there. Install or "
+        "activate the real build (Debian: python3-dolfinx-real, conda: petsc=*=real*, "
+        "PyPI: dolfinx-solver-real)."
+    )
+
+version: str = dolfinx.__version__
+
+_ADD = (la.InsertMode if hasattr(la, "InsertMode") else la.ScatterMode).add
+
+
+def functionspace(mesh, element):
+    """Function space from ``(family, degree)`` or ``(family, degree, shape)``, as in DOLFINx >= 0.7."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, element)
+    family, degree, *shape = element
+    if not shape or shape[0] == ():
+        return fem.FunctionSpace(mesh, (family, degree))
+    if len(shape[0]) == 2:
+        return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape[0])
+    return fem.VectorFunctionSpace(mesh, (family, degree), dim=shape[0][0])
+
+
+def interpolation_points(V):
+    """Interpolation points of the element of ``V``: a method before DOLFINx 0.10, a property since."""
+    points = V.element.interpolation_points
+    return points() if callable(points) else points
+
+
+def model_to_mesh(model, comm, rank, gdim=3):
+    """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10)."""
+    try:
+        from dolfinx.io import gmsh
+    except ImportError:
+        from dolfinx.io import gmshio as gmsh
+    found = gmsh.model_to_mesh(model, comm, rank, gdim=gdim)
+    if hasattr(found, "facet_tags"):
+        return found
+    return SimpleNamespace(mesh=found[0], cell_tags=found[1], facet_tags=found[2])
+
+
+def is_function_space(V) -> bool:
+    return isinstance(V, fem.FunctionSpace if hasattr(fem, "FunctionSpace") else ())
+
+
+def lagrange_degree(V) -> int | None:
+    """Degree of a continuous Lagrange space, blocked or not; None for any other element."""
+    element = V.ufl_element()
+    if callable(getattr(element, "family", None)):  # legacy UFL elements, DOLFINx < 0.7
+        return element.degree() if element.family() in ("Lagrange", "Q") else None
+    continuous = not getattr(element, "discontinuous", True)
+    return element.degree if element.family_name == "P" and continuous else None
+
+
+def bc_dofs(bc):
+    """Owned degrees of freedom (local, unrolled) that a Dirichlet condition fixes."""
+    dofs, owned = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()
+    return np.asarray(dofs[:owned])
+
+
+def assemble_into(x, form) -> None:
+    """Assemble a linear form into the distributed vector ``x`` and add what ghosts hold to owners."""
+    x.array[:] = 0.0
+    fem.assemble_vector(x.array, form)
+    x.scatter_reverse(_ADD)
+
+
+def petsc_vec(u):
+    """The PETSc vector of a Function: ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before."""
+    return u.x.petsc_vec if hasattr(u.x, "petsc_vec") else u.vector

@@ -1,0 +1,65 @@
+"""Anderson acceleration (type II) of a fixed point x <- x + g(x), one global reduction per iteration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class Anderson:
+    """Mixes the last corrections so that their combination is as small as possible in norm.
+
+    Equations as in H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49 (2011), Section 2: with the
+    differences dX, dG of iterates and corrections, x <- x + g - (dX + dG) gamma, gamma the least
+    squares solution of dG gamma = g.
+
+    Args:
+        size: Number of unknowns of this rank.
+        depth: Number of differences kept; memory is two vectors for each.
+        total: Function that sums an array over all ranks.
+    """
+
+    def __init__(self, size: int, depth: int, total):
+        self._dx = np.empty((depth, size))
+        self._dg = np.empty((depth, size))
+        self._gram = np.zeros((depth, depth))
+        self._total = total
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all differences: the next step is a plain one."""
+        self._count = 0
+        self._last = None
+
+    def step(self, x: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, float]:
+        """The next iterate after ``x`` with the correction ``g``, and the global norm of ``g``."""
+        depth = self._dx.shape[0]
+        row = None
+        if self._last is not None:
+            row = self._count % depth
+            np.subtract(x, self._last[0], out=self._dx[row])
+            np.subtract(g, self._last[1], out=self._dg[row])
+            self._count += 1
+        self._last = (x, g)
+        m = min(self._count, depth)
+        dx, dg = self._dx[:m], self._dg[:m]
+        newest = np.zeros(m) if row is None else dg @ dg[row]
+        sums = self._total(np.concatenate((newest, dg @ g, [g @ g])))
+        norm = float(np.sqrt(sums[-1]))
+        if row is None:
+            return x + g, norm
+        self._gram[row, :m] = self._gram[:m, row] = sums[:m]
+        gamma = _solve(self._gram[:m, :m], sums[m:-1])
+        return x + g - gamma @ dx - gamma @ dg, norm
+
+
+def _solve(gram: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """Least squares from its normal equations, columns scaled to length one.
+
+    Directions that the other columns give up to the rounding of the Gram matrix are left out.
+    """
+    length = np.sqrt(np.diag(gram))
+    if not np.isfinite(gram).all() or (length == 0.0).all():
+        return np.zeros_like(rhs)
+    scale = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+    scaled = gram * scale[:, None] * scale
+    return scale * np.linalg.lstsq(scaled, rhs * scale, rcond=4e-15)[0]

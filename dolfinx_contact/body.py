@@ -1,0 +1,239 @@
+"""The elastic body: what DOLFINx assembles and PETSc solves, without a word of contact.
+
+All vectors are NumPy arrays of the degrees of freedom that this rank owns.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from itertools import count
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from dolfinx_contact import _dolfinx
+from dolfinx_contact._errors import raised_together
+
+DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+_instances = count()
+
+
+class ElasticBody:
+    """F(u) = K u - f on the free degrees of freedom, u given on the others.
+
+    Args:
+        F: Residual form, linear in ``u``.
+        u: Displacement.
+        bcs: Dirichlet conditions; their values may change between steps, their places not.
+        J: Derivative of ``F``; found by UFL if None.
+        petsc_options: Options of the solver; by default a factorisation by MUMPS.
+        petsc_options_prefix: Their prefix.
+
+    Raises:
+        ValueError: ``F`` is no residual form in ``u``.
+        NotImplementedError: ``F`` is not linear in ``u``.
+    """
+
+    def __init__(self, F, u, bcs, J=None, petsc_options=None, petsc_options_prefix=None):
+        self.u, self.V, self.bcs = u, u.function_space, list(bcs)
+        self.comm = self.V.mesh.comm
+        with raised_together(self.comm):
+            derivative = _linear_part(F, u, J)
+        self._residual_form = fem.form(F)
+        self._stiffness_form = fem.form(derivative)
+        self._parameters = [*derivative.coefficients(), *derivative.constants()]
+        self._work = fem.Function(self.V)
+        self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
+        fixed = [_dolfinx.bc_dofs(bc) for bc in self.bcs]
+        self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
+        self._options = DIRECT if petsc_options is None else dict(petsc_options)
+        self._prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
+        self._digest = None
+        self._assemblies = 0
+        self.K = None
+
+    def refresh(self) -> int:
+        """Assemble the stiffness if a constant or coefficient in it changed.
+
+        Returns:
+            How often it was assembled so far: a number that changes with the matrix.
+        """
+        digest = hashlib.blake2b()
+        for parameter in self._parameters:
+            values = parameter.x.array if hasattr(parameter, "x") else parameter.value
+            digest.update(np.ascontiguousarray(values))
+        digest = digest.digest()
+        if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
+            return self._assemblies
+        self._digest = None  # so that a failure below does not leave a stale matrix
+        if self.K is None:
+            self.K = fem.petsc.assemble_matrix(self._stiffness_form, bcs=self.bcs)
+        else:
+            self.K.zeroEntries()
+            fem.petsc.assemble_matrix(self.K, self._stiffness_form, bcs=self.bcs)
+        self.K.assemble()
+        with raised_together(self.comm):
+            if not np.isfinite(self.K.getDiagonal().array).all():
+                raise ValueError(
+                    "the stiffness contains NaN or infinity: check the material parameters in F."
+                )
+        self._right, self._left = self.K.createVecs()
+        self._elastic = None
+        self._refuse_rigid_motion()
+        self._digest = digest
+        self._assemblies += 1
+        return self._assemblies
+
+    # -- loads and residuals -------------------------------------------------------------------
+
+    def load(self) -> tuple[np.ndarray, np.ndarray]:
+        """Boundary values and loads of this step.
+
+        Returns:
+            ``b`` with ``b - K u`` the residual forces for any ``u`` that has the boundary values
+            (which ``b`` holds at fixed degrees of freedom), and the external forces alone.
+        """
+        lift = self._work.x.array.copy()
+        lift[:] = 0.0
+        fem.set_bc(lift, self.bcs)
+        external = -self.internal_force(np.zeros_like(lift))
+        b = -self.internal_force(lift) if self.comm.allreduce(lift.any(), op=MPI.LOR) else external.copy()
+        with raised_together(self.comm):
+            for name, values in (("boundary values", lift), ("loads", external), ("loads", b)):
+                if not np.isfinite(values).all():
+                    raise ValueError(f"the {name} contain NaN or infinity: nothing was solved.")
+        external[self.fixed] = 0.0
+        b[self.fixed] = lift[self.fixed]
+        return b, external
+
+    def internal_force(self, values: np.ndarray) -> np.ndarray:
+        """F assembled by DOLFINx at a displacement, owned entries; ``u`` itself is left as it was."""
+        kept = self.u.x.array.copy()
+        try:
+            self.u.x.array[: values.size] = values
+            self.u.x.scatter_forward()
+            _dolfinx.assemble_into(self._work.x, self._residual_form)
+        finally:
+            self.u.x.array[:] = kept
+        return self._work.x.array[: self.size].copy()
+
+    def multiply(self, x: np.ndarray) -> np.ndarray:
+        """K x; rows and columns of fixed degrees of freedom are those of the identity."""
+        self._right.array_w[:] = x
+        self.K.mult(self._right, self._left)
+        return self._left.array_r.copy()
+
+    def total(self, array: np.ndarray) -> np.ndarray:
+        """Sum of an array over all ranks."""
+        result = np.array(array, dtype=np.float64)
+        self.comm.Allreduce(MPI.IN_PLACE, result, op=MPI.SUM)
+        return result
+
+    def largest(self, x: np.ndarray) -> float:
+        """Largest entry over all ranks, at least zero."""
+        return self.comm.allreduce(float(x.max(initial=0.0)), op=MPI.MAX)
+
+    def norm(self, x: np.ndarray) -> float:
+        """Euclidean norm over all ranks, safe against under- and overflow of squares."""
+        largest = self.largest(np.abs(x))
+        if largest == 0.0 or not np.isfinite(largest):
+            return largest
+        return largest * float(np.sqrt(self.total(np.sum((x / largest) ** 2))))
+
+    # -- solves --------------------------------------------------------------------------------
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """K^-1 b; the factorisation is made at the first call and kept while K stands."""
+        if self._elastic is None:
+            self._elastic = self.factorise(self.K)
+        return self._elastic(b)
+
+    def factorise(self, A):
+        """A function that applies the inverse of a PETSc matrix, by the options of this body."""
+        ksp = PETSc.KSP().create(self.comm)
+        ksp.setOptionsPrefix(self._prefix)
+        ksp.setOperators(A)
+        options = PETSc.Options()
+        options.prefixPush(self._prefix)
+        for key, value in self._options.items():
+            options[key] = value
+        ksp.setFromOptions()
+        for key in self._options:
+            del options[key]
+        options.prefixPop()
+        right, left = A.createVecs()
+
+        def solve(b: np.ndarray) -> np.ndarray:
+            left.array_w[:] = b
+            ksp.solve(left, right)
+            if ksp.getConvergedReason() < 0:
+                raise RuntimeError(
+                    f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) "
+                    f"after {ksp.getIterationNumber()} iterations; options {self._options}."
+                )
+            return right.array_r.copy()
+
+        return solve
+
+    def _refuse_rigid_motion(self) -> None:
+        """Raise if a rigid motion costs no energy; a factorisation would not notice."""
+        modes = _rigid_modes(self.V, self.size, self.comm)
+        held = self.total(modes[self.fixed].T @ modes[self.fixed])
+        values, vectors = np.linalg.eigh(held)
+        # Squares of lengths, relative to the best held motion: 1e-13 is rounding, not distance.
+        free = modes @ vectors[:, values <= 1e-13 * values[-1]]
+        if free.shape[1] == 0:
+            return
+        free[self.fixed] = 0.0
+        energy = self.total(free.T @ np.array([self.multiply(z) for z in free.T]).T)
+        scale = self.total(free.T @ (self.K.getDiagonal().array[:, None] * free))
+        root = np.linalg.inv(np.linalg.cholesky(scale))
+        stiffness = np.linalg.eigvalsh(root @ (energy + energy.T) / 2 @ root.T)
+        if stiffness[0] < 1e-13:
+            raise ValueError(
+                f"nothing holds the body: {int((stiffness < 1e-13).sum())} rigid motion(s) are left "
+                "free by the boundary conditions and cost no energy. Contact alone does not hold it "
+                "here: fix it by Dirichlet conditions, or add a soft spring to F."
+            )
+
+
+def _linear_part(F, u, J):
+    """The bilinear form of F, after a check that F is linear in u."""
+    if not isinstance(F, ufl.Form) or len(F.arguments()) != 1:
+        raise ValueError(
+            f"F must be a residual form with one test function, as in DOLFINx's NonlinearProblem; got "
+            f"{type(F).__name__}" + (f" of rank {len(F.arguments())}." if isinstance(F, ufl.Form) else ".")
+        )
+    if F.arguments()[0].ufl_function_space() != u.ufl_function_space():
+        raise ValueError("the test function of F lives on another space than u.")
+    derivative = ufl.algorithms.expand_derivatives(
+        ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
+    )
+    if derivative.empty():
+        raise ValueError("F does not depend on u: write it as residual, internal minus external work.")
+    if J is not None:
+        derivative, given = ufl.algorithms.expand_derivatives(J), derivative
+        if any(c is u for c in given.coefficients()):
+            derivative = given
+    if any(c is u for c in derivative.coefficients()):
+        raise NotImplementedError("F is not linear in u: nonlinear bodies are not supported yet.")
+    return derivative
+
+
+def _rigid_modes(V, size: int, comm) -> np.ndarray:
+    """Translations, and rotations about the middle scaled by the body's size, ``shape=(size, 3 or 6)``."""
+    gdim = V.mesh.geometry.dim
+    x = V.tabulate_dof_coordinates()[: size // gdim, :gdim]
+    low, high = x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)
+    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    x = (x - (low + high) / 2) / (high - low).max()
+    pairs = [(i, j) for i in range(gdim) for j in range(i)]
+    modes = np.zeros((x.shape[0], gdim, gdim + len(pairs)))
+    modes[:, range(gdim), range(gdim)] = 1.0
+    for k, (i, j) in enumerate(pairs, start=gdim):
+        modes[:, i, k], modes[:, j, k] = -x[:, j], x[:, i]
+    return modes.reshape(size, -1)

@@ -1,0 +1,328 @@
+"""The contact of boundary nodes with a rigid plane: kinematics, reactions and their history."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import exterior_facet_indices
+from mpi4py import MPI
+
+from dolfinx_contact import _dolfinx
+from dolfinx_contact._errors import raised_together
+from dolfinx_contact.friction import Friction
+from dolfinx_contact.plane import RigidPlane
+
+
+class Status(IntEnum):
+    """What a contact node does, which is the branch that the projection took."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
+class _State(NamedTuple):
+    """All that a step leaves to the next one; arrays over the owned contact nodes, local frame."""
+
+    displacement: np.ndarray  # of the node relative to the plane, (n, gdim)
+    reaction: np.ndarray  # (n, gdim)
+    gap: np.ndarray  # (n,)
+    slip_increment: np.ndarray  # (n, gdim - 1)
+    status: np.ndarray  # (n,)
+
+
+class Contact:
+    """Nodes of boundary facets that may touch a rigid plane.
+
+    Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The
+    local frame is (t1, t2, n), in two dimensions (t, n): the plane's axis, the direction across
+    it, and the normal.
+
+    Args:
+        V: First-order continuous Lagrange space of displacements, one component per dimension.
+        facets: Local indices of boundary facets, integers; a rank may have none.
+        plane: The rigid plane.
+        friction: The friction law, the same on all ranks.
+
+    Raises:
+        ValueError: on all ranks, for facets that are not boundary facets of the mesh, a space that
+            does not fit, a plane of another dimension or without an axis where friction needs one.
+
+    Attributes:
+        nodes: Indices of the nodes among the blocks of ``V``, ``shape=(n,)``.
+        x: Reference positions, ``shape=(n, 3)``, global frame.
+        gap: Distance to the plane, ``shape=(n,)``; negative is penetration.
+        slip_increment: Slip relative to the plane since the last step, ``shape=(n, gdim - 1)``, local.
+        reaction: Force of the plane on the body, ``shape=(n, gdim)``, local frame.
+        status: A ``Status`` per node, ``shape=(n,)``.
+        rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
+    """
+
+    def __init__(self, V, facets, plane: RigidPlane, friction: Friction):
+        if not _dolfinx.is_function_space(V):
+            raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
+        mesh = V.mesh
+        gdim, fdim = mesh.geometry.dim, mesh.topology.dim - 1
+        for dims in ((fdim, fdim + 1), (fdim, 0)):
+            mesh.topology.create_connectivity(*dims)
+        boundary = exterior_facet_indices(mesh.topology)
+        with raised_together(mesh.comm):
+            _check_space(V)
+            facets = _checked_facets(facets, mesh.topology.index_map(fdim), boundary)
+            _check_law(plane, friction, gdim)
+        described = repr((plane, plane.displacement.tolist(), friction))
+        same = described == mesh.comm.bcast(described, root=0) or friction.mu.ndim > 1
+        blocks = fem.locate_dofs_topological(V, fdim, facets)
+        owned = V.dofmap.index_map.size_local
+        self.nodes = np.unique(blocks[blocks < owned])
+        total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
+        with raised_together(mesh.comm):
+            if not same:
+                raise ValueError(f"plane and friction differ between ranks: here {described}.")
+            if total == 0:
+                raise ValueError("facets is empty on all ranks: name the facets that may touch.")
+            _check_coefficients(friction, self.nodes.size)
+
+        self.V, self.plane, self.friction = V, plane, friction
+        self.comm = mesh.comm
+        self.law = friction.law(gdim)
+        self.frame = plane.frame
+        self.x = V.tabulate_dof_coordinates()[self.nodes]
+        self.rho = None
+        self._size = gdim * owned
+        self._dofs = gdim * self.nodes[:, None] + np.arange(gdim)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the history: undeformed body, no reactions, the plane where it is now."""
+        n, gdim = self._dofs.shape
+        self._converged = _State(
+            np.tile(-self.frame @ self.plane.displacement, (n, 1)),
+            np.zeros((n, gdim)),
+            self._gap0 - (self.frame @ self.plane.displacement)[-1],
+            np.zeros((n, gdim - 1)),
+            np.full(n, Status.OPEN, dtype=np.uint8),
+        )
+        self.restore()
+
+    @property
+    def _gap0(self) -> np.ndarray:
+        return (self.x[:, : self.plane.point.size] - self.plane.point) @ self.plane.normal
+
+    # -- one iteration -------------------------------------------------------------------------
+
+    def set_metric(self, K) -> None:
+        """Take ``rho`` from the assembled stiffness: the normal diagonal entry of each node.
+
+        Args:
+            K: Assembled PETSc stiffness matrix on ``V``.  Collective.
+        """
+        n = self.frame[-1]
+        self.rho = np.einsum("i,kij,j->k", n, self.stiffness_blocks(K), n)
+
+    def stiffness_blocks(self, K) -> np.ndarray:
+        """Diagonal blocks of the contact nodes in a PETSc matrix, ``shape=(n, gdim, gdim)``, global."""
+        from petsc4py import PETSc
+
+        n, gdim = self._dofs.shape
+        rows = PETSc.IS().createGeneral(self._global_dofs(K), comm=self.comm)
+        block = K.createSubMatrix(rows, rows)
+        start, columns, values = block.getValuesCSR()
+        row = np.repeat(np.arange(n * gdim), np.diff(start))
+        column = columns - block.getOwnershipRange()[0]
+        here = row // gdim == column // gdim
+        blocks = np.zeros((n, gdim, gdim))
+        blocks[row[here] // gdim, row[here] % gdim, column[here] % gdim] = values[here]
+        rows.destroy()
+        block.destroy()
+        return blocks
+
+    def add_springs(self, K, springs: np.ndarray) -> None:
+        """Add a spring per contact node and local direction to a PETSc matrix.  Collective.
+
+        Args:
+            K: Assembled PETSc matrix on ``V``, changed in place.
+            springs: Stiffnesses, ``shape=(n, gdim)``, local frame, force per length.
+        """
+        from petsc4py import PETSc
+
+        gdim = self.frame.shape[0]
+        dofs = self._global_dofs(K).reshape(-1, gdim)
+        blocks = np.einsum("ki,nk,kj->nij", self.frame, springs, self.frame)
+        for node, block in zip(dofs, blocks):
+            K.setValues(node, node, block, addv=PETSc.InsertMode.ADD_VALUES)
+        K.assemble()
+
+    def _global_dofs(self, K) -> np.ndarray:
+        return (self._dofs.ravel() + K.getOwnershipRange()[0]).astype(np.int32)
+
+    def move(self, u) -> None:
+        """Gaps and slip increments for a displacement, from the last converged step on.
+
+        Args:
+            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+        """
+        values = u.x.array if hasattr(u, "x") else u
+        self._displacement = (values[self._dofs] - self.plane.displacement) @ self.frame.T
+        self.gap = self._gap0 + self._displacement[:, -1]
+        self.slip_increment = (self._displacement - self._converged.displacement)[:, :-1]
+
+    def gap_rounding(self, u: np.ndarray) -> float:
+        """Bound of the rounding in a gap: a penetration below it is none, length units."""
+        lengths = (self.x, self.plane.point, self.plane.displacement, u[self._dofs])
+        return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
+
+    def update(self, u) -> None:
+        """One predictor and corrector of the paper for all nodes [dSFMH07, Section 2].
+
+        Takes ``u``, computes gaps and slip increments, and replaces ``reaction`` by the projection
+        of ``reaction - rho (...)`` on the friction cone, and ``status`` by the branch it took.
+
+        Args:
+            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+
+        Raises:
+            ValueError: ``rho`` has not been set; see ``set_metric``.
+        """
+        if self.rho is None:
+            raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
+        self.move(u)
+        self.reaction, self.status = self.law.bipotential_map(
+            self.reaction, self.gap, self.slip_increment, self.rho
+        )
+
+    def take_reaction(self, forces: np.ndarray) -> None:
+        """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
+        self.reaction = forces[self._dofs] @ self.frame.T
+
+    @property
+    def springs(self) -> np.ndarray:
+        """Springs per unit of rho that belong to the predictor: diag(Q^2, 1), ``shape=(n, gdim)``."""
+        n, gdim = self._dofs.shape
+        springs = np.ones((n, gdim))
+        springs[:, :-1] = self.friction.Q[..., : gdim - 1] ** 2
+        return springs
+
+    def assemble_reaction(self, b) -> None:
+        """Add the nodal reactions, forces on the body, to ``b``.
+
+        Args:
+            b: PETSc vector on ``V``, or the array of its owned degrees of freedom, oriented as
+                ``f - K u``: applied minus internal forces.
+        """
+        array = b if isinstance(b, np.ndarray) else b.array_w
+        array[self._dofs] += self.reaction @ self.frame
+
+    # -- history -------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """Make the present state the last converged one, from which the next slip is measured."""
+        self._converged = _State(
+            self._displacement, self.reaction, self.gap, self.slip_increment, self.status
+        )
+
+    def restore(self) -> None:
+        """Return to the last converged state."""
+        last = self._converged
+        self._displacement, self.reaction, self.gap, self.slip_increment, self.status = last
+
+    @property
+    def previous_reaction(self) -> np.ndarray:
+        """Reactions of the last converged step, ``shape=(n, gdim)``, local frame."""
+        return self._converged.reaction
+
+    # -- results -------------------------------------------------------------------------------
+
+    @property
+    def load_function(self) -> np.ndarray:
+        """f = ||M^-1 r_t|| - r_n, ``shape=(n,)``, force units [dSFMH07, Eq. (1)]."""
+        return self.law.load_function(self.reaction)
+
+    @property
+    def bipotential_gap(self) -> np.ndarray:
+        """Certificate b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
+
+        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``;
+        penetration is reported by itself.
+        """
+        return self.law.bipotential_gap(
+            self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
+        )
+
+    def force(self) -> np.ndarray:
+        """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
+        return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
+
+    def reaction_function(self):
+        """Nodal reactions in global components as a Function on ``V``, zero elsewhere."""
+        function = fem.Function(self.V, name="reaction")
+        self.assemble_reaction(function.x.array)
+        function.x.scatter_forward()
+        return function
+
+
+def _check_space(V) -> None:
+    mesh = V.mesh
+    gdim, tdim = mesh.geometry.dim, mesh.topology.dim
+    components = V.dofmap.index_map_bs
+    if gdim != tdim or gdim not in (2, 3):
+        raise ValueError(f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both.")
+    if components != gdim:
+        raise ValueError(
+            f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
+            f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
+        )
+    if _dolfinx.lagrange_degree(V) != 1:
+        raise ValueError(
+            f"V must be continuous Lagrange of degree 1 (other orders are not supported yet), "
+            f"got {V.ufl_element()}."
+        )
+
+
+def _checked_facets(facets, index_map, boundary) -> np.ndarray:
+    array = np.asarray(facets)
+    if array.size == 0:
+        return np.zeros(0, dtype=np.int32)
+    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(
+            f"facets must be a one-dimensional array of integers, got shape {array.shape} of "
+            f"{array.dtype}."
+        )
+    available = index_map.size_local + index_map.num_ghosts
+    if array.min() < 0 or array.max() >= available:
+        raise ValueError(
+            f"facets range from {array.min()} to {array.max()}, but this rank has facets "
+            f"0 to {available - 1}: pass local indices, of the mesh's own facets."
+        )
+    inside = np.setdiff1d(array[array < index_map.size_local], boundary)
+    if inside.size:
+        raise ValueError(
+            f"facets {inside[:5].tolist()} ({inside.size} in all) are not on the boundary: pass "
+            "facets of dimension tdim - 1 found by locate_entities_boundary or facet tags."
+        )
+    return array.astype(np.int32)
+
+
+def _check_law(plane, friction, gdim: int) -> None:
+    if not isinstance(plane, RigidPlane):
+        raise ValueError(f"plane must be a RigidPlane, got {type(plane).__name__}: {plane!r}.")
+    if not isinstance(friction, Friction):
+        raise ValueError(f"friction must be a Friction, got {type(friction).__name__}: {friction!r}.")
+    if plane.point.size != gdim:
+        raise ValueError(f"{plane} has {plane.point.size} dimensions, the mesh {gdim}.")
+    friction.law(gdim)  # refuses what has no meaning in two dimensions
+    if gdim == 3 and plane.axis is None and not friction.isotropic:
+        raise ValueError(
+            f"plane.axis is None, but {friction} depends on the direction: give RigidPlane the first "
+            "principal friction direction, axis=(...)."
+        )
+
+
+def _check_coefficients(friction, n: int) -> None:
+    for name in ("mu", "p"):
+        shape = np.shape(getattr(friction, name))
+        if len(shape) == 2 and shape[0] != n:
+            raise ValueError(f"friction.{name} has {shape[0]} rows, this rank owns {n} contact nodes.")

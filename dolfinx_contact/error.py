@@ -1,0 +1,42 @@
+r"""The error of a step: one dimensionless number, defined here and nowhere else.
+
+For a displacement ``u`` and admissible nodal reactions ``r`` (in the friction cone),
+
+.. math:: e = \max(|f - K u + r|,\; |r - \mathrm{proj}(r - \kappa w,\, K_\mu)|) \,/\, L .
+
+- The first term is the residual of equilibrium on the free degrees of freedom, assembled by DOLFINx.
+- The second is the residual of the paper's projection equation [dSFMH07, Section 2] over all
+  contact nodes, ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``.  Its metric ``kappa`` is canonical: the
+  normal diagonal entry of the stiffness at the node, never the rho of a solver.
+- ``L`` is the load, which is not the reaction (zero when everything opens): the largest of the
+  external forces, the reactions of the last step, and ``kappa`` times the penetration of the
+  contact-free trial state.  Where all three vanish nothing presses, and ``kappa |u|``, the forces
+  that hold a single node against that displacement, takes their place.
+
+All norms are Euclidean over the nodal vectors of all ranks, so the number depends neither on the
+frame nor on the units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def projection_residual(contact, stiffness: np.ndarray) -> np.ndarray:
+    """``r - proj(r - kappa w, K_mu)``, ``shape=(n, gdim)``, local frame, force units.
+
+    Args:
+        contact: Contact with its present reaction, gap and slip increment.
+        stiffness: Canonical metric ``kappa``, ``shape=(n,)``, force per length.
+    """
+    projected, _ = contact.law.bipotential_map(
+        contact.reaction, contact.gap, contact.slip_increment, stiffness
+    )
+    return contact.reaction - projected
+
+
+def relative(value: float, load: float) -> float:
+    """``value / load``; a residual without any load is no error if it is zero, an infinite one else."""
+    if load > 0.0:
+        return value / load
+    return 0.0 if value == 0.0 else np.inf

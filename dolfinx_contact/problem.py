@@ -1,0 +1,349 @@
+"""An elastic body in contact: one call, one load step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact._errors import raised_together
+from dolfinx_contact.body import ElasticBody
+from dolfinx_contact.contact import Contact, Status
+from dolfinx_contact.error import projection_residual, relative
+from dolfinx_contact.fixed_point import FixedPoint
+
+
+class Counts(NamedTuple):
+    """Number of contact nodes by status, over all ranks."""
+
+    open: int
+    stick: int
+    slip: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """Record of a load step, the same on all ranks.
+
+    Attributes:
+        error: Dimensionless, see ``dolfinx_contact.error``.
+        bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
+        penetration: Largest penetration, >= 0, length.
+        iterations: Iterations of the solver; 0 if the contact-free state already was the solution.
+        seconds: Wall time of the step.
+        counts: Contact nodes open, sticking and slipping.
+    """
+
+    error: float
+    bipotential_gap: float
+    penetration: float
+    iterations: int
+    seconds: float
+    counts: Counts
+
+
+class NotConverged(RuntimeError):
+    """A step did not reach its tolerance; ``step`` is its record.
+
+    Displacement, reactions and history are those of the last converged step.
+    """
+
+    def __init__(self, message: str, step: Step):
+        super().__init__(message)
+        self.step = step
+
+
+class ContactProblem:
+    """An elastic body pressed against rigid planes, solved load step by load step.
+
+    Args:
+        F: Residual form, internal minus external virtual work, linear in ``u``.
+        u: Displacement, a Function.  Holds the solution after a step; at the start of one it is only
+            a guess, the last converged state is kept inside.
+        contacts: The contacts; no node in two of them.
+        bcs: Dirichlet conditions; their values may change between steps.
+        J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
+        solver: A solver, by default ``FixedPoint()``.
+        tol: Largest error of a converged step, see ``dolfinx_contact.error``.
+        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
+        petsc_options_prefix: Their prefix.
+
+    Raises:
+        ValueError: on all ranks, for input that makes no sense; the message says what and why.
+        NotImplementedError: ``F`` is not linear, or tangential displacements of contact nodes are
+            prescribed.
+    """
+
+    def __init__(
+        self,
+        F,
+        u,
+        contacts,
+        bcs=(),
+        J=None,
+        solver=None,
+        tol=1e-8,
+        petsc_options=None,
+        petsc_options_prefix=None,
+    ):
+        if not isinstance(u, fem.Function):
+            raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
+        with raised_together(u.function_space.mesh.comm):
+            self.contacts = _checked_contacts(contacts, u)
+            self.solver = FixedPoint() if solver is None else solver
+            if not callable(getattr(self.solver, "solve", None)):
+                raise ValueError(f"solver {solver!r} is unknown: use None or dc.FixedPoint(...).")
+            self.tol = _checked_tolerance(tol)
+        self.u = u
+        self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
+        with raised_together(self.body.comm):
+            for contact in self.contacts:
+                _check_free(contact, self.body.fixed)
+        self._stiffened = {}
+        self._assembled = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the undeformed body without reactions or history; planes stay where they are."""
+        self._states = [np.zeros(self.body.size)] * 2
+        for contact in self.contacts:
+            contact.reset()
+        self._restore()
+
+    def solve(self) -> Step:
+        """Solve one load step; the history advances when it succeeds.  Collective.
+
+        Returns:
+            The record of the step.
+
+        Raises:
+            NotConverged: the error stayed above ``tol``; carries the record.
+            ValueError: loads, boundary values, planes or ``u`` that are not finite, or a body that
+                nothing holds.  After any exception the last converged state is in place.
+        """
+        start = perf_counter()
+        try:
+            with raised_together(self.body.comm):
+                self._check_input()
+            x, error, iterations = self._solve()
+            step = self._record(error, iterations, perf_counter() - start)
+            if not error <= self.tol:
+                raise NotConverged(
+                    f"not converged: error {error:.3e} above tol {self.tol:.1e} after {iterations} "
+                    f"iterations ({step.counts.open} open, {step.counts.stick} sticking, "
+                    f"{step.counts.slip} slipping nodes). Smaller load steps help most often.",
+                    step,
+                )
+        except BaseException:
+            self._restore()
+            raise
+        self._states = [x, self._states[0]]
+        self._show(x)
+        for contact in self.contacts:
+            contact.advance()
+        return step
+
+    def _solve(self) -> tuple[np.ndarray, float, int]:
+        body = self.body
+        assembled = body.refresh()
+        if assembled != self._assembled:
+            self._assembled = assembled
+            self._stiffened.clear()
+            for contact in self.contacts:
+                contact.set_metric(body.K)
+            self._stiffness = [contact.rho for contact in self.contacts]
+        b, external = body.load()
+        trial = body.solve(b)
+        trial[body.fixed] = b[body.fixed]
+        equations = _ContactEquations(self, b, self._load(trial, external))
+        if not self._touches:
+            return trial, equations.open_error(trial), 0
+        last, before = self._states
+        guesses = [self.u.x.array[: body.size].copy(), 2 * last - before]
+        for guess in guesses:
+            guess[body.fixed] = b[body.fixed]
+        x = min(guesses, key=lambda guess: equations.residual(guess)[1])
+        x, error, iterations = self.solver.solve(equations, x, self.tol)
+        return x, equations.residual(x)[1], iterations
+
+    def _load(self, trial: np.ndarray, external: np.ndarray) -> float:
+        """The load of the step, see ``dolfinx_contact.error``; notes whether the trial state touches."""
+        body = self.body
+        previous, pressed, deepest = [], [], 0.0
+        for contact, stiffness in zip(self.contacts, self._stiffness):
+            contact.move(trial)
+            previous.append(contact.previous_reaction.ravel())
+            pressed.append(stiffness * np.maximum(-contact.gap, 0.0))
+            deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
+        empty = [np.zeros(0)]
+        penetration = body.norm(np.concatenate(pressed + empty))
+        self._touches = body.largest(np.array([deepest])) > 1.0
+        if not self._touches:
+            penetration = 0.0
+        load = max(body.norm(external), body.norm(np.concatenate(previous + empty)), penetration)
+        if load > 0.0:
+            return load
+        return body.norm(trial) * body.largest(np.concatenate(self._stiffness + empty))
+
+    # -- helpers -------------------------------------------------------------------------------
+
+    def _check_input(self) -> None:
+        if not np.isfinite(self.u.x.array).all():
+            raise ValueError("u contains NaN or infinity: it is the guess of this step, set it anew.")
+        for contact in self.contacts:
+            if not np.isfinite(contact.plane.displacement).all():
+                raise ValueError(
+                    f"plane.displacement must be finite, got {contact.plane.displacement}."
+                )
+
+    def _record(self, error: float, iterations: int, seconds: float) -> Step:
+        sums = np.zeros(4)
+        penetration = 0.0
+        for contact in self.contacts:
+            sums[:3] += np.bincount(contact.status, minlength=3)
+            sums[3] += contact.bipotential_gap.sum()
+            penetration = max(penetration, -contact.gap.min(initial=0.0))
+        *counts, gap = self.body.total(sums)
+        return Step(
+            error=float(error),
+            bipotential_gap=float(gap),
+            penetration=self.body.largest(np.array([penetration])),
+            iterations=iterations,
+            seconds=seconds,
+            counts=Counts(*(int(count) for count in counts)),
+        )
+
+    def _show(self, x: np.ndarray) -> None:
+        self.u.x.array[: self.body.size] = x
+        self.u.x.scatter_forward()
+
+    def _restore(self) -> None:
+        self._show(self._states[0])
+        for contact in self.contacts:
+            contact.restore()
+
+
+class _ContactEquations:
+    """What a solver sees of a step: a residual, a correction, a metric and a sum over ranks."""
+
+    def __init__(self, problem: ContactProblem, b: np.ndarray, load: float):
+        self.problem, self.body, self.b, self.load = problem, problem.body, b, load
+        self.total = problem.body.total
+        self._metric = 1.0
+
+    def use_metric(self, factor: float) -> None:
+        """Set rho of the predictor to ``factor`` times the nodal stiffness, springs to match."""
+        self._metric = factor
+        stiffened = self.problem._stiffened
+        if factor not in stiffened:
+            A = self.body.K.copy()
+            for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+                contact.add_springs(A, factor * stiffness[:, None] * contact.springs)
+            stiffened.clear()  # one factorisation at a time: memory counts more than a second try
+            stiffened[factor] = self.body.factorise(A)
+
+    def correction(self, residual: np.ndarray) -> np.ndarray:
+        """Displacement that removes the residual while the springs hold the contact nodes."""
+        correction = self.problem._stiffened[self._metric](residual)
+        correction[self.body.fixed] = 0.0
+        return correction
+
+    def residual(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Forces out of balance once every contact node has its projected reaction, and the error.
+
+        The reactions that enter the predictor are those the body asks for, ``K x - f``.  Once the
+        error falls below the tolerance it is measured again with F itself, assembled by DOLFINx.
+        """
+        forces = self.b - self.body.multiply(x)
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            contact.rho = self._metric * stiffness
+            contact.take_reaction(-forces)
+            contact.update(x)
+        residual = self._balance(forces)
+        error = self._error(residual)
+        if error <= self.problem.tol:
+            error = max(error, self._error(self._balance(self._assembled(x))))
+        return residual, error
+
+    def open_error(self, x: np.ndarray) -> float:
+        """Error of a state in which no node touches, to rounding, and all reactions are zero."""
+        for contact in self.problem.contacts:
+            contact.move(x)
+            contact.gap = np.maximum(contact.gap, 0.0)
+            contact.reaction = np.zeros_like(contact.reaction)
+            contact.status = np.full_like(contact.status, Status.OPEN)
+        return self._error(self._assembled(x))
+
+    def _assembled(self, x: np.ndarray) -> np.ndarray:
+        values = self.problem.u.x.array.copy()
+        values[: self.body.size] = x
+        return -self.body.internal_force(values)
+
+    def _balance(self, forces: np.ndarray) -> np.ndarray:
+        forces = forces.copy()
+        for contact in self.problem.contacts:
+            contact.assemble_reaction(forces)
+        return forces
+
+    def _error(self, residual: np.ndarray) -> float:
+        residual = residual.copy()
+        residual[self.body.fixed] = 0.0
+        projection = [
+            projection_residual(contact, stiffness).ravel()
+            for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness)
+        ]
+        worst = max(self.body.norm(residual), self.body.norm(np.concatenate([*projection, []])))
+        return relative(worst, self.load)
+
+
+def _checked_contacts(contacts, u) -> list[Contact]:
+    contacts = [contacts] if isinstance(contacts, Contact) else list(contacts)
+    taken = np.zeros(0, dtype=np.int64)
+    for contact in contacts:
+        if not isinstance(contact, Contact):
+            raise ValueError(f"contacts must hold dc.Contact objects, got {type(contact).__name__}.")
+        if contact.V != u.function_space:
+            raise ValueError(
+                "a contact lives on another space or mesh than u: build it on u.function_space."
+            )
+        twice = np.intersect1d(taken, contact.nodes)
+        if twice.size:
+            raise ValueError(
+                f"{twice.size} node(s) are in two contacts, the first at "
+                f"{contact.x[np.searchsorted(contact.nodes, twice[0])].tolist()}: separate their facets."
+            )
+        taken = np.union1d(taken, contact.nodes)
+    return contacts
+
+
+def _checked_tolerance(tol) -> float:
+    try:
+        value = float(tol)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not 1e-13 <= value < np.inf:
+        raise ValueError(
+            f"tol must be a finite number of at least 1e-13 (rounding forbids less), got {tol!r}."
+        )
+    return value
+
+
+def _check_free(contact: Contact, fixed: np.ndarray) -> None:
+    free = ~np.isin(contact._dofs, fixed)
+    if free.all():
+        return
+    along_normal = np.linalg.norm(free * contact.plane.normal, axis=1)
+    node = np.argmin(free.all(axis=1))
+    if (along_normal < 1e-12).any():
+        node = np.argmin(along_normal)
+        raise ValueError(
+            f"the normal displacement of the contact node at {contact.x[node].tolist()} is fixed by a "
+            "boundary condition: contact and condition contradict each other, take the node out of one."
+        )
+    raise NotImplementedError(
+        f"the contact node at {contact.x[node].tolist()} has a tangential displacement fixed by a "
+        "boundary condition: not supported yet."
+    )

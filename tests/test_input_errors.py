@@ -1,0 +1,285 @@
+"""Every mistake of a user is a ValueError that says what is wrong, raised by all ranks together.
+
+A test that hangs here means that one rank raised and another waits for it.
+"""
+
+import numpy as np
+import pytest
+import scenes
+import ufl
+
+import dolfinx_contact as dc
+from dolfinx import fem, mesh
+from dolfinx_contact._dolfinx import functionspace
+
+COMM = scenes.COMM
+FRICTION = dc.Friction(mu=0.3)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return scenes.block()
+
+
+def plane(**changes):
+    return dc.RigidPlane(**{"point": (0, 0, 0), "normal": (0, 0, 1), "axis": (1, 0, 0), **changes})
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"normal": (0, 0, 0)}, "normal must not be zero"),
+        ({"normal": (0, np.nan, 1)}, "normal must be finite"),
+        ({"normal": (0, 1)}, "normal must be a vector of 3"),
+        ({"normal": (0, 0, 1, 0)}, "normal must be a vector of 3"),
+        ({"normal": 1.0}, "normal must be a vector of 3"),
+        ({"normal": (0, 0, 1j)}, "normal must be a vector of 3 real"),
+        ({"normal": "up"}, "normal must be a vector"),
+        ({"normal": ((0, 1), 2)}, "normal must be a vector"),
+        ({"point": (0, 0, np.inf)}, "point must be finite"),
+        ({"point": (0,)}, "point must be a vector of 2 or 3"),
+        ({"axis": (0, 0, 0)}, "axis must not be zero"),
+        ({"axis": (1, 0)}, "axis must be a vector of 3"),
+        ({"axis": (0, 0, -2.0)}, "parallel to the normal"),
+        ({"normal": (1, 1, 1), "axis": (1e9, 1e9, 1e9)}, "parallel to the normal"),
+    ],
+)
+def test_plane_refuses(changes, message):
+    """A plane without a direction, or with a wrong one, names the argument and its value."""
+    with pytest.raises(ValueError, match=message):
+        plane(**changes)
+
+
+@pytest.mark.parametrize("value", [(0, 0), (0, 0, np.nan), "far", (0, 0, 1j)])
+def test_plane_refuses_displacement(value):
+    """The plane's displacement is a finite vector of the plane's dimension."""
+    with pytest.raises(ValueError, match="plane.displacement"):
+        plane().displacement = value
+
+
+def bad_facets(scene, case):
+    cells = scene.mesh.topology.index_map(3)
+    facets = scene.mesh.topology.index_map(2)
+    available = facets.size_local + facets.num_ghosts
+    inner = np.setdiff1d(
+        np.arange(facets.size_local), mesh.exterior_facet_indices(scene.mesh.topology)
+    )
+    return {
+        "inside": inner,
+        "floats": scene.facets.astype(float),
+        "matrix": scene.facets.reshape(1, -1),
+        "negative": np.array([-1]),
+        "out of range": np.array([available]),
+        "of the wrong dimension": np.arange(cells.size_local + facets.size_local, dtype=np.int32),
+        "none": np.zeros(0, dtype=np.int32),
+        "strings": np.array(["bottom"]),
+        "a mask": np.ones(available, dtype=bool),
+    }[case]
+
+
+@pytest.mark.parametrize(
+    "case, message",
+    [
+        ("inside", "not on the boundary"),
+        ("floats", "array of integers"),
+        ("matrix", "one-dimensional"),
+        ("negative", "local indices"),
+        ("out of range", "local indices"),
+        ("of the wrong dimension", "local indices|not on the boundary"),
+        ("none", "empty on all ranks"),
+        ("strings", "array of integers"),
+        ("a mask", "array of integers"),
+    ],
+)
+def test_contact_refuses_facets(scene, case, message):
+    """Facets are local indices of boundary facets, at least one on some rank."""
+    with pytest.raises(ValueError, match=message):
+        dc.Contact(scene.V, bad_facets(scene, case), plane(), FRICTION)
+
+
+def test_one_rank_is_enough_to_refuse(scene):
+    """A mistake on the last rank alone is raised on every rank."""
+    last = COMM.rank == COMM.size - 1
+    facets = np.array([-1]) if last else scene.facets
+    with pytest.raises(ValueError, match="local indices"):
+        dc.Contact(scene.V, facets, plane(), FRICTION)
+
+
+def test_planes_that_differ_between_ranks_are_refused(scene):
+    """Plane and friction must be the same on all ranks, and a difference is noticed."""
+    if COMM.size == 1:
+        pytest.skip("needs more than one rank")
+    with pytest.raises(ValueError, match="differ between ranks"):
+        dc.Contact(scene.V, scene.facets, plane(point=(0, 0, COMM.rank)), FRICTION)
+    with pytest.raises(ValueError, match="differ between ranks"):
+        dc.Contact(scene.V, scene.facets, plane(), dc.Friction(mu=0.1 * (1 + COMM.rank)))
+
+
+def test_no_facets_on_one_rank_is_fine(scene):
+    """Contact may lie on some ranks only: the nodes are those of all ranks' facets."""
+    everything = dc.Contact(scene.V, scene.facets, plane(), FRICTION)
+    few = scene.facets if COMM.rank == 0 else scene.facets[:0]
+    some = COMM.allreduce(len(few)) > 0
+    if not some:
+        pytest.skip("rank 0 has no contact facets in this partition")
+    part = dc.Contact(scene.V, few, plane(), FRICTION)
+    assert 0 < COMM.allreduce(part.nodes.size) <= COMM.allreduce(everything.nodes.size)
+
+
+@pytest.mark.parametrize(
+    "element, message",
+    [
+        (("Lagrange", 1), "component"),
+        (("DG", 1, (3,)), "continuous Lagrange of degree 1"),
+        (("Lagrange", 1, (2,)), "component"),
+        (("Lagrange", 2, (3,)), "degree 1"),
+    ],
+)
+def test_contact_refuses_spaces(scene, element, message):
+    """Displacements are first-order continuous Lagrange vectors of the mesh's dimension."""
+    V = functionspace(scene.mesh, element)
+    with pytest.raises(ValueError, match=message):
+        dc.Contact(V, scene.facets, plane(), FRICTION)
+
+
+def test_contact_refuses_wrong_types(scene):
+    """Space, plane and friction are told apart by name."""
+    for arguments, message in [
+        (("V", scene.facets, plane(), FRICTION), "V must be"),
+        ((scene.V, scene.facets, (0, 0, 1), FRICTION), "plane must be a RigidPlane"),
+        ((scene.V, scene.facets, plane(), 0.3), "friction must be a Friction"),
+        ((scene.V, scene.facets, dc.RigidPlane((0, 0), (0, 1)), FRICTION), "dimensions"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            dc.Contact(*arguments)
+
+
+def test_orthotropic_friction_needs_an_axis(scene):
+    """Without an axis an orthotropic law has no directions; an isotropic one needs none."""
+    bare = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1))
+    with pytest.raises(ValueError, match="axis"):
+        dc.Contact(scene.V, scene.facets, bare, dc.Friction(mu=(0.3, 0.15)))
+    with pytest.raises(ValueError, match="axis"):
+        dc.Contact(scene.V, scene.facets, bare, dc.Friction(mu=0.3, p=(1.0, 2.0)))
+    dc.Contact(scene.V, scene.facets, bare, FRICTION)
+
+
+def rebuilt(scene, **changes):
+    arguments = {"F": scene.F, "u": scene.u, "contacts": [scene.contact], "bcs": scene.bcs, **changes}
+    return dc.ContactProblem(**arguments)
+
+
+@pytest.mark.parametrize("tol", [0.0, -1e-8, np.nan, np.inf, 1e-14, "small", None])
+def test_problem_refuses_tolerances(scene, tol):
+    """tol is a finite number that rounding allows to reach."""
+    with pytest.raises(ValueError, match="tol must be"):
+        rebuilt(scene, tol=tol)
+
+
+def test_problem_refuses_unknown_solvers(scene):
+    """A solver is an object of the library, not a word."""
+    with pytest.raises(ValueError, match="solver 'magic' is unknown"):
+        rebuilt(scene, solver="magic")
+
+
+def test_problem_refuses_nodes_in_two_contacts(scene):
+    """A node takes part in one contact."""
+    twin = dc.Contact(scene.V, scene.facets, plane(), FRICTION)
+    with pytest.raises(ValueError, match="in two contacts"):
+        rebuilt(scene, contacts=[scene.contact, twin])
+
+
+def test_problem_refuses_spaces_of_another_mesh(scene):
+    """Contacts, F and u belong together."""
+    other = scenes.block()
+    with pytest.raises(ValueError, match="another space or mesh"):
+        rebuilt(scene, contacts=[other.contact])
+    with pytest.raises(ValueError, match="another space"):
+        rebuilt(scene, F=other.F)
+    with pytest.raises(ValueError, match="u must be a DOLFINx Function"):
+        rebuilt(scene, u=scene.V)
+    with pytest.raises(ValueError, match="dc.Contact"):
+        rebuilt(scene, contacts=["contact"])
+
+
+def test_problem_refuses_other_forms(scene):
+    """F is the residual form of the unknown u, linear in it for now."""
+    v, du = ufl.TestFunction(scene.V), ufl.TrialFunction(scene.V)
+    with pytest.raises(ValueError, match="one test function"):
+        rebuilt(scene, F=scenes.elasticity(du, v, 1.0, 0.3))
+    with pytest.raises(ValueError, match="F must be a residual form"):
+        rebuilt(scene, F=0.0)
+    with pytest.raises(ValueError, match="does not depend on u"):
+        rebuilt(scene, F=ufl.inner(scene.force, v) * ufl.dx)
+    with pytest.raises(NotImplementedError, match="not linear"):
+        rebuilt(scene, F=ufl.inner(scene.u, scene.u) * v[0] * ufl.dx + scene.F)
+
+
+def test_problem_refuses_conditions_on_contact_nodes(scene):
+    """A fixed normal displacement contradicts contact; a fixed tangential one is not supported yet."""
+    for component, error in ((2, ValueError), (0, NotImplementedError)):
+        sub = scene.V.sub(component)
+        dofs = fem.locate_dofs_topological(sub, 2, scene.facets)
+        bc = fem.dirichletbc(0.0, dofs, sub)
+        with pytest.raises(error, match="boundary condition"):
+            rebuilt(scene, bcs=[*scene.bcs, bc])
+
+
+@pytest.mark.parametrize("held", ["nothing", "one point", "height only", "a hinge", "its top"])
+def test_body_that_nothing_holds_is_refused(scene, held):
+    """Rigid motions that the boundary conditions leave free are found, though a factorisation works."""
+    bcs = []
+    if held == "its top":
+        bcs = scene.bcs
+    elif held == "height only":
+        sub = scene.V.sub(2)
+        top = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[2], 0.6))
+        bcs = [fem.dirichletbc(0.0, fem.locate_dofs_topological(sub, 2, top), sub)]
+    elif held != "nothing":
+        points = {
+            "one point": lambda x: np.isclose(x[0] + x[1], 1.0) & np.isclose(x[2], 0.6),
+            "a hinge": lambda x: np.isclose(x[0], 0.5) & np.isclose(x[2], 0.6),
+        }[held]
+        dofs = fem.locate_dofs_geometrical(scene.V, points)
+        bcs = [fem.dirichletbc(np.zeros(3), dofs, scene.V)]
+    problem = rebuilt(scene, bcs=bcs)
+    if held == "its top":
+        problem.solve()
+    else:
+        with pytest.raises(ValueError, match="nothing holds the body"):
+            problem.solve()
+
+
+def test_a_soft_spring_holds_a_body(scene):
+    """A body on a spring 1e-8 as stiff as itself is held, and not refused."""
+    v = ufl.TestFunction(scene.V)
+    problem = rebuilt(scene, F=scene.F + 1e-8 * 210e3 * ufl.inner(scene.u, v) * ufl.ds, bcs=[])
+    assert problem.solve().iterations == 0
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("place", ["load", "boundary value", "guess", "plane", "material"])
+def test_nothing_that_is_not_finite_becomes_a_result(place, bad):
+    """NaN or infinity anywhere in the input is a ValueError, and the last state stays usable."""
+    scene = scenes.block(cells=(2, 2, 2))
+    scene.move_top(0, 0, -0.01)
+    scene.problem.solve()
+    u, reaction = scene.u.x.array.copy(), scene.contact.reaction.copy()
+    scene.move_top(0, 0, -0.02)
+    if place == "load":
+        scene.force.value[0] = bad
+    elif place == "boundary value":
+        scene.held.x.array[:] = bad
+    elif place == "guess":
+        scene.u.x.array[:] = bad
+    elif place == "plane":
+        scene.plane.displacement[0] = bad
+    else:
+        scene.modulus.value = bad
+    with pytest.raises(ValueError, match="NaN or infinity|must be finite"):
+        scene.problem.solve()
+    assert np.array_equal(scene.u.x.array, u)
+    assert np.array_equal(scene.contact.reaction, reaction)
+    scene.force.value[0], scene.plane.displacement[0], scene.modulus.value = 0.0, 0.0, 210e3
+    scene.move_top(0, 0, -0.02)
+    assert scene.problem.solve().error <= 1e-10
