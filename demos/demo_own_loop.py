@@ -1,0 +1,79 @@
+"""The paper's predictor and corrector in a loop of one's own, with plain DOLFINx and PETSc.
+
+For those who have a solver already and want contact in it: ``contact.update`` turns displacements
+into reactions, ``contact.assemble_reaction`` adds them to a residual. Without acceleration the loop
+takes some fifty times the iterations of ``dc.ContactProblem``, whose answer it is checked against.
+"""
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact._dolfinx import petsc_vec
+
+# isort: split
+import numpy as np
+import ufl
+from demo_punch import Parameters, Punch
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+
+class OwnLoop:
+    """Fixed point of [dSFMH07, Section 2] with one contact and a residual form F linear in u."""
+
+    def __init__(self, F, u, contact: dc.Contact, bcs):
+        self.u, self.contact, self.bcs = u, contact, bcs
+        self.minus_F = fem.form(-F)
+        A = fem.petsc.assemble_matrix(fem.form(ufl.derivative(F, u)), bcs=bcs)
+        A.assemble()
+        contact.set_metric(A)  # rho, from the stiffness
+        contact.add_springs(A, contact.springs())
+        self.ksp = PETSc.KSP().create(A.comm)
+        self.ksp.setOperators(A)
+        self.ksp.setType("preonly")
+        self.ksp.getPC().setType("lu")
+        self.ksp.getPC().setFactorSolverType("mumps")
+        self.correction = A.createVecRight()
+
+    def solve(self, tol: float) -> int:
+        """One load step; ends when corrections are below ``tol`` times the displacement."""
+        for iteration in range(1, 100_000):
+            self.contact.update(self.u)  # gaps, slip increments, predictor, projection
+            b = fem.petsc.assemble_vector(self.minus_F)
+            b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+            self.contact.assemble_reaction(b)
+            fem.petsc.set_bc(b, self.bcs, petsc_vec(self.u))
+            self.ksp.solve(b, self.correction)
+            b.destroy()
+            petsc_vec(self.u).axpy(1.0, self.correction)
+            self.u.x.scatter_forward()
+            if self.correction.norm() <= tol * petsc_vec(self.u).norm():
+                self.contact.advance()  # accepted: the next slip is measured from here
+                return iteration
+        raise RuntimeError("The loop did not converge.")
+
+
+def compare(case: str = "C", displacements=(0.05, 0.1, 0.07)) -> float:
+    """Both solvers on a coarse punch; returns the largest difference of reactions, relative."""
+    coarse = dict(divisions=2, layers=1)
+    own = Punch(Parameters(case=case), **coarse)
+    reference = Punch(Parameters(case=case, tol=1e-12), **coarse)
+    loop = OwnLoop(own.F, own.u, own.contact, own.bcs)
+    differences = []
+    for displacement in displacements:
+        own.approach.value = -displacement
+        iterations = loop.solve(tol=1e-13)
+        record = reference.press(displacement)
+        difference = np.abs(own.contact.reaction - reference.contact.reaction).max(initial=0.0)
+        largest = np.abs(reference.contact.reaction).max(initial=0.0)
+        difference, largest = (
+            own.comm.allreduce(value, op=MPI.MAX) for value in (difference, largest)
+        )
+        differences.append(difference / largest)
+        if own.comm.rank == 0:
+            print(f"{displacement} mm: {iterations} iterations, ", end="")
+            print(f"ContactProblem {record['iterations']}, difference {differences[-1]:.1e}")
+    return max(differences)
+
+
+if __name__ == "__main__":
+    assert compare() < 1e-9

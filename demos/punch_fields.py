@@ -1,0 +1,79 @@
+"""ParaView files of a punch: displacement, stress and the state of its contact nodes, per step."""
+
+from __future__ import annotations
+
+from dolfinx_contact._dolfinx import functionspace, interpolation_points
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.io import VTKFile
+
+
+class FieldWriter:
+    """Writes a collection ``punch.pvd`` into a directory, to be opened in ParaView.
+
+    - per node: displacement [mm]; and of the contact nodes reaction [N] and slip increment [mm] in
+      global components, gap [mm], load function f [N], status (0 open, 1 stick, 2 slip). Nodes
+      that are no contact nodes have zeros, and status -1;
+    - per cell: von Mises stress and the components of the stress [MPa], as scalars because
+      DOLFINx 0.5 refuses tensors here.
+
+    Args:
+        punch: Whose fields to write.
+        directory: Path of an existing directory.
+    """
+
+    def __init__(self, punch, directory):
+        self.contact, self.u, V = punch.contact, punch.u, punch.V
+        self.slip = fem.Function(V, name="slip_increment")
+        self.scalars, parent = V.sub(0).collapse()
+        node = np.ravel(parent) // 3  # of each degree of freedom of the scalar space
+        self.scalar_dofs = np.argsort(node)[self.contact.nodes]
+
+        sigma = punch.stress(self.u)
+        cellwise = {"von_Mises": ufl.sqrt(3 / 2 * ufl.inner(ufl.dev(sigma), ufl.dev(sigma)))}
+        for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)):
+            cellwise["stress_" + "xyz"[i] + "xyz"[j]] = sigma[i, j]
+        constant = functionspace(punch.mesh, ("DG", 0))
+        self.cellwise = [
+            (
+                fem.Function(constant, name=name),
+                fem.Expression(value, interpolation_points(constant)),
+            )
+            for name, value in cellwise.items()
+        ]
+        self.path = directory / "punch.pvd"
+        self._file = VTKFile(punch.comm, str(self.path), "w")
+
+    def write(self, step: float) -> None:
+        """Write the present state as time ``step``.  Collective."""
+        contact = self.contact
+        slip = self.slip.x.array.reshape(-1, 3)
+        slip[contact.nodes] = contact.slip_increment @ contact.frame[:2]
+        self.slip.x.scatter_forward()
+        for function, expression in self.cellwise:
+            function.interpolate(expression)
+        fields = [self.u, contact.reaction_function(), self.slip]
+        fields += [
+            self.nodal("gap", contact.gap),
+            self.nodal("load_function", contact.load_function),
+            self.nodal("status", contact.status, elsewhere=-1),
+        ]
+        fields += [function for function, _ in self.cellwise]
+        self._file.write_function(fields, step)
+
+    def nodal(self, name, values, elsewhere=0.0):
+        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function."""
+        function = fem.Function(self.scalars, name=name)
+        function.x.array[:] = elsewhere
+        function.x.array[self.scalar_dofs] = values
+        function.x.scatter_forward()
+        return function
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self._file.close()
