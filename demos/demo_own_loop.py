@@ -11,10 +11,10 @@ from dolfinx_contact._dolfinx import petsc_vec
 # isort: split
 import numpy as np
 import ufl
-from demo_punch import Parameters, Punch
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
+from punch import Parameters, Punch
 
 
 class OwnLoop:

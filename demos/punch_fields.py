@@ -10,6 +10,14 @@ import ufl
 from dolfinx import fem
 from dolfinx.io import VTKFile
 
+COMPONENTS = "xx", "yy", "zz", "xy", "yz", "xz"
+
+
+def von_mises(xx, yy, zz, xy, yz, xz):
+    """The stress of uniaxial tension with the same shape-changing energy."""
+    normal = ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2
+    return np.sqrt(normal + 3 * (xy**2 + yz**2 + xz**2))
+
 
 class FieldWriter:
     """Writes a collection ``punch.pvd`` into a directory, to be opened in ParaView.
@@ -32,18 +40,17 @@ class FieldWriter:
         node = np.ravel(parent) // 3  # of each degree of freedom of the scalar space
         self.scalar_dofs = np.argsort(node)[self.contact.nodes]
 
+        six = functionspace(punch.mesh, ("DG", 0, (6,)))
         sigma = punch.stress(self.u)
-        cellwise = {"von_Mises": ufl.sqrt(3 / 2 * ufl.inner(ufl.dev(sigma), ufl.dev(sigma)))}
-        for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)):
-            cellwise["stress_" + "xyz"[i] + "xyz"[j]] = sigma[i, j]
-        constant = functionspace(punch.mesh, ("DG", 0))
-        self.cellwise = [
-            (
-                fem.Function(constant, name=name),
-                fem.Expression(value, interpolation_points(constant)),
-            )
-            for name, value in cellwise.items()
-        ]
+        components = ufl.as_vector([sigma["xyz".index(i), "xyz".index(j)] for i, j in COMPONENTS])
+        self.expression = fem.Expression(components, interpolation_points(six))
+        self.stress = fem.Function(six)
+        cellwise, parent = six.sub(0).collapse()
+        self.cells = np.ravel(parent) // 6  # of each degree of freedom of the cell-wise scalars
+        self.cellwise = {
+            name: fem.Function(cellwise, name=name)
+            for name in ["von_Mises", *("stress_" + component for component in COMPONENTS)]
+        }
         self.path = directory / "punch.pvd"
         self._file = VTKFile(punch.comm, str(self.path), "w")
 
@@ -53,15 +60,19 @@ class FieldWriter:
         slip = self.slip.x.array.reshape(-1, 3)
         slip[contact.nodes] = contact.slip_increment @ contact.frame[:2]
         self.slip.x.scatter_forward()
-        for function, expression in self.cellwise:
-            function.interpolate(expression)
+        self.stress.interpolate(self.expression)
+        stress = self.stress.x.array.reshape(-1, 6)[self.cells].T
+        for function, values in zip(
+            self.cellwise.values(), [von_mises(*stress), *stress], strict=True
+        ):
+            function.x.array[:] = values
         fields = [self.u, contact.reaction_function(), self.slip]
         fields += [
             self.nodal("gap", contact.gap),
             self.nodal("load_function", contact.load_function),
             self.nodal("status", contact.status, elsewhere=-1),
         ]
-        fields += [function for function, _ in self.cellwise]
+        fields += self.cellwise.values()
         self._file.write_function(fields, step)
 
     def nodal(self, name, values, elsewhere=0.0):

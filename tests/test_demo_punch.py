@@ -20,7 +20,7 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 import demo_own_loop
 import demo_punch
-from demo_punch import Parameters, Punch, programme
+from punch import Parameters, Punch, programme
 from punch_fields import FieldWriter
 from punch_figure import draw, gather
 from punch_mesh import CONTACT, TOP, punch_mesh
@@ -112,8 +112,9 @@ def test_programme():
     up = [0.092, 0.084, 0.076, 0.068, 0.06, 0.052, 0.044, 0.036, 0.028, 0.02]
     again = [0.036, 0.052, 0.068, 0.084, 0.1]
     assert steps == pytest.approx(down + up + again + up)
-    with pytest.raises(ValueError, match="unload_to"):
-        programme(Parameters(unload_to=0.1))
+    for wrong in (dict(unload_to=0.1), dict(cycles=0), dict(loading=0), dict(unloading=-1)):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            programme(Parameters(**wrong))
 
 
 # Total normal reaction and sum of the norms of tangential ones, N, after loading: computed for
