@@ -10,8 +10,6 @@ import time
 
 import hypothesis
 import pytest
-
-import dolfinx_contact  # noqa: F401  (some DOLFINx wheels must be imported before mpi4py)
 from mpi4py import MPI
 
 JOIN_SECONDS = float(os.environ.get("JOIN_SECONDS", 120))
