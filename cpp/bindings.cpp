@@ -9,245 +9,320 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
-#include <sstream>
 
 namespace py = pybind11;
 using namespace dolfinx_contact;
+using py::ssize_t;
 
 namespace {
 using Array = py::array_t<double>;
 using Branches = py::array_t<std::uint8_t>;
 
-std::string shape_of(const py::array &array) { return py::str(array.attr("shape")); }
+std::string text(const std::vector<ssize_t> &shape) { return py::str(py::tuple(py::cast(shape))); }
 
-/// View of an array of `nodes` rows and N components, N = 0 for one number per node.
-View<const double> view(const Array &array, const char *name, py::ssize_t nodes, int components) {
-    const bool right = components == 0 ? array.ndim() == 1 && array.shape(0) == nodes
-                                       : array.ndim() == 2 && array.shape(0) == nodes &&
-                                             array.shape(1) == components;
-    if (!right) {
-        std::ostringstream message;
-        message << name << " must have shape (" << nodes << ","
-                << (components == 0 ? "" : " " + std::to_string(components)) << "), not "
-                << shape_of(array);
-        throw py::value_error(message.str());
-    }
-    constexpr auto size = static_cast<std::ptrdiff_t>(sizeof(double));
-    for (int axis = 0; axis < array.ndim(); ++axis)
-        if (array.strides(axis) % size != 0)
-            throw py::value_error(std::string(name) +
-                                  " must have strides that are multiples of 8 bytes");
-    return {array.data(), array.strides(0) / size, components == 0 ? 0 : array.strides(1) / size};
+std::vector<ssize_t> shape_of(const py::array &array) {
+    return {array.shape(), array.shape() + array.ndim()};
 }
 
-py::ssize_t rows(const Array &array, const char *name) {
-    if (array.ndim() == 0)
-        throw py::value_error(std::string(name) + " must be an array with one row per node");
-    return array.shape(0);
+/// View of `array` if it has this shape; else a ValueError with its name and both shapes.
+template <class Scalar>
+View<const Scalar> view(const char *name, const py::array_t<Scalar> &array,
+                        const std::vector<ssize_t> &shape) {
+    if (shape_of(array) != shape)
+        throw py::value_error(std::string(name) + " must have shape " + text(shape) + ", not " +
+                              text(shape_of(array)));
+    constexpr auto size = static_cast<ssize_t>(sizeof(Scalar));
+    bool aligned = reinterpret_cast<std::uintptr_t>(array.data()) % sizeof(Scalar) == 0;
+    for (ssize_t axis = 0; axis < array.ndim(); ++axis)
+        aligned = aligned && array.strides(axis) % size == 0;
+    if (!aligned)
+        throw py::value_error(std::string(name) + " must be aligned: give a contiguous copy");
+    return {array.data(), array.strides(0) / size,
+            array.ndim() > 1 ? array.strides(1) / size : ssize_t{0}};
 }
 
-/// Law of known dimension, T tangential directions, and the number of nodes it is for.
+/// Zeros, of which untouched pages cost nothing.
+template <class Scalar> py::array_t<Scalar> zeros(const std::vector<ssize_t> &shape) {
+    return py::module_::import("numpy").attr("zeros")(shape, py::dtype::of<Scalar>());
+}
+
+/// View of an array of ours: C order, one row per node.
+template <class Scalar> View<Scalar> written(py::array_t<Scalar> &array) {
+    constexpr auto size = static_cast<ssize_t>(sizeof(Scalar));
+    return {array.mutable_data(), array.strides(0) / size, 1};
+}
+
+/// A law in T + 1 dimensions with what belongs to it for each node.
 template <int T> struct PyLaw {
+    static constexpr ssize_t D = T + 1;
     AnyLaw<T> any;
-    std::optional<py::ssize_t> nodes; // none: any number
+    std::optional<ssize_t> nodes; // none: any number
+    std::optional<Array> axes;
 
-    static PyLaw make(const Array &mu, const std::optional<Array> &p) {
-        const bool uniform = mu.ndim() == 1;
-        if (!(uniform || mu.ndim() == 2) || mu.shape(mu.ndim() - 1) != T)
-            throw py::value_error("mu must have shape (" + std::to_string(T) + ",) or (n, " +
-                                  std::to_string(T) + "), not " + shape_of(mu));
-        if (p &&
-            (p->ndim() != mu.ndim() || !std::equal(mu.shape(), mu.shape() + mu.ndim(), p->shape())))
-            throw py::value_error("p must have the shape of mu, " + shape_of(mu) + ", not " +
-                                  shape_of(*p));
-        const auto columns = [uniform](const Array &array) {
-            std::vector<Tangent<T>> nodes(uniform ? 1 : static_cast<std::size_t>(array.shape(0)));
-            for (std::size_t i = 0; i < nodes.size(); ++i)
-                for (int j = 0; j < T; ++j)
-                    nodes[i][j] = uniform ? array.at(j) : array.at(static_cast<py::ssize_t>(i), j);
-            return nodes;
-        };
-        const auto coefficients = columns(mu);
-        PyLaw law{make_law<T>(coefficients, p ? columns(*p) : coefficients, uniform), {}};
-        if (!uniform)
-            law.nodes = mu.shape(0);
-        return law;
-    }
-
-    std::string kind() const {
-        return std::visit(
-            [](const auto &source) -> std::string {
-                using Law = typename std::decay_t<decltype(source)>::Law;
-                if constexpr (is_frictionless<Law>)
-                    return "frictionless";
-                else if constexpr (is_isotropic<Law>)
-                    return "isotropic";
-                else if constexpr (std::is_same_v<Law, Associated<T>>)
-                    return "associated";
-                else
-                    return "nonassociated";
-            },
-            any);
-    }
-
-    std::size_t count(const Array &array, const char *name) const {
-        const py::ssize_t n = rows(array, name);
-        if (nodes && *nodes != n) {
-            std::ostringstream message;
-            message << name << " has " << n << " nodes, the law's coefficients " << *nodes;
-            throw py::value_error(message.str());
+    /// Views of the arguments of one call; the first of them says how many nodes there are.
+    class Call {
+      public:
+        Call(const PyLaw &law, const char *name, const Array &r) : law(law) {
+            if (r.ndim() == 0)
+                throw py::value_error(std::string(name) + " must have one row per node");
+            n = r.shape(0);
+            if (law.nodes && *law.nodes != n)
+                throw py::value_error(std::string(name) + " has " + std::to_string(n) +
+                                      " nodes, the law's coefficients " +
+                                      std::to_string(*law.nodes));
+            in.tangents = T;
+            in.r = view(name, r, {n, D});
+            if (law.axes)
+                in.axes = view("axes", *law.axes, {n, 2});
         }
-        return static_cast<std::size_t>(n);
-    }
+        Call &gap(const Array &a) { return in.gap = view("gap", a, {n}), *this; }
+        Call &slip(const Array &a) { return in.slip = view("slip", a, {n, ssize_t{T}}), *this; }
+        Call &rho(const Array &a) { return in.rho_n = view("rho", a, {n}), *this; }
+        Call &rho(const Array &normal, const Array &tangential) {
+            in.rho_n = view("rho_n", normal, {n});
+            in.rho_t = view("rho_t", tangential, {n});
+            return *this;
+        }
+        Call &branch(const Branches &a) { return in.branch = view("branch", a, {n}), *this; }
 
-    /// Loop over nodes that writes one number per node.
-    template <class Node> Array scalars(std::size_t n, Node node) const {
-        Array out(static_cast<py::ssize_t>(n));
-        double *values = out.mutable_data();
-        py::gil_scoped_release release;
-        std::visit(
-            [&](const auto &source) {
-                for_each_node(source, n,
-                              [&](std::size_t i, const auto &law) { values[i] = node(i, law); });
-            },
-            any);
-        return out;
-    }
+        template <class F> Array number(F f) const {
+            Array value({n});
+            Outputs out;
+            out.value = written(value);
+            run(out, f);
+            return value;
+        }
 
-    /// Loop over nodes that writes a reaction and a branch per node.
-    template <class Node> std::pair<Array, Branches> reactions(std::size_t n, Node node) const {
-        Array out({static_cast<py::ssize_t>(n), static_cast<py::ssize_t>(T + 1)});
-        Branches branches(static_cast<py::ssize_t>(n));
-        double *r = out.mutable_data();
-        std::uint8_t *branch = branches.mutable_data();
-        {
+        template <class F> py::tuple reaction(F f) const {
+            Array value = vectors();
+            Branches branch({n});
+            Outputs out;
+            out.value = written(value);
+            out.branch = written(branch);
+            run(out, f);
+            return py::make_tuple(value, branch);
+        }
+
+        template <class F> py::tuple linearisation(F f) const {
+            Array value = vectors(), by_reaction = zeros<double>({n, D, D}),
+                  by_motion = zeros<double>({n, D, D});
+            Branches branch({n});
+            Outputs out;
+            out.value = written(value);
+            out.branch = written(branch);
+            out.by_reaction = written(by_reaction);
+            out.by_motion = written(by_motion);
+            run(out, f);
+            return py::make_tuple(value, branch, by_reaction, by_motion);
+        }
+
+      private:
+        const PyLaw &law;
+        ssize_t n;
+        Inputs in;
+
+        Array vectors() const {
+            const bool normal_only = std::holds_alternative<Uniform<Frictionless>>(law.any);
+            return normal_only ? zeros<double>({n, D}) : Array({n, D});
+        }
+
+        template <class F> void run(const Outputs &out, F f) const {
             py::gil_scoped_release release;
             std::visit(
                 [&](const auto &source) {
-                    for_each_node(source, n, [&](std::size_t i, const auto &law) {
-                        const Reaction<T> result = node(i, law);
-                        for (int j = 0; j <= T; ++j)
-                            r[i * (T + 1) + static_cast<std::size_t>(j)] = result.r[j];
-                        branch[i] = static_cast<std::uint8_t>(result.branch);
-                    });
+                    for_each_node(source, static_cast<std::size_t>(n), in, out, f);
                 },
-                any);
+                law.any);
         }
-        return {out, branches};
-    }
+    };
 };
+
+template <int T>
+PyLaw<T> make_py_law(const Array &mu, const std::optional<Array> &p,
+                     const std::optional<Array> &axes) {
+    const bool uniform = mu.ndim() == 1;
+    if (!(uniform || mu.ndim() == 2) || mu.shape(mu.ndim() - 1) != T)
+        throw py::value_error("mu must have shape " + text({T}) + " or (n, " + std::to_string(T) +
+                              "), not " + text(shape_of(mu)));
+    if (p && shape_of(*p) != shape_of(mu))
+        throw py::value_error("p must have the shape of mu, " + text(shape_of(mu)) + ", not " +
+                              text(shape_of(*p)));
+    const auto rows = [uniform](const Array &array) {
+        std::vector<Tangent<T>> result(uniform ? 1U : static_cast<std::size_t>(array.shape(0)));
+        for (std::size_t i = 0; i < result.size(); ++i)
+            for (int j = 0; j < T; ++j)
+                result[i][j] = uniform ? array.at(j) : array.at(static_cast<ssize_t>(i), j);
+        return result;
+    };
+    const auto mu_rows = rows(mu);
+    PyLaw<T> law{make_law<T>(mu_rows, p ? rows(*p) : mu_rows, uniform), {}, {}};
+    if (!uniform)
+        law.nodes = mu.shape(0);
+    if (axes) {
+        if (T == 1)
+            throw py::value_error("axes have no meaning in two dimensions");
+        view("axes", *axes, {uniform ? axes->shape(0) : mu.shape(0), 2});
+        law.nodes = axes->shape(0);
+        law.axes = Array::ensure(axes->attr("copy")());
+    }
+    return law;
+}
 
 template <int T> void bind_law(py::module_ &m, const char *name) {
     using Law = PyLaw<T>;
-    constexpr int D = T + 1;
-    py::class_<Law>(m, name)
-        .def_property_readonly("kind", &Law::kind)
-        .def_property_readonly("dim", [](const Law &) { return D; })
-        .def_readonly("nodes", &Law::nodes)
-        .def(
-            "load_function",
-            [](const Law &law, const Array &r) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D);
-                return law.scalars(n, [=](std::size_t i, const auto &node) {
-                    return load_function(node, load<D>(rv, i));
+    using Call = typename Law::Call;
+    const auto r = py::arg("r").noconvert(), tau = py::arg("tau").noconvert(),
+               gap = py::arg("gap").noconvert(), slip = py::arg("slip").noconvert(),
+               rho = py::arg("rho").noconvert(), rho_n = py::arg("rho_n").noconvert(),
+               rho_t = py::arg("rho_t").noconvert(), branch = py::arg("branch").noconvert();
+
+    py::class_<Law> law(m, name);
+    law.def_property_readonly("kind", [](const Law &self) {
+        return std::visit(
+            [](const auto &source) { return std::decay_t<decltype(source)>::Law::kind; }, self.any);
+    });
+    law.def_property_readonly("dim", [](const Law &) { return Law::D; });
+    law.def_readonly("nodes", &Law::nodes, "Number of nodes it has coefficients for, or None.");
+
+    law.def(
+        "load_function",
+        [](const Law &self, const Array &r) {
+            return Call(self, "r", r).number([](const auto &node, const auto &s) {
+                return load_function(node, s.r);
+            });
+        },
+        r, "f = |M^-1 r_t| - r_n, shape (n,)  [dSFMH07, Eq. (1)]");
+    law.def(
+        "project",
+        [](const Law &self, const Array &tau) {
+            return Call(self, "tau", tau).reaction(EuclideanProjection{});
+        },
+        tau, "Euclidean projection on the friction cone: (r, branch)  [dSFMH07, Section 2]");
+    law.def(
+        "bipotential_map",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
+            return Call(self, "r", r).gap(gap).slip(slip).rho(rho).reaction(BipotentialMap{});
+        },
+        r, gap, slip, rho, "Predictor and corrector of [dSFMH07, Section 2]: (r, branch)");
+    law.def(
+        "scaled_map",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
+            return Call(self, "r", r)
+                .gap(gap)
+                .slip(slip)
+                .rho(rho)
+                .reaction([](const auto &node, const auto &s) {
+                    return scaled_map(node, s.r, s.gap, s.slip, s.rho_n);
                 });
-            },
-            py::arg("r").noconvert())
-        .def(
-            "project",
-            [](const Law &law, const Array &tau) {
-                const std::size_t n = law.count(tau, "tau");
-                const auto tv = view(tau, "tau", tau.shape(0), D);
-                return law.reactions(n, [=](std::size_t i, const auto &node) {
-                    return project(node, load<D>(tv, i));
+        },
+        r, gap, slip, rho, "The same in scaled variables, in closed form: (r, branch)");
+    law.def(
+        "return_map",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho_n,
+           const Array &rho_t) {
+            return Call(self, "r", r).gap(gap).slip(slip).rho(rho_n, rho_t).reaction(ReturnMap{});
+        },
+        r, gap, slip, rho_n, rho_t, "Projection in the metric of the slip rule: (r, branch)");
+
+    law.def(
+        "project_jacobian",
+        [](const Law &self, const Array &tau) {
+            const py::tuple all =
+                Call(self, "tau", tau).linearisation([](const auto &node, const auto &s) {
+                    constexpr int tangents = std::decay_t<decltype(node)>::tangents;
+                    Linearisation<tangents> out;
+                    out.value = project(node, s.r, &out.by_reaction);
+                    out.by_motion.setZero();
+                    return out;
                 });
-            },
-            py::arg("tau").noconvert())
-        .def(
-            "bipotential_map",
-            [](const Law &law, const Array &r, const Array &gap, const Array &slip,
-               const Array &rho) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D), sv = view(slip, "slip", r.shape(0), T),
-                           gv = view(gap, "gap", r.shape(0), 0),
-                           pv = view(rho, "rho", r.shape(0), 0);
-                return law.reactions(n, [=](std::size_t i, const auto &node) {
-                    return bipotential_map(node, load<D>(rv, i), gv(i), load<T>(sv, i), pv(i));
+            return py::make_tuple(all[0], all[1], all[2]);
+        },
+        tau, "project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))");
+    law.def(
+        "bipotential_jacobian",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
+            return Call(self, "r", r)
+                .gap(gap)
+                .slip(slip)
+                .rho(rho)
+                .linearisation([](const auto &node, const auto &s) {
+                    return bipotential_jacobian(node, s.r, s.gap, s.slip, s.rho_n);
                 });
-            },
-            py::arg("r").noconvert(), py::arg("gap").noconvert(), py::arg("slip").noconvert(),
-            py::arg("rho").noconvert())
-        .def(
-            "scaled_map",
-            [](const Law &law, const Array &r, const Array &gap, const Array &slip,
-               const Array &rho) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D), sv = view(slip, "slip", r.shape(0), T),
-                           gv = view(gap, "gap", r.shape(0), 0),
-                           pv = view(rho, "rho", r.shape(0), 0);
-                return law.reactions(n, [=](std::size_t i, const auto &node) {
-                    return scaled_map(node, load<D>(rv, i), gv(i), load<T>(sv, i), pv(i));
+        },
+        r, gap, slip, rho,
+        "bipotential_map and its derivatives: (r, branch, by r, by (slip, gap))");
+    law.def(
+        "scaled_jacobian",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
+            return Call(self, "r", r)
+                .gap(gap)
+                .slip(slip)
+                .rho(rho)
+                .linearisation([](const auto &node, const auto &s) {
+                    return scaled_jacobian(node, s.r, s.gap, s.slip, s.rho_n);
                 });
-            },
-            py::arg("r").noconvert(), py::arg("gap").noconvert(), py::arg("slip").noconvert(),
-            py::arg("rho").noconvert())
-        .def(
-            "return_map",
-            [](const Law &law, const Array &r, const Array &gap, const Array &slip,
-               const Array &rho_n, const Array &rho_t) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D), sv = view(slip, "slip", r.shape(0), T),
-                           gv = view(gap, "gap", r.shape(0), 0),
-                           nv = view(rho_n, "rho_n", r.shape(0), 0),
-                           tv = view(rho_t, "rho_t", r.shape(0), 0);
-                return law.reactions(n, [=](std::size_t i, const auto &node) {
-                    return return_map(node, load<D>(rv, i), gv(i), load<T>(sv, i), nv(i), tv(i));
+        },
+        r, gap, slip, rho, "scaled_map and its derivatives: (r, branch, by r, by (slip, gap))");
+    law.def(
+        "return_jacobian",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho_n,
+           const Array &rho_t) {
+            return Call(self, "r", r)
+                .gap(gap)
+                .slip(slip)
+                .rho(rho_n, rho_t)
+                .linearisation([](const auto &node, const auto &s) {
+                    return return_jacobian(node, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
                 });
-            },
-            py::arg("r").noconvert(), py::arg("gap").noconvert(), py::arg("slip").noconvert(),
-            py::arg("rho_n").noconvert(), py::arg("rho_t").noconvert())
-        .def(
-            "bipotential_gap",
-            [](const Law &law, const Array &r, const Array &gap, const Array &slip) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D), sv = view(slip, "slip", r.shape(0), T),
-                           gv = view(gap, "gap", r.shape(0), 0);
-                return law.scalars(n, [=](std::size_t i, const auto &node) {
-                    return bipotential_gap(node, load<D>(rv, i), gv(i), load<T>(sv, i));
+        },
+        r, gap, slip, rho_n, rho_t,
+        "return_map and its derivatives: (r, branch, by r, by (slip, gap))");
+
+    law.def(
+        "bipotential_gap",
+        [](const Law &self, const Array &r, const Array &gap, const Array &slip) {
+            return Call(self, "r", r)
+                .gap(gap)
+                .slip(slip)
+                .number([](const auto &node, const auto &s) {
+                    return bipotential_gap(node, s.r, s.gap, s.slip);
                 });
-            },
-            py::arg("r").noconvert(), py::arg("gap").noconvert(), py::arg("slip").noconvert())
-        .def(
-            "slip_defect",
-            [](const Law &law, const Array &r, const Array &slip, const Branches &branch) {
-                const std::size_t n = law.count(r, "r");
-                const auto rv = view(r, "r", r.shape(0), D), sv = view(slip, "slip", r.shape(0), T);
-                if (branch.ndim() != 1 || branch.shape(0) != r.shape(0))
-                    throw py::value_error("branch must have shape (" + std::to_string(n) +
-                                          ",), not " + shape_of(branch));
-                const View<const std::uint8_t> bv{branch.data(), branch.strides(0), 0};
-                return law.scalars(n, [=](std::size_t i, const auto &node) {
-                    return slip_defect(node, load<D>(rv, i), load<T>(sv, i),
-                                       static_cast<Branch>(bv(i)));
+        },
+        r, gap, slip, "Gap of the bi-potential for r in the cone and gap >= 0, shape (n,)");
+    law.def(
+        "slip_defect",
+        [](const Law &self, const Array &r, const Array &slip, const Branches &branch) {
+            return Call(self, "r", r)
+                .slip(slip)
+                .branch(branch)
+                .number([](const auto &node, const auto &s) {
+                    return slip_defect(node, s.r, s.slip, s.branch);
                 });
-            },
-            py::arg("r").noconvert(), py::arg("slip").noconvert(), py::arg("branch").noconvert());
+        },
+        r, slip, branch, "Part of the slip increment that the slip rule does not explain, (n,)");
 }
 } // namespace
 
+
 PYBIND11_MODULE(_kernel, m) {
-    m.doc() = "Kernel of dolfinx_contact: friction law, cone and maps on NumPy arrays.";
+    m.doc() =
+        "Kernel of dolfinx_contact: friction law, cone and maps on NumPy arrays.\n\n"
+        "Local frame (t1, t2, n), or (t, n) in two dimensions. r, tau: (n, dim); gap, rho:\n"
+        "(n,); slip: (n, dim - 1); branch: uint8, 0 open, 1 stick, 2 slip. All float64 of any\n"
+        "strides, read in place.";
     bind_law<1>(m, "Law2D");
     bind_law<2>(m, "Law3D");
     m.def(
         "make_law",
-        [](const Array &mu, const std::optional<Array> &p, int dim) -> py::object {
+        [](const Array &mu, const std::optional<Array> &p, int dim,
+           const std::optional<Array> &axes) -> py::object {
             if (dim == 2)
-                return py::cast(PyLaw<1>::make(mu, p));
+                return py::cast(make_py_law<1>(mu, p, axes));
             if (dim == 3)
-                return py::cast(PyLaw<2>::make(mu, p));
+                return py::cast(make_py_law<2>(mu, p, axes));
             throw py::value_error("dim must be 2 or 3, not " + std::to_string(dim));
         },
-        py::arg("mu"), py::arg("p"), py::arg("dim"));
+        py::arg("mu"), py::arg("p"), py::arg("dim"), py::arg("axes") = py::none(),
+        "The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: "
+        "associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).");
 }

@@ -1,35 +1,270 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
 /// @file batch.h
-/// The functions of one node, over all nodes of a contact: arrays with strides in, arrays out.
+/// A function of one node over all nodes of a contact: strided arrays in, strided arrays out.
+///
+/// Nodes are taken in blocks: components are gathered into contiguous columns and rotated to the
+/// principal axes, the function is evaluated along the columns, results are rotated back and
+/// scattered. So the loop along the columns vectorises whatever the layout of the arrays, and
+/// outputs may overwrite inputs. No allocation, no exception, no thread.
 #pragma once
 
-#include "bipotential.h"
 #include "law.h"
 #include "return_map.h"
 
 namespace dolfinx_contact {
-/// Element (i, j) of an array of any strided layout is data[i * row + j * column].
+/// Component j of node i is data[i * row + j * column]. Without data: an array that is not there.
 template <class Scalar> struct View {
-    Scalar *data;
-    std::ptrdiff_t row, column;
-    Scalar &operator()(std::size_t i, int j = 0) const {
-        return data[static_cast<std::ptrdiff_t>(i) * row + j * column];
+    Scalar *data = nullptr;
+    std::ptrdiff_t row = 0, column = 0;
+
+    View from_node(std::size_t node) const {
+        return {data ? data + static_cast<std::ptrdiff_t>(node) * row : data, row, column};
     }
 };
 
-/// The T (or T + 1) components of node i.
-template <int N> Eigen::Matrix<double, N, 1> load(const View<const double> &view, std::size_t i) {
-    Eigen::Matrix<double, N, 1> v;
-    for (int j = 0; j < N; ++j)
-        v[j] = view(i, j);
-    return v;
+/// Arrays that a function may read; those it does not use need not be there. Vectors have
+/// `tangents` tangential components and a normal one. A frictionless law reads normal components
+/// alone.
+struct Inputs {
+    int tangents = 2;                  ///< 1 in two dimensions, 2 in three
+    View<const double> r{};            ///< vector: reaction or other point
+    View<const double> gap{};          ///< scalar
+    View<const double> slip{};         ///< `tangents` components
+    View<const double> rho_n{};        ///< scalar
+    View<const double> rho_t{};        ///< scalar
+    View<const std::uint8_t> branch{}; ///< scalar, number of the enum
+    View<const double> axes{};         ///< principal direction x (cos, sin) in the tangent plane
+};
+
+/// Arrays that a function writes, where there. A frictionless law writes normal components alone.
+struct Outputs {
+    View<double> value{};        ///< scalar, or vector
+    View<std::uint8_t> branch{}; ///< scalar, number of the enum
+    View<double> by_reaction{};  ///< (tangents + 1)^2 components, row by row
+    View<double> by_motion{};    ///< likewise
+};
+
+/// What a function of one node may look at.
+template <int T> struct State {
+    Local<T> r;
+    double gap;
+    Tangent<T> slip;
+    double rho_n, rho_t;
+    Branch branch;
+};
+
+// Maps whose boundary branch needs the root of a secular equation say how they start. Over many
+// nodes the equations of a block are then solved side by side.
+
+struct EuclideanProjection {
+    template <class Law, class S> auto start(const Law &law, const S &s) const {
+        return start_projection(law, s.r);
+    }
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return project(law, s.r);
+    }
+};
+
+struct BipotentialMap {
+    template <class Law, class S> auto start(const Law &law, const S &s) const {
+        return start_projection(law, predictor(law, s.r, s.gap, s.slip, s.rho_n));
+    }
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return bipotential_map(law, s.r, s.gap, s.slip, s.rho_n);
+    }
+};
+
+struct ReturnMap {
+    template <class Law, class S> auto start(const Law &law, const S &s) const {
+        return start_return(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
+    }
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return return_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
+    }
+};
+
+namespace detail {
+inline constexpr int block_size = 64;
+
+template <class F> inline constexpr bool has_start = false;
+template <> inline constexpr bool has_start<EuclideanProjection> = true;
+template <> inline constexpr bool has_start<BipotentialMap> = true;
+template <> inline constexpr bool has_start<ReturnMap> = true;
+
+/// One component at the nodes of a block.
+using Column = double[block_size];
+
+template <class Scalar>
+void gather(const View<Scalar> &view, int component, int count, Column &to) {
+    if (!view.data)
+        return;
+    Scalar *from = view.data + component * view.column;
+    for (int i = 0; i < count; ++i)
+        to[i] = from[i * view.row];
 }
 
-/// Calls node(i, law) for all nodes. Nothing in the loop asks which law it is.
-template <class Source, class Node>
-void for_each_node(const Source &source, std::size_t nodes, Node node) {
-    for (std::size_t i = 0; i < nodes; ++i)
-        node(i, source(i));
+template <class Scalar>
+void scatter(const Column &from, int count, const View<Scalar> &view, int component) {
+    if (!view.data)
+        return;
+    Scalar *to = view.data + component * view.column;
+    for (int i = 0; i < count; ++i)
+        to[i * view.row] = static_cast<Scalar>(from[i]);
+}
+
+/// Columns of a block for T tangential components, D = T + 1 in all.
+template <int T> struct Block {
+    static constexpr int D = T + 1;
+    Column r[D], gap, slip[T + 1], rho_n, rho_t, branch_in; // slip[T] is not used: no empty arrays
+    Column cos, sin;
+    Column value[D], branch, by_reaction[D * D], by_motion[D * D];
+
+    void load(const Inputs &in, std::size_t first, int count) {
+        const auto r_in = in.r.from_node(first), slip_in = in.slip.from_node(first);
+        for (int k = 0; k < T; ++k) {
+            gather(r_in, k, count, r[k]);
+            gather(slip_in, k, count, slip[k]);
+        }
+        gather(r_in, in.tangents, count, r[T]);
+        gather(in.gap.from_node(first), 0, count, gap);
+        gather(in.rho_n.from_node(first), 0, count, rho_n);
+        gather(in.rho_t.from_node(first), 0, count, rho_t);
+        gather(in.branch.from_node(first), 0, count, branch_in);
+        gather(in.axes.from_node(first), 0, count, cos);
+        gather(in.axes.from_node(first), 1, count, sin);
+    }
+
+    [[gnu::always_inline]] State<T> state(int i) const {
+        State<T> s;
+        for (int k = 0; k < T; ++k) {
+            s.r[k] = r[k][i];
+            s.slip[k] = slip[k][i];
+        }
+        s.r[T] = r[T][i];
+        s.gap = gap[i];
+        s.rho_n = rho_n[i];
+        s.rho_t = rho_t[i];
+        s.branch = static_cast<Branch>(static_cast<int>(branch_in[i]));
+        return s;
+    }
+
+    [[gnu::always_inline]] void keep(double result, int i) { value[0][i] = result; }
+
+    [[gnu::always_inline]] void keep(const Reaction<T> &result, int i) {
+        for (int k = 0; k < D; ++k)
+            value[k][i] = result.r[k];
+        branch[i] = static_cast<double>(static_cast<int>(result.branch));
+    }
+
+    void keep(const Linearisation<T> &result, int i) {
+        keep(result.value, i);
+        for (int a = 0; a < D; ++a)
+            for (int b = 0; b < D; ++b) {
+                by_reaction[a * D + b][i] = result.by_reaction(a, b);
+                by_motion[a * D + b][i] = result.by_motion(a, b);
+            }
+    }
+
+    /// (x, y) <- (c x + s y, c y - s x): to the principal axes; with sign = -1 from them.
+    void rotate(Column &x, Column &y, double sign, int count) const {
+        for (int i = 0; i < count; ++i) {
+            const double s = sign * sin[i], turned = cos[i] * x[i] + s * y[i];
+            y[i] = cos[i] * y[i] - s * x[i];
+            x[i] = turned;
+        }
+    }
+
+    void rotate_matrix_back(Column *J, int count) const {
+        for (int k = 0; k < D; ++k)
+            rotate(J[k], J[D + k], -1.0, count);
+        for (int k = 0; k < D; ++k)
+            rotate(J[k * D], J[k * D + 1], -1.0, count);
+    }
+
+    template <class Result>
+    void store(const Outputs &out, int tangents, std::size_t first, int count) const {
+        const auto value_out = out.value.from_node(first);
+        if constexpr (std::is_same_v<Result, double>)
+            return scatter(value[0], count, value_out, 0);
+        for (int k = 0; k < T; ++k)
+            scatter(value[k], count, value_out, k);
+        scatter(value[T], count, value_out, tangents);
+        scatter(branch, count, out.branch.from_node(first), 0);
+        if constexpr (std::is_same_v<Result, Linearisation<T>>)
+            for (int k = 0; k < D * D; ++k) {
+                // the last component is the normal one for any number of tangential ones
+                const int component = (tangents + 1) * (tangents + 1) - D * D + k;
+                scatter(by_reaction[k], count, out.by_reaction.from_node(first), component);
+                scatter(by_motion[k], count, out.by_motion.from_node(first), component);
+            }
+    }
+};
+
+/// The function at the nodes of a block, from `first` on.
+template <class Source, class F, int T>
+void evaluate(const Source &source, F f, std::size_t first, int size, Block<T> &block) {
+    using Law = typename Source::Law;
+    const auto law = [&](int i) -> const Law & {
+        return source(first + static_cast<std::size_t>(i));
+    };
+    if constexpr (!has_start<F> || T == 0 || is_isotropic<Law>) {
+        for (int i = 0; i < size; ++i)
+            block.keep(f(law(i), block.state(i)), i);
+    } else {
+        Projection<T> starts[block_size];
+        int unfinished[block_size], count = 0;
+        for (int i = 0; i < size; ++i) {
+            starts[i] = f.start(law(i), block.state(i));
+            block.keep(starts[i].result, i);
+            unfinished[count] = i;
+            count += starts[i].unfinished ? 1 : 0;
+        }
+        constexpr int lanes = 16;
+        SecularEquations<T, lanes> equations;
+        for (int done = 0; done < count; done += lanes) {
+            const int together = std::min(lanes, count - done), *nodes = unfinished + done;
+            for (int l = 0; l < together; ++l)
+                equations.set(l, starts[nodes[l]].equation);
+            equations.solve(together);
+            for (int l = 0; l < together; ++l) {
+                const int i = nodes[l];
+                block.keep(finish(law(i), starts[i], equations.root(l)), i);
+            }
+        }
+    }
+}
+} // namespace detail
+
+/// out = f(law of node i, State of node i) for all nodes i < count, where f gives a number, a
+/// Reaction or a Linearisation. Nothing in the loop asks which law it is: visit an AnyLaw around
+/// the call.
+template <class Source, class F>
+void for_each_node(const Source &source, std::size_t count, const Inputs &in, const Outputs &out,
+                   F f) {
+    constexpr int T = Source::Law::tangents;
+    using Result = decltype(f(source(0), State<T>{}));
+    constexpr bool scalar = std::is_same_v<Result, double>;
+    detail::Block<T> block;
+    for (std::size_t first = 0; first < count; first += detail::block_size) {
+        const int size = static_cast<int>(std::min<std::size_t>(detail::block_size, count - first));
+        block.load(in, first, size);
+        const bool rotated = T == 2 && in.axes.data;
+        if constexpr (T == 2)
+            if (rotated) {
+                block.rotate(block.r[0], block.r[1], 1.0, size);
+                block.rotate(block.slip[0], block.slip[1], 1.0, size);
+            }
+        detail::evaluate(source, f, first, size, block);
+        if constexpr (T == 2 && !scalar)
+            if (rotated) {
+                block.rotate(block.value[0], block.value[1], -1.0, size);
+                if constexpr (std::is_same_v<Result, Linearisation<T>>) {
+                    block.rotate_matrix_back(block.by_reaction, size);
+                    block.rotate_matrix_back(block.by_motion, size);
+                }
+            }
+        block.template store<Result>(out, in.tangents, first, size);
+    }
 }
 } // namespace dolfinx_contact

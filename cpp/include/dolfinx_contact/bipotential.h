@@ -2,24 +2,24 @@
 // SPDX-License-Identifier: MIT
 /// @file bipotential.h
 /// The bi-potential of [dSFMH07, Section 1]: predictor and corrector of Section 2, the same in
-/// scaled variables, and the gap that certifies a solution.
+/// scaled variables, the derivatives of both, and the gap that certifies a solution.
+///
+/// State of a node: reaction r (T+1,), gap x_n, slip increment du_t (T,). The metric rho > 0 is a
+/// stiffness. Derivatives by the motion are by (du_t, x_n), shape (T+1,) in the local frame.
 #pragma once
 
 #include "friction_cone.h"
 
 namespace dolfinx_contact {
-/// Q^2 du_t.
-template <class Law, int T = Law::tangents>
-Tangent<T> q2_slip(const Law &law, const Tangent<T> &slip) {
-    Tangent<T> v;
-    for (int i = 0; i < T; ++i)
-        v[i] = law.q2(i) * slip[i];
-    return v;
-}
+/// A reaction, its branch, and its derivatives by the old reaction and by the motion.
+template <int T> struct Linearisation {
+    Reaction<T> value;
+    Jacobian<T> by_reaction, by_motion;
+};
 
 /// w_t = M Q^2 du_t, whose norm is the dual norm ||Q^2 (-du_t)||*_mu of [dSFMH07, Section 1].
 template <class Law, int T = Law::tangents>
-Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
+[[gnu::always_inline]] inline Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
     Tangent<T> w;
     for (int i = 0; i < T; ++i)
         w[i] = law.mu(i) * (law.q2(i) * slip[i]);
@@ -27,19 +27,14 @@ Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
 }
 
 /// Predictor of [dSFMH07, Section 2]:
-/// tau_t = r_t - rho Q^2 du_t,  tau_n = r_n - rho (x_n + |M Q^2 du_t|),  rho > 0 a stiffness.
+/// tau_t = r_t - rho Q^2 du_t,  tau_n = r_n - rho (x_n + |M Q^2 du_t|).
 template <class Law, int T = Law::tangents>
 Local<T> predictor(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
                    double rho) {
-    Local<T> tau = r;
-    if constexpr (is_frictionless<Law>)
-        tau[T] -= rho * gap;
-    else {
-        const Tangent<T> v = q2_slip(law, slip);
-        for (int i = 0; i < T; ++i)
-            tau[i] -= rho * v[i];
-        tau[T] -= rho * (gap + norm<T>(scaled_slip(law, slip)));
-    }
+    Local<T> tau;
+    for (int i = 0; i < T; ++i)
+        tau[i] = r[i] - rho * (law.q2(i) * slip[i]);
+    tau[T] = r[T] - rho * (gap + norm<T>(scaled_slip(law, slip)));
     return tau;
 }
 
@@ -50,30 +45,106 @@ Reaction<T> bipotential_map(const Law &law, const Local<T> &r, double gap, const
     return project(law, predictor(law, r, gap, slip, rho));
 }
 
-/// The same predictor and corrector in the scaled variables (M^-1 r_t, r_n), (M Q^2 du_t, x_n +
-/// |M Q^2 du_t|), in which the law is isotropic with unit friction and the projection has a closed
-/// form. Same fixed points as bipotential_map, other iterates (unless M is the identity).
+/// The predictor in the scaled variables (M^-1 r_t, r_n), (M Q^2 du_t, x_n + |M Q^2 du_t|), in
+/// which the law is isotropic with unit friction.
 template <class Law, int T = Law::tangents>
-Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
-                       double rho) {
-    if constexpr (is_frictionless<Law>)
-        return bipotential_map(law, r, gap, slip, rho);
-    else {
-        const Tangent<T> w = scaled_slip(law, slip);
-        Tangent<T> t;
-        for (int i = 0; i < T; ++i)
-            t[i] = r[i] / divisor(law, i) - rho * w[i];
-        const double n = r[T] - rho * (gap + norm<T>(w)), length = norm<T>(t);
-        const bool inside = length <= n, apex = length <= -n;
-        const double radius = inside ? n : (apex ? 0.0 : 0.5 * length + 0.5 * n);
-        // length is zero only inside or at the apex
-        const double shrink = inside ? 1.0 : (apex ? 0.0 : radius / length);
-        Reaction<T> result{r, apex ? Branch::open : (inside ? inside_branch(law) : Branch::slip)};
-        for (int i = 0; i < T; ++i)
-            result.r[i] = law.mu(i) * (shrink * t[i]);
-        result.r[T] = radius;
-        return result;
+[[gnu::always_inline]] inline Local<T> scaled_predictor(const Law &law, const Local<T> &r,
+                                                        double gap, const Tangent<T> &slip,
+                                                        double rho) {
+    const Tangent<T> w = scaled_slip(law, slip);
+    Local<T> tau;
+    for (int i = 0; i < T; ++i)
+        tau[i] = r[i] / divisor(law, i) - rho * w[i];
+    tau[T] = r[T] - rho * (gap + norm<T>(w));
+    return tau;
+}
+
+/// Predictor and corrector in the scaled variables; the projection on the unit cone has a closed
+/// form. Same fixed points as bipotential_map, other iterates (unless M is the identity). Without a
+/// jump, so that a loop over nodes vectorises.
+template <class Law, int T = Law::tangents>
+[[gnu::always_inline]] inline Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap,
+                                                     const Tangent<T> &slip, double rho) {
+    const Local<T> tau = scaled_predictor(law, r, gap, slip, rho);
+    Tangent<T> t;
+    for (int i = 0; i < T; ++i)
+        t[i] = tau[i];
+    const double n = tau[T], length = norm<T>(t);
+    // apex, inside or boundary: 0, n or (length + n) / 2
+    const double radius = std::max(std::max(0.5 * length + 0.5 * n, n), 0.0);
+    constexpr double tiny = std::numeric_limits<double>::denorm_min();
+    const double shrink = std::min(radius / std::max(length, tiny), 1.0);
+    const double inside_code = law.mu(0) > 0.0 ? 1.0 : 2.0;
+    const double closed = length <= -n ? 0.0 : 1.0, code = length <= n ? inside_code : 2.0;
+    Reaction<T> result{tau, static_cast<Branch>(static_cast<int>(closed * code))};
+    for (int i = 0; i < T; ++i)
+        result.r[i] = law.mu(i) * (shrink * t[i]);
+    result.r[T] = radius;
+    return result;
+}
+
+/// Unit vector along M Q^2 du_t. The dual norm has a kink at du_t = 0; there, the limit for a slip
+/// against r_t, or along the first axis if that is zero too.
+template <class Law, int T = Law::tangents>
+Tangent<T> scaled_slip_direction(const Law &law, const Local<T> &r, const Tangent<T> &slip) {
+    const Tangent<T> w = scaled_slip(law, slip), against = -in_units_of_ellipse(law, r);
+    if (const double length = norm<T>(w); length > 0.0)
+        return w / length;
+    if (const double length = norm<T>(against); length > 0.0)
+        return against / length;
+    Tangent<T> first = Tangent<T>::Zero();
+    if constexpr (T > 0)
+        first[0] = 1.0;
+    return first;
+}
+
+/// d tau / d (du_t, x_n) of a predictor with tangential part -rho diag(tangential) du_t.
+template <class Law, int T = Law::tangents>
+Jacobian<T> predictor_by_motion(const Law &law, const Tangent<T> &tangential,
+                                const Tangent<T> &direction, double rho) {
+    Jacobian<T> J = Jacobian<T>::Zero();
+    for (int i = 0; i < T; ++i) {
+        J(i, i) = -rho * tangential[i];
+        J(T, i) = -rho * (law.mu(i) * law.q2(i) * direction[i]);
     }
+    J(T, T) = -rho;
+    return J;
+}
+
+/// bipotential_map with its derivatives on the branch taken.
+template <class Law, int T = Law::tangents>
+Linearisation<T> bipotential_jacobian(const Law &law, const Local<T> &r, double gap,
+                                      const Tangent<T> &slip, double rho) {
+    Tangent<T> q2;
+    for (int i = 0; i < T; ++i)
+        q2[i] = law.q2(i);
+    Linearisation<T> out;
+    out.value = project(law, predictor(law, r, gap, slip, rho), &out.by_reaction);
+    out.by_motion =
+        out.by_reaction * predictor_by_motion(law, q2, scaled_slip_direction(law, r, slip), rho);
+    return out;
+}
+
+/// scaled_map with its derivatives on the branch taken.
+template <class Law, int T = Law::tangents>
+Linearisation<T> scaled_jacobian(const Law &law, const Local<T> &r, double gap,
+                                 const Tangent<T> &slip, double rho) {
+    Local<T> scale = Local<T>::Ones(), inverse = Local<T>::Ones();
+    Tangent<T> mu_q2;
+    for (int i = 0; i < T; ++i) {
+        scale[i] = divisor(law, i);
+        inverse[i] = 1.0 / scale[i];
+        mu_q2[i] = law.mu(i) * law.q2(i);
+    }
+    Jacobian<T> J;
+    const Local<T> tau = scaled_predictor(law, r, gap, slip, rho);
+    if constexpr (T == 0)
+        project(law, tau, &J);
+    else
+        project(Isotropic<T>{1.0}, tau, &J);
+    J = scale.asDiagonal() * J;
+    return {scaled_map(law, r, gap, slip, rho), J * inverse.asDiagonal(),
+            J * predictor_by_motion(law, mu_q2, scaled_slip_direction(law, r, slip), rho)};
 }
 
 /// Gap of the bi-potential, b_c(-du, r) + du . r = r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t, force
@@ -85,22 +156,11 @@ Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap, const Tang
 /// r_n - |x| below zero (r outside by rounding) counts as zero.
 template <class Law, int T = Law::tangents>
 double bipotential_gap(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip) {
-    if constexpr (is_frictionless<Law>)
-        return r[T] * gap;
-    else {
-        const Tangent<T> x = in_units_of_ellipse(law, Tangent<T>(r.template head<T>()));
-        const Tangent<T> w = scaled_slip(law, slip);
-        const double x_length = norm<T>(x), w_length = norm<T>(w);
-        double work = r[T] * gap + std::max(r[T] - x_length, 0.0) * w_length;
-        if (x_length > 0.0 && w_length > 0.0) {
-            double chord2 = 0.0;
-            for (int i = 0; i < T; ++i) {
-                const double chord = x[i] / x_length + w[i] / w_length;
-                chord2 += chord * chord;
-            }
-            work += 0.5 * x_length * w_length * chord2;
-        }
-        return work;
-    }
+    const Tangent<T> x = in_units_of_ellipse(law, r), w = scaled_slip(law, slip);
+    const double x_length = norm<T>(x), w_length = norm<T>(w);
+    double work = r[T] * gap + std::max(r[T] - x_length, 0.0) * w_length;
+    if (x_length > 0.0 && w_length > 0.0)
+        work += 0.5 * x_length * w_length * (x / x_length + w / w_length).squaredNorm();
+    return work;
 }
 } // namespace dolfinx_contact

@@ -7,7 +7,8 @@
 /// anisotrope", 18e Congres Francais de Mecanique, 2007.
 ///
 /// Local frame of a node: T tangential components along the principal friction directions, then the
-/// normal one, pointing from the obstacle into the body. T = 1 in two dimensions, 2 in three.
+/// normal one, pointing from the obstacle into the body. T = 1 in two dimensions, 2 in three; T = 0
+/// is the frictionless law, which has no use for the tangential components and never sees them.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,6 +21,9 @@ template <int T> using Tangent = Eigen::Matrix<double, T, 1>;
 
 /// Vector in the local frame, shape (T+1,): tangential components, then the normal one.
 template <int T> using Local = Eigen::Matrix<double, T + 1, 1>;
+
+/// Derivative of a vector in the local frame by another, shape (T+1, T+1).
+template <int T> using Jacobian = Eigen::Matrix<double, T + 1, T + 1>;
 
 /// Which part of a projection was taken: the apex, the inside or the boundary of the friction cone.
 /// It is the status of the node: without contact, sticking, slipping.
@@ -35,17 +39,23 @@ template <int T> struct Reaction {
 /// their squares and the squares of their ratios neither overflow nor vanish.
 inline constexpr double min_coefficient = 1e-50, max_coefficient = 1e50;
 
-// Every law but the frictionless one has mu(i), the principal coefficient of friction, diagonal of
-// M (all positive or, at a node of a field, all zero), and q2(i), the square of the
-// non-associativity Q = P M^-1 ([dSFMH07], Section 1), scaled to max(q2) = 1. Only the ratio of the
-// p matters: P -> c P leaves the slip rule unchanged.
+// A law has mu(i), the principal coefficient of friction, diagonal of M (all positive or, at a node
+// of a field, all zero), and q2(i), the square of the non-associativity Q = P M^-1 ([dSFMH07],
+// Section 1), scaled to max(q2) = 1. Only the ratio of the p matters: P -> c P leaves the slip rule
+// unchanged.
 
-/// No friction: the cone is the half line r_t = 0, r_n >= 0.
-template <int T> struct Frictionless { static constexpr int tangents = T; };
+/// No friction: the cone is the half line r_n >= 0.
+struct Frictionless {
+    static constexpr const char *kind = "frictionless";
+    static constexpr int tangents = 0;
+    static constexpr double mu(int) { return 0.0; }
+    static constexpr double q2(int) { return 1.0; }
+};
 
 /// One coefficient for all directions, slip against the friction force. Two-dimensional friction is
 /// always of this kind.
 template <int T> struct Isotropic {
+    static constexpr const char *kind = "isotropic";
     static constexpr int tangents = T;
     double coefficient;
     double mu(int) const { return coefficient; }
@@ -54,6 +64,7 @@ template <int T> struct Isotropic {
 
 /// Orthotropic friction with the associated slip rule, P = M: slip is normal to the ellipse.
 template <int T> struct Associated {
+    static constexpr const char *kind = "associated";
     static constexpr int tangents = T;
     Tangent<T> coefficient;
     double mu(int i) const { return coefficient[i]; }
@@ -62,14 +73,12 @@ template <int T> struct Associated {
 
 /// Orthotropic friction with a slip rule of its own, P != M.
 template <int T> struct NonAssociated {
+    static constexpr const char *kind = "nonassociated";
     static constexpr int tangents = T;
     Tangent<T> coefficient, q_squared;
     double mu(int i) const { return coefficient[i]; }
     double q2(int i) const { return q_squared[i]; }
 };
-
-template <class Law> inline constexpr bool is_frictionless = false;
-template <int T> inline constexpr bool is_frictionless<Frictionless<T>> = true;
 
 template <class Law> inline constexpr bool is_isotropic = false;
 template <int T> inline constexpr bool is_isotropic<Isotropic<T>> = true;

@@ -8,8 +8,10 @@
 #include "friction.h"
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <limits>
+#include <sstream>
 #include <stdexcept>
-#include <string>
 #include <variant>
 #include <vector>
 
@@ -28,59 +30,65 @@ template <class L> struct Field {
     const Law &operator()(std::size_t node) const { return laws[node]; }
 };
 
-/// A law whose kind is known at run time. Visit it once per contact, not once per node.
-template <int T>
-using AnyLaw = std::conditional_t<
-    T == 1, std::variant<Uniform<Frictionless<T>>, Uniform<Isotropic<T>>, Field<Isotropic<T>>>,
-    std::variant<Uniform<Frictionless<T>>, Uniform<Isotropic<T>>, Field<Isotropic<T>>,
-                 Uniform<Associated<T>>, Field<Associated<T>>, Uniform<NonAssociated<T>>,
-                 Field<NonAssociated<T>>>>;
+/// A law whose kind is known at run time. Visit it once per contact, not once per node. Friction in
+/// two dimensions (T = 1) is isotropic.
+template <int T> struct AnyLawOf;
+template <> struct AnyLawOf<1> {
+    using type = std::variant<Uniform<Frictionless>, Uniform<Isotropic<1>>, Field<Isotropic<1>>>;
+};
+template <> struct AnyLawOf<2> {
+    using type = std::variant<Uniform<Frictionless>, Uniform<Isotropic<2>>, Field<Isotropic<2>>,
+                              Uniform<Associated<2>>, Field<Associated<2>>,
+                              Uniform<NonAssociated<2>>, Field<NonAssociated<2>>>;
+};
+template <int T> using AnyLaw = typename AnyLawOf<T>::type;
 
 namespace detail {
-inline void check(bool condition, const char *what, double value) {
-    if (!condition)
-        throw std::invalid_argument(std::string(what) + ", not " + std::to_string(value));
+/// Relative difference below which p counts as proportional to mu: rounding.
+inline constexpr double proportional = 4 * std::numeric_limits<double>::epsilon();
+
+inline void require(bool condition, const char *what, double value) {
+    if (condition)
+        return;
+    std::ostringstream message;
+    message << what << ", not " << value;
+    throw std::invalid_argument(message.str());
 }
 
-/// Coefficients of one node with p normalised: Q squared.
+/// Coefficients of one node, p normalised.
 template <int T> NonAssociated<T> checked(const Tangent<T> &mu, const Tangent<T> &p) {
     NonAssociated<T> law{mu, Tangent<T>::Ones()};
     if (mu.isZero(0.0))
         return law;
     for (int i = 0; i < T; ++i) {
-        check(mu[i] >= min_coefficient && mu[i] <= max_coefficient,
-              "mu must be zero in all directions or between 1e-50 and 1e50 in all", mu[i]);
-        check(p[i] > 0.0 && std::isfinite(p[i]), "p must be positive and finite", p[i]);
+        require(mu[i] >= min_coefficient && mu[i] <= max_coefficient,
+                "mu must be zero in all directions or between 1e-50 and 1e50 in all", mu[i]);
+        require(p[i] > 0.0 && std::isfinite(p[i]), "p must be positive and finite", p[i]);
     }
     const Tangent<T> q = normalised_q<T>(mu, p);
-    check(q.minCoeff() >= min_coefficient, "p/mu must not vary by more than 1e50, but is 1 and",
-          q.minCoeff());
-    // p proportional to mu up to rounding is the associated rule
-    if (1.0 - q.minCoeff() > 4 * std::numeric_limits<double>::epsilon())
+    require(q.minCoeff() >= min_coefficient,
+            "the smallest p/mu must be at least 1e-50 of the largest", q.minCoeff());
+    if (1.0 - q.minCoeff() > proportional)
         law.q_squared = q.cwiseAbs2();
     return law;
 }
 
-/// The simplest law that has these coefficients, at one node or at as many as there are.
-template <int T, class Make>
-AnyLaw<T> simplest(const std::vector<NonAssociated<T>> &nodes, Make make) {
-    const auto all = [&nodes](auto property) {
-        return std::all_of(nodes.begin(), nodes.end(), property);
-    };
-    if constexpr (T > 1) {
-        const bool associated = all([](const auto &n) { return n.q_squared.minCoeff() == 1.0; });
-        if (!associated)
-            return make([](const auto &n) { return n; });
-        if (!all(
-                [](const auto &n) { return n.coefficient.minCoeff() == n.coefficient.maxCoeff(); }))
-            return make([](const auto &n) { return Associated<T>{n.coefficient}; });
-    }
-    return make([](const auto &n) { return Isotropic<T>{n.coefficient[0]}; });
+/// All nodes converted to the law that `convert` gives.
+template <int T, class Convert>
+AnyLaw<T> collect(const std::vector<NonAssociated<T>> &nodes, bool uniform, Convert convert) {
+    using Law = decltype(convert(nodes.front()));
+    if (uniform)
+        return Uniform<Law>{convert(nodes.front())};
+    Field<Law> field;
+    field.laws.reserve(nodes.size());
+    std::transform(nodes.begin(), nodes.end(), std::back_inserter(field.laws), convert);
+    return field;
 }
 } // namespace detail
 
-/// The law with the coefficients mu and p of one node (uniform) or of each node: the simplest kind
-/// that has them. Throws std::invalid_argument where mu or p is out of range.
+/// The law with the coefficients mu and p of all nodes alike (`uniform`, one entry) or of each
+/// node: the simplest kind that has them. Throws std::invalid_argument where mu or p is out of
+/// range.
 template <int T>
 AnyLaw<T> make_law(const std::vector<Tangent<T>> &mu, const std::vector<Tangent<T>> &p,
                    bool uniform) {
@@ -88,17 +96,22 @@ AnyLaw<T> make_law(const std::vector<Tangent<T>> &mu, const std::vector<Tangent<
     nodes.reserve(mu.size());
     for (std::size_t i = 0; i < mu.size(); ++i)
         nodes.push_back(detail::checked<T>(mu[i], p[i]));
-    if (std::all_of(nodes.begin(), nodes.end(), [](const auto &n) { return n.mu(0) == 0.0; }))
-        return Uniform<Frictionless<T>>{};
-    const auto make = [&](auto convert) -> AnyLaw<T> {
-        using Law = decltype(convert(nodes.front()));
-        if (uniform)
-            return Uniform<Law>{convert(nodes.front())};
-        Field<Law> field;
-        field.laws.reserve(nodes.size());
-        std::transform(nodes.begin(), nodes.end(), std::back_inserter(field.laws), convert);
-        return field;
+    const auto all = [&nodes](auto property) {
+        return std::all_of(nodes.begin(), nodes.end(), property);
     };
-    return detail::simplest<T>(nodes, make);
+
+    if (all([](const auto &node) { return node.mu(0) == 0.0; }))
+        return Uniform<Frictionless>{};
+    if constexpr (T > 1) {
+        if (!all([](const auto &node) { return node.q_squared.minCoeff() == 1.0; }))
+            return detail::collect<T>(nodes, uniform, [](const auto &node) { return node; });
+        if (!all([](const auto &node) {
+                return node.coefficient.minCoeff() == node.coefficient.maxCoeff();
+            }))
+            return detail::collect<T>(
+                nodes, uniform, [](const auto &node) { return Associated<T>{node.coefficient}; });
+    }
+    return detail::collect<T>(nodes, uniform,
+                              [](const auto &node) { return Isotropic<T>{node.mu(0)}; });
 }
 } // namespace dolfinx_contact

@@ -16,7 +16,7 @@ struct PowerOfTwo {
 
 /// The power of two for which magnitude * down lies in [1, 2); less for magnitude < 2^-1021, zero
 /// included. No branch and no library call, so that loops with it vectorise.
-inline PowerOfTwo power_of_two(double magnitude) {
+[[gnu::always_inline]] inline PowerOfTwo power_of_two(double magnitude) {
     constexpr std::uint64_t exponent = 0x7ffULL << 52U, twice_bias = 2046ULL << 52U;
     const double clamped = std::min(std::max(magnitude, 0x1p-1021), 0x1p1021);
     std::uint64_t bits = 0;
@@ -28,14 +28,29 @@ inline PowerOfTwo power_of_two(double magnitude) {
     return scale;
 }
 
+/// max |v_i|
+template <int N>
+[[gnu::always_inline]] inline double largest(const Eigen::Matrix<double, N, 1> &v) {
+    double magnitude = 0.0;
+    for (int i = 0; i < N; ++i)
+        magnitude = std::max(magnitude, std::abs(v[i]));
+    return magnitude;
+}
+
 /// |v|, for all finite v whose norm is representable.
-template <int T> double norm(const Tangent<T> &v) {
-    if constexpr (T == 1)
+template <int T> [[gnu::always_inline]] inline double norm(const Tangent<T> &v) {
+    if constexpr (T == 0)
+        return 0.0;
+    else if constexpr (T == 1)
         return std::abs(v[0]);
     else {
-        const PowerOfTwo scale = power_of_two(std::max(std::abs(v[0]), std::abs(v[1])));
-        const double x = v[0] * scale.down, y = v[1] * scale.down;
-        return std::sqrt(x * x + y * y) * scale.up;
+        const PowerOfTwo scale = power_of_two(largest<T>(v));
+        double sum = 0.0;
+        for (int i = 0; i < T; ++i) {
+            const double x = v[i] * scale.down;
+            sum += x * x;
+        }
+        return std::sqrt(sum) * scale.up;
     }
 }
 } // namespace dolfinx_contact

@@ -5,45 +5,96 @@
 #pragma once
 
 #include "norm.h"
-#include <limits>
 
 namespace dolfinx_contact {
-/// Root of a secular equation and the unit vector that belongs to it.
+/// The equation, for s >= 0,
+///
+///     phi(s) = sum_i (a_i / d_i)^2 = 1,   d_i = b_i s + c_i,   b_i > 0,  c_i >= 0,  phi(0) >= 1.
+///
+/// For T = 2 it is a quartic in s.
+template <int T> struct SecularEquation { Tangent<T> a, b, c; };
+
+/// Its root, d, and the unit vector e with e_i d_i = a_i.
 template <int T> struct SecularRoot {
     double s;
-    Tangent<T> e; ///< e_i = a_i / (b_i s + c_i), |e| = 1
-    int iterations;
+    Tangent<T> d, e;
 };
 
-/// More Newton steps than any input was seen to need; the loop cannot run longer.
-inline constexpr int max_newton_steps = 60;
+/// Up to L such equations, solved together.
+///
+/// psi = phi^(-1/2) is a power mean of the increasing affine functions d_i / |a_i|, hence
+/// increasing and concave, and below its tangents: Newton's iterates for psi(s) = 1 are never right
+/// of the root, from whatever start, and increase from the first on. They start at the largest of
+/// the root for one term alone, for either term, and the root of the tangent plane of psi (as a
+/// function of d) where all d_i are equal; all are left of the root, the last exact for b_1 = b_2,
+/// c_1 = c_2. They end when rounding stops the increase. All terms of phi are positive, so that phi
+/// has full relative precision at every s.
+template <int T, int L> class SecularEquations {
+  public:
+    /// Bound on the Newton steps, more than twice the largest number seen (docs/kernel.md).
+    static constexpr int max_steps = 60;
 
-/// The root s >= 0 of
-///
-///     phi(s) = sum_i (a_i / (b_i s + c_i))^2 = 1,      b_i > 0,  c_i >= 0,  phi(0) >= 1,
-///
-/// for T = 2 a quartic in s. psi = phi^(-1/2) is a power mean of positive increasing affine
-/// functions, hence increasing and concave: Newton's iterates for psi(s) = 1 that start left of the
-/// root stay there and increase. The start, where one term alone gives phi = 1, is left of it.
-/// All terms of phi are positive, so phi has full relative precision at any s.
-template <int T>
-SecularRoot<T> secular_root(const Tangent<T> &a, const Tangent<T> &b, const Tangent<T> &c) {
-    SecularRoot<T> root{0.0, a, 0};
-    for (int i = 0; i < T; ++i)
-        root.s = std::max(root.s, (std::abs(a[i]) - c[i]) / b[i]);
-    for (;; ++root.iterations) {
-        double phi = 0.0, slope = 0.0;
+    void set(int l, const SecularEquation<T> &equation) {
+        double length2 = 0.0, weighted_b = 0.0, weighted_c = 0.0;
+        s[l] = 0.0;
         for (int i = 0; i < T; ++i) {
-            const double d = b[i] * root.s + c[i];
-            root.e[i] = a[i] / d;
-            phi += root.e[i] * root.e[i];
-            slope += root.e[i] * root.e[i] * (b[i] / d);
+            const double a2 = equation.a[i] * equation.a[i];
+            a[i][l] = equation.a[i];
+            b[i][l] = equation.b[i];
+            c[i][l] = equation.c[i];
+            length2 += a2;
+            weighted_b += a2 * b[i][l];
+            weighted_c += a2 * c[i][l];
+            s[l] = std::max(s[l], (std::abs(a[i][l]) - c[i][l]) / b[i][l]);
         }
-        const double next = root.s + phi * (std::sqrt(phi) - 1.0) / slope;
-        // Past the root only by rounding: monotone iterates have nowhere else to go.
-        if (!(next > root.s) || root.iterations == max_newton_steps)
-            return root;
-        root.s = next;
+        s[l] = std::max(s[l], (length2 * std::sqrt(length2) - weighted_c) / weighted_b);
     }
+
+    /// Solves the first `count` equations; gives the number of Newton steps.
+    int solve(int count) {
+        for (int steps = 0;; ++steps) {
+            for (int l = 0; l < count; ++l) {
+                double phi = 0.0, slope = 0.0;
+                for (int i = 0; i < T; ++i) {
+                    d[i][l] = b[i][l] * s[l] + c[i][l];
+                    e[i][l] = a[i][l] / d[i][l];
+                    const double e2 = e[i][l] * e[i][l];
+                    phi += e2;
+                    slope += e2 * (b[i][l] / d[i][l]);
+                }
+                next[l] = s[l] + phi * (std::sqrt(phi) - 1.0) / slope;
+            }
+            if (steps == max_steps)
+                return steps;
+            bool moved = false;
+            for (int l = 0; l < count; ++l)
+                if (next[l] > s[l]) {
+                    s[l] = next[l];
+                    moved = true;
+                }
+            if (!moved)
+                return steps;
+        }
+    }
+
+    SecularRoot<T> root(int l) const {
+        SecularRoot<T> result;
+        result.s = s[l];
+        for (int i = 0; i < T; ++i) {
+            result.d[i] = d[i][l];
+            result.e[i] = e[i][l];
+        }
+        return result;
+    }
+
+  private:
+    double a[T][L], b[T][L], c[T][L], d[T][L], e[T][L], s[L], next[L];
+};
+
+template <int T> SecularRoot<T> solve(const SecularEquation<T> &equation) {
+    SecularEquations<T, 1> one;
+    one.set(0, equation);
+    one.solve(1);
+    return one.root(0);
 }
 } // namespace dolfinx_contact
