@@ -75,10 +75,19 @@ def lagrange_degree(V) -> int | None:
     return element.degree if element.family_name == "P" and continuous else None
 
 
-def bc_dofs(bc):
-    """Owned degrees of freedom (local, unrolled) that a Dirichlet condition fixes."""
-    dofs, owned = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()
-    return np.asarray(dofs[:owned])
+def bc_dofs(bc, size: int):
+    """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
+    dofs, _ = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()
+    return np.asarray(dofs)[np.asarray(dofs) < size]
+
+
+def set_bc_values(array, bcs) -> None:
+    """Write boundary values into a local array, ghosts included: ``bc.set`` in DOLFINx >= 0.9."""
+    for bc in bcs:
+        if hasattr(bc, "set"):
+            bc.set(array)
+        else:
+            fem.set_bc(array, [bc])
 
 
 def assemble_into(x, form) -> None:

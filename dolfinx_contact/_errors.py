@@ -22,7 +22,9 @@ def raised_together(comm):
     first = comm.allreduce(comm.rank if error is not None else comm.size, op=MPI.MIN)
     if first == comm.size:
         return
-    kind, message = comm.bcast((type(error), str(error)) if comm.rank == first else None, root=first)
+    kind, message = comm.bcast(
+        (type(error), str(error)) if comm.rank == first else None, root=first
+    )
     if error is not None:
         raise error
     raise kind(f"{message} (found on rank {first})")

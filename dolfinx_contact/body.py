@@ -47,7 +47,7 @@ class ElasticBody:
         self._parameters = [*derivative.coefficients(), *derivative.constants()]
         self._work = fem.Function(self.V)
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
-        fixed = [_dolfinx.bc_dofs(bc) for bc in self.bcs]
+        fixed = [_dolfinx.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
         self._options = DIRECT if petsc_options is None else dict(petsc_options)
         self._prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
@@ -98,9 +98,13 @@ class ElasticBody:
         """
         lift = self._work.x.array.copy()
         lift[:] = 0.0
-        fem.set_bc(lift, self.bcs)
+        _dolfinx.set_bc_values(lift, self.bcs)
         external = -self.internal_force(np.zeros_like(lift))
-        b = -self.internal_force(lift) if self.comm.allreduce(lift.any(), op=MPI.LOR) else external.copy()
+        b = (
+            -self.internal_force(lift)
+            if self.comm.allreduce(lift.any(), op=MPI.LOR)
+            else external.copy()
+        )
         with raised_together(self.comm):
             for name, values in (("boundary values", lift), ("loads", external), ("loads", b)):
                 if not np.isfinite(values).all():
@@ -205,7 +209,8 @@ def _linear_part(F, u, J):
     if not isinstance(F, ufl.Form) or len(F.arguments()) != 1:
         raise ValueError(
             f"F must be a residual form with one test function, as in DOLFINx's NonlinearProblem; got "
-            f"{type(F).__name__}" + (f" of rank {len(F.arguments())}." if isinstance(F, ufl.Form) else ".")
+            f"{type(F).__name__}"
+            + (f" of rank {len(F.arguments())}." if isinstance(F, ufl.Form) else ".")
         )
     if F.arguments()[0].ufl_function_space() != u.ufl_function_space():
         raise ValueError("the test function of F lives on another space than u.")
@@ -213,7 +218,9 @@ def _linear_part(F, u, J):
         ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
     )
     if derivative.empty():
-        raise ValueError("F does not depend on u: write it as residual, internal minus external work.")
+        raise ValueError(
+            "F does not depend on u: write it as residual, internal minus external work."
+        )
     if J is not None:
         derivative, given = ufl.algorithms.expand_derivatives(J), derivative
         if any(c is u for c in given.coefficients()):

@@ -175,14 +175,17 @@ class Contact:
         lengths = (self.x, self.plane.point, self.plane.displacement, u[self._dofs])
         return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
 
-    def update(self, u) -> None:
-        """One predictor and corrector of the paper for all nodes [dSFMH07, Section 2].
+    def update(self, u, map: str = "bipotential") -> None:
+        """One predictor and corrector for all nodes, with the metric ``rho``.
 
-        Takes ``u``, computes gaps and slip increments, and replaces ``reaction`` by the projection
-        of ``reaction - rho (...)`` on the friction cone, and ``status`` by the branch it took.
+        Takes ``u``, computes gaps and slip increments, and replaces ``reaction`` by its predictor's
+        projection on the friction cone, and ``status`` by the branch that the projection took.
 
         Args:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+            map: "bipotential" for the paper's predictor and Euclidean projection [dSFMH07, Section
+                2], "return" for a predictor without the translated normal term and a projection in
+                the metric of the slip rule.  Both have the same fixed points.
 
         Raises:
             ValueError: ``rho`` has not been set; see ``set_metric``.
@@ -190,21 +193,26 @@ class Contact:
         if self.rho is None:
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         self.move(u)
-        self.reaction, self.status = self.law.bipotential_map(
-            self.reaction, self.gap, self.slip_increment, self.rho
-        )
+        state = (self.reaction, self.gap, self.slip_increment, self.rho)
+        if map == "bipotential":
+            self.reaction, self.status = self.law.bipotential_map(*state)
+        else:
+            self.reaction, self.status = self.law.return_map(*state, self.rho)
 
     def take_reaction(self, forces: np.ndarray) -> None:
         """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
         self.reaction = forces[self._dofs] @ self.frame.T
 
-    @property
-    def springs(self) -> np.ndarray:
-        """Springs per unit of rho that belong to the predictor: diag(Q^2, 1), ``shape=(n, gdim)``."""
-        n, gdim = self._dofs.shape
-        springs = np.ones((n, gdim))
-        springs[:, :-1] = self.friction.Q[..., : gdim - 1] ** 2
-        return springs
+    def springs(self, map: str = "bipotential") -> np.ndarray:
+        """Springs that belong to ``update``, ``shape=(n, gdim)``, local frame, force per length.
+
+        ``rho diag(Q^2, 1)`` for the paper's map, ``rho`` in all directions for the return map;
+        none along the plane without friction.
+        """
+        Q = self.friction.Q[..., : self.frame.shape[0] - 1]
+        springs = np.ones_like(self.reaction)
+        springs[:, :-1] = Q**2 if map == "bipotential" else Q > 0
+        return springs * self.rho[:, None]
 
     def assemble_reaction(self, b) -> None:
         """Add the nodal reactions, forces on the body, to ``b``.
@@ -252,6 +260,11 @@ class Contact:
             self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
         )
 
+    @property
+    def slip_defect(self) -> np.ndarray:
+        """What of the slip increments the slip rule leaves unexplained, ``shape=(n,)``, length."""
+        return self.law.slip_defect(self.reaction, self.slip_increment, self.status)
+
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
@@ -269,7 +282,9 @@ def _check_space(V) -> None:
     gdim, tdim = mesh.geometry.dim, mesh.topology.dim
     components = V.dofmap.index_map_bs
     if gdim != tdim or gdim not in (2, 3):
-        raise ValueError(f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both.")
+        raise ValueError(
+            f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both."
+        )
     if components != gdim:
         raise ValueError(
             f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
@@ -310,7 +325,9 @@ def _check_law(plane, friction, gdim: int) -> None:
     if not isinstance(plane, RigidPlane):
         raise ValueError(f"plane must be a RigidPlane, got {type(plane).__name__}: {plane!r}.")
     if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction, got {type(friction).__name__}: {friction!r}.")
+        raise ValueError(
+            f"friction must be a Friction, got {type(friction).__name__}: {friction!r}."
+        )
     if plane.point.size != gdim:
         raise ValueError(f"{plane} has {plane.point.size} dimensions, the mesh {gdim}.")
     friction.law(gdim)  # refuses what has no meaning in two dimensions
@@ -325,4 +342,6 @@ def _check_coefficients(friction, n: int) -> None:
     for name in ("mu", "p"):
         shape = np.shape(getattr(friction, name))
         if len(shape) == 2 and shape[0] != n:
-            raise ValueError(f"friction.{name} has {shape[0]} rows, this rank owns {n} contact nodes.")
+            raise ValueError(
+                f"friction.{name} has {shape[0]} rows, this rank owns {n} contact nodes."
+            )

@@ -13,13 +13,33 @@ For a displacement ``u`` and admissible nodal reactions ``r`` (in the friction c
   contact-free trial state.  Where all three vanish nothing presses, and ``kappa |u|``, the forces
   that hold a single node against that displacement, takes their place.
 
+The projection equation weights slip by ``Q^2`` and is blind where p is small, so a second number is kept
+beside it: the slip error, the largest ``|Delta u_t + |Delta u_t| d|`` over slipping nodes, d the unit
+vector along ``P^-2 r_t``, and ``|Delta u_t|`` over sticking ones (nothing where mu = 0), over the load
+displacement, which is the largest penetration or slip increment of a contact node in the trial
+state.  A step has converged when both are at most ``tol``.
+
 All norms are Euclidean over the nodal vectors of all ranks, so the number depends neither on the
 frame nor on the units.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+
+
+class Errors(NamedTuple):
+    """Both errors of a state, dimensionless."""
+
+    error: float
+    slip_error: float
+
+    @property
+    def largest(self) -> float:
+        """The larger one; NaN if either is."""
+        return float(np.maximum(*self))
 
 
 def projection_residual(contact, stiffness: np.ndarray) -> np.ndarray:

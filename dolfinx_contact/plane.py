@@ -92,4 +92,6 @@ class RigidPlane:
 
     def __repr__(self):
         axis = None if self.axis is None else self.axis.tolist()
-        return f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis})"
+        return (
+            f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis})"
+        )

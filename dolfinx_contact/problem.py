@@ -12,7 +12,7 @@ from dolfinx import fem
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.body import ElasticBody
 from dolfinx_contact.contact import Contact, Status
-from dolfinx_contact.error import projection_residual, relative
+from dolfinx_contact.error import Errors, projection_residual, relative
 from dolfinx_contact.fixed_point import FixedPoint
 
 
@@ -30,6 +30,7 @@ class Step:
 
     Attributes:
         error: Dimensionless, see ``dolfinx_contact.error``.
+        slip_error: Largest defect of the slip rule over the load displacement, see the same place.
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
         penetration: Largest penetration, >= 0, length.
         iterations: Iterations of the solver; 0 if the contact-free state already was the solution.
@@ -38,6 +39,7 @@ class Step:
     """
 
     error: float
+    slip_error: float
     bipotential_gap: float
     penetration: float
     iterations: int
@@ -66,7 +68,8 @@ class ContactProblem:
         contacts: The contacts; no node in two of them.
         bcs: Dirichlet conditions; their values may change between steps.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
-        solver: A solver, by default ``FixedPoint()``.
+        solver: A solver, such as ``FixedPoint()``; None takes what measured best,
+            ``FixedPoint(map="return")``.
         tol: Largest error of a converged step, see ``dolfinx_contact.error``.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
         petsc_options_prefix: Their prefix.
@@ -93,7 +96,7 @@ class ContactProblem:
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
         with raised_together(u.function_space.mesh.comm):
             self.contacts = _checked_contacts(contacts, u)
-            self.solver = FixedPoint() if solver is None else solver
+            self.solver = FixedPoint(map="return") if solver is None else solver
             if not callable(getattr(self.solver, "solve", None)):
                 raise ValueError(f"solver {solver!r} is unknown: use None or dc.FixedPoint(...).")
             self.tol = _checked_tolerance(tol)
@@ -128,12 +131,12 @@ class ContactProblem:
         try:
             with raised_together(self.body.comm):
                 self._check_input()
-            x, error, iterations = self._solve()
-            step = self._record(error, iterations, perf_counter() - start)
-            if not error <= self.tol:
+            x, errors, iterations = self._solve()
+            step = self._record(errors, iterations, perf_counter() - start)
+            if not errors.largest <= self.tol:
                 raise NotConverged(
-                    f"not converged: error {error:.3e} above tol {self.tol:.1e} after {iterations} "
-                    f"iterations ({step.counts.open} open, {step.counts.stick} sticking, "
+                    f"not converged: error {step.error:.3e}, slip error {step.slip_error:.3e}, tol "
+                    f"{self.tol:.1e}, after {iterations} iterations ({step.counts.open} open, {step.counts.stick} sticking, "
                     f"{step.counts.slip} slipping nodes). Smaller load steps help most often.",
                     step,
                 )
@@ -146,7 +149,7 @@ class ContactProblem:
             contact.advance()
         return step
 
-    def _solve(self) -> tuple[np.ndarray, float, int]:
+    def _solve(self) -> tuple[np.ndarray, Errors, int]:
         body = self.body
         assembled = body.refresh()
         if assembled != self._assembled:
@@ -158,48 +161,53 @@ class ContactProblem:
         b, external = body.load()
         trial = body.solve(b)
         trial[body.fixed] = b[body.fixed]
-        equations = _ContactEquations(self, b, self._load(trial, external))
+        equations = _ContactEquations(self, b, *self._load(trial, external))
         if not self._touches:
-            return trial, equations.open_error(trial), 0
+            return trial, equations.errors_if_open(trial), 0
         last, before = self._states
         guesses = [self.u.x.array[: body.size].copy(), 2 * last - before]
         for guess in guesses:
             guess[body.fixed] = b[body.fixed]
         x = min(guesses, key=lambda guess: equations.residual(guess)[1])
-        x, error, iterations = self.solver.solve(equations, x, self.tol)
-        return x, equations.residual(x)[1], iterations
+        x, iterations = self.solver.solve(equations, x, self.tol)
+        equations.residual(x)
+        return x, equations.errors, iterations
 
-    def _load(self, trial: np.ndarray, external: np.ndarray) -> float:
-        """The load of the step, see ``dolfinx_contact.error``; notes whether the trial state touches."""
+    def _load(self, trial: np.ndarray, external: np.ndarray) -> tuple[float, float]:
+        """Load and load displacement, see ``dolfinx_contact.error``; notes whether anything touches."""
         body = self.body
-        previous, pressed, deepest = [], [], 0.0
+        previous, pressed, deepest, farthest = [], [], 0.0, 0.0
         for contact, stiffness in zip(self.contacts, self._stiffness):
             contact.move(trial)
             previous.append(contact.previous_reaction.ravel())
             pressed.append(stiffness * np.maximum(-contact.gap, 0.0))
             deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
+            slip = np.abs(contact.slip_increment).max(initial=0.0)
+            farthest = max(farthest, slip, -contact.gap.min(initial=0.0))
         empty = [np.zeros(0)]
         penetration = body.norm(np.concatenate(pressed + empty))
         self._touches = body.largest(np.array([deepest])) > 1.0
         if not self._touches:
             penetration = 0.0
         load = max(body.norm(external), body.norm(np.concatenate(previous + empty)), penetration)
-        if load > 0.0:
-            return load
-        return body.norm(trial) * body.largest(np.concatenate(self._stiffness + empty))
+        if load == 0.0:
+            load = body.norm(trial) * body.largest(np.concatenate(self._stiffness + empty))
+        return load, body.largest(np.array([farthest]))
 
     # -- helpers -------------------------------------------------------------------------------
 
     def _check_input(self) -> None:
         if not np.isfinite(self.u.x.array).all():
-            raise ValueError("u contains NaN or infinity: it is the guess of this step, set it anew.")
+            raise ValueError(
+                "u contains NaN or infinity: it is the guess of this step, set it anew."
+            )
         for contact in self.contacts:
             if not np.isfinite(contact.plane.displacement).all():
                 raise ValueError(
                     f"plane.displacement must be finite, got {contact.plane.displacement}."
                 )
 
-    def _record(self, error: float, iterations: int, seconds: float) -> Step:
+    def _record(self, errors: Errors, iterations: int, seconds: float) -> Step:
         sums = np.zeros(4)
         penetration = 0.0
         for contact in self.contacts:
@@ -208,7 +216,8 @@ class ContactProblem:
             penetration = max(penetration, -contact.gap.min(initial=0.0))
         *counts, gap = self.body.total(sums)
         return Step(
-            error=float(error),
+            error=errors.error,
+            slip_error=errors.slip_error,
             bipotential_gap=float(gap),
             penetration=self.body.largest(np.array([penetration])),
             iterations=iterations,
@@ -229,21 +238,24 @@ class ContactProblem:
 class _ContactEquations:
     """What a solver sees of a step: a residual, a correction, a metric and a sum over ranks."""
 
-    def __init__(self, problem: ContactProblem, b: np.ndarray, load: float):
-        self.problem, self.body, self.b, self.load = problem, problem.body, b, load
+    def __init__(self, problem, b: np.ndarray, load: float, load_displacement: float):
+        self.problem, self.body, self.b = problem, problem.body, b
+        self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
-        self._metric = 1.0
+        self._metric = ("bipotential", 1.0)
 
-    def use_metric(self, factor: float) -> None:
-        """Set rho of the predictor to ``factor`` times the nodal stiffness, springs to match."""
-        self._metric = factor
+    def use_metric(self, map: str, factor: float) -> None:
+        """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
+        self._metric = metric = (map, factor)
         stiffened = self.problem._stiffened
-        if factor not in stiffened:
-            A = self.body.K.copy()
-            for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-                contact.add_springs(A, factor * stiffness[:, None] * contact.springs)
-            stiffened.clear()  # one factorisation at a time: memory counts more than a second try
-            stiffened[factor] = self.body.factorise(A)
+        if metric in stiffened:
+            return
+        A = self.body.K.copy()
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            contact.rho = factor * stiffness
+            contact.add_springs(A, contact.springs(map))
+        stiffened.clear()  # one factorisation at a time: memory counts more than a second try
+        stiffened[metric] = self.body.factorise(A)
 
     def correction(self, residual: np.ndarray) -> np.ndarray:
         """Displacement that removes the residual while the springs hold the contact nodes."""
@@ -258,24 +270,25 @@ class _ContactEquations:
         error falls below the tolerance it is measured again with F itself, assembled by DOLFINx.
         """
         forces = self.b - self.body.multiply(x)
+        map, factor = self._metric
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = self._metric * stiffness
+            contact.rho = factor * stiffness
             contact.take_reaction(-forces)
-            contact.update(x)
+            contact.update(x, map)
         residual = self._balance(forces)
-        error = self._error(residual)
-        if error <= self.problem.tol:
-            error = max(error, self._error(self._balance(self._assembled(x))))
-        return residual, error
+        self.errors = self._errors(residual)
+        if self.errors.largest <= self.problem.tol:
+            self.errors = self._errors(self._balance(self._assembled(x)))
+        return residual, self.errors.largest
 
-    def open_error(self, x: np.ndarray) -> float:
-        """Error of a state in which no node touches, to rounding, and all reactions are zero."""
+    def errors_if_open(self, x: np.ndarray) -> Errors:
+        """Errors of a state in which no node touches, to rounding, and all reactions are zero."""
         for contact in self.problem.contacts:
             contact.move(x)
             contact.gap = np.maximum(contact.gap, 0.0)
             contact.reaction = np.zeros_like(contact.reaction)
             contact.status = np.full_like(contact.status, Status.OPEN)
-        return self._error(self._assembled(x))
+        return self._errors(self._assembled(x))
 
     def _assembled(self, x: np.ndarray) -> np.ndarray:
         values = self.problem.u.x.array.copy()
@@ -288,15 +301,16 @@ class _ContactEquations:
             contact.assemble_reaction(forces)
         return forces
 
-    def _error(self, residual: np.ndarray) -> float:
+    def _errors(self, residual: np.ndarray) -> Errors:
         residual = residual.copy()
         residual[self.body.fixed] = 0.0
-        projection = [
-            projection_residual(contact, stiffness).ravel()
-            for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness)
-        ]
-        worst = max(self.body.norm(residual), self.body.norm(np.concatenate([*projection, []])))
-        return relative(worst, self.load)
+        projection, defect = [np.zeros(0)], 0.0
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            projection.append(projection_residual(contact, stiffness).ravel())
+            defect = max(defect, contact.slip_defect.max(initial=0.0))
+        worst = max(self.body.norm(residual), self.body.norm(np.concatenate(projection)))
+        defect = self.body.largest(np.array([defect]))
+        return Errors(relative(worst, self.load), relative(defect, self.load_displacement))
 
 
 def _checked_contacts(contacts, u) -> list[Contact]:
@@ -304,7 +318,9 @@ def _checked_contacts(contacts, u) -> list[Contact]:
     taken = np.zeros(0, dtype=np.int64)
     for contact in contacts:
         if not isinstance(contact, Contact):
-            raise ValueError(f"contacts must hold dc.Contact objects, got {type(contact).__name__}.")
+            raise ValueError(
+                f"contacts must hold dc.Contact objects, got {type(contact).__name__}."
+            )
         if contact.V != u.function_space:
             raise ValueError(
                 "a contact lives on another space or mesh than u: build it on u.function_space."

@@ -49,7 +49,9 @@ def block(
     turn = np.eye(3) if turn is None else turn
     low, high = [-0.5] * (gdim - 1) + [0.0], [0.5] * (gdim - 1) + [0.6]
     if gdim == 3:
-        domain = mesh.create_box(comm, [np.array(low), np.array(high)], cells, mesh.CellType.hexahedron)
+        domain = mesh.create_box(
+            comm, [np.array(low), np.array(high)], cells, mesh.CellType.hexahedron
+        )
     else:
         domain = mesh.create_rectangle(
             comm, [np.array(low), np.array(high)], cells, mesh.CellType.quadrilateral
