@@ -168,7 +168,9 @@ def _colour(axes, disc, values, shown, **colours):
     """Quarters in the colour of their node's value."""
     quarters = disc.quarters().reshape(-1, 4, 2)[shown]
     image = PolyCollection(quarters, array=values[disc.faces.ravel()][shown], **colours)
-    image.set(edgecolor="face", linewidth=0.6)  # or the background would shine through seams
+    image.set(
+        edgecolor="face", linewidth=0.6, snap=False
+    )  # or the background would shine through seams
     axes.add_collection(image)
     return image
 
@@ -180,8 +182,10 @@ def _arrows(axes, disc, vectors, shown, label) -> None:
     if longest == 0.0:
         return
     if len(disc.x) > 500:
-        _, thinned = np.unique(np.floor(x / (0.08 * radius)), axis=0, return_index=True)
-        x, vectors = x[thinned], vectors[thinned]
+        square = np.round(x / (0.09 * radius))  # of a lattice, keep the node nearest to its middle
+        nearest = np.argsort(np.linalg.norm(x / (0.09 * radius) - square, axis=1).round(6))
+        _, first = np.unique(square[nearest], axis=0, return_index=True)
+        x, vectors = x[nearest[first]], vectors[nearest[first]]
     style = dict(angles="xy", scale_units="xy", scale=6 * longest / radius, width=4.5e-3)
     arrows = axes.quiver(*x.T, *vectors.T, **style)
     key = float(f"{longest:.1g}")
