@@ -1,6 +1,6 @@
 """Frictional contact of elastic bodies with rigid planes, for FEniCSx, by the bi-potential method."""
 
-from dolfinx_contact import _dolfinx  # first: some releases must be imported in a certain order
+from dolfinx_contact import _dolfinx  # noqa: F401  (first: releases differ in what they want first)
 from dolfinx_contact.bipotential import bipotential_gap
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.fixed_point import FixedPoint

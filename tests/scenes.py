@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import ufl
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc  # before dolfinx, which some releases want
-from dolfinx import fem, mesh
 from dolfinx_contact._dolfinx import functionspace
 
 COMM = MPI.COMM_WORLD

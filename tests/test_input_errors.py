@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scenes
 import ufl
+from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
-from dolfinx import fem, mesh
 from dolfinx_contact._dolfinx import functionspace
 
 COMM = scenes.COMM
@@ -165,7 +165,13 @@ def test_orthotropic_friction_needs_an_axis(scene):
 
 
 def rebuilt(scene, **changes):
-    arguments = {"F": scene.F, "u": scene.u, "contacts": [scene.contact], "bcs": scene.bcs, **changes}
+    arguments = {
+        "F": scene.F,
+        "u": scene.u,
+        "contacts": [scene.contact],
+        "bcs": scene.bcs,
+        **changes,
+    }
     return dc.ContactProblem(**arguments)
 
 

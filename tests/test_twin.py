@@ -1,14 +1,14 @@
 """The package against its slow twin, which shares neither law nor error nor solver with it."""
 
+import dolfinx.fem.petsc
 import numpy as np
 import pytest
 import scenes
 import twin_solver
 import ufl
+from dolfinx import fem
 from mpi4py import MPI
 
-import dolfinx.fem.petsc
-from dolfinx import fem
 from dolfinx_contact._dolfinx import bc_dofs
 
 CASES = {
