@@ -2,6 +2,7 @@
 
 from dolfinx_contact import _dolfinx  # noqa: F401  (first: releases differ in what they want first)
 from dolfinx_contact.bipotential import bipotential_gap
+from dolfinx_contact.body import LinearSolverError
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.fixed_point import FixedPoint
 from dolfinx_contact.friction import Friction
@@ -15,6 +16,7 @@ __all__ = [
     "Counts",
     "FixedPoint",
     "Friction",
+    "LinearSolverError",
     "NotConverged",
     "RigidPlane",
     "Status",

@@ -21,6 +21,10 @@ DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "
 _instances = count()
 
 
+class LinearSolverError(RuntimeError):
+    """PETSc's linear solver did not solve; the message has its reason and options."""
+
+
 class ElasticBody:
     """F(u) = K u - f on the free degrees of freedom, u given on the others.
 
@@ -174,7 +178,7 @@ class ElasticBody:
             left.array_w[:] = b
             ksp.solve(left, right)
             if ksp.getConvergedReason() < 0:
-                raise RuntimeError(
+                raise LinearSolverError(
                     f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) "
                     f"after {ksp.getIterationNumber()} iterations; options {self._options}."
                 )

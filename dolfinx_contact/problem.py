@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.body import ElasticBody
@@ -129,8 +130,7 @@ class ContactProblem:
         """
         start = perf_counter()
         try:
-            with raised_together(self.body.comm):
-                self._check_input()
+            self._check_input()
             x, errors, iterations = self._solve()
             step = self._record(errors, iterations, perf_counter() - start)
             if not errors.largest <= self.tol:
@@ -197,15 +197,18 @@ class ContactProblem:
     # -- helpers -------------------------------------------------------------------------------
 
     def _check_input(self) -> None:
-        if not np.isfinite(self.u.x.array).all():
-            raise ValueError(
-                "u contains NaN or infinity: it is the guess of this step, set it anew."
-            )
-        for contact in self.contacts:
-            if not np.isfinite(contact.plane.displacement).all():
+        moved = np.concatenate([c.plane.displacement for c in self.contacts] + [np.zeros(0)])
+        extremes = np.concatenate([moved, -moved])
+        self.body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
+        with raised_together(self.body.comm):
+            if not np.isfinite(self.u.x.array).all():
                 raise ValueError(
-                    f"plane.displacement must be finite, got {contact.plane.displacement}."
+                    "u contains NaN or infinity: it is the guess of this step, set it anew."
                 )
+            if not np.isfinite(moved).all():
+                raise ValueError(f"plane.displacement must be finite, got {moved}.")
+            if (extremes[: moved.size] != -extremes[moved.size :]).any():
+                raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
 
     def _record(self, errors: Errors, iterations: int, seconds: float) -> Step:
         sums = np.zeros(4)
@@ -221,7 +224,7 @@ class ContactProblem:
             bipotential_gap=float(gap),
             penetration=self.body.largest(np.array([penetration])),
             iterations=iterations,
-            seconds=seconds,
+            seconds=self.body.largest(np.array([seconds])),
             counts=Counts(*(int(count) for count in counts)),
         )
 

@@ -115,6 +115,16 @@ def test_planes_that_differ_between_ranks_are_refused(scene):
         dc.Contact(scene.V, scene.facets, plane(), dc.Friction(mu=0.1 * (1 + COMM.rank)))
 
 
+def test_plane_that_moves_differently_between_ranks_is_refused():
+    """A displacement set on one rank only is noticed before it becomes a result."""
+    if COMM.size == 1:
+        pytest.skip("needs more than one rank")
+    scene = scenes.block(cells=(2, 2, 2))
+    scene.plane.displacement = (0, 0, 0.01 * COMM.rank)
+    with pytest.raises(ValueError, match="differs between ranks"):
+        scene.problem.solve()
+
+
 def test_no_facets_on_one_rank_is_fine(scene):
     """Contact may lie on some ranks only: the nodes are those of all ranks' facets."""
     everything = dc.Contact(scene.V, scene.facets, plane(), FRICTION)

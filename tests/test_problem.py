@@ -241,6 +241,16 @@ def test_wrong_derivative_is_never_taken_for_convergence():
         problem.solve()
 
 
+def test_linear_solver_is_the_users_choice():
+    """petsc_options reach PETSc: conjugate gradients with multigrid give the same reactions."""
+    reference, _ = run()
+    options = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": 1e-12}
+    other, scene = run(petsc_options=options, petsc_options_prefix="mine_")
+    assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
+    with pytest.raises(dc.LinearSolverError, match="ksp_max_it"):
+        run(petsc_options={**options, "ksp_max_it": 1})
+
+
 def test_same_scene_twice_gives_the_same_bits():
     """On one rank nothing depends on time, memory addresses or a random number."""
     first, _ = run(comm=MPI.COMM_SELF)
