@@ -95,11 +95,11 @@ template <> inline constexpr bool has_start<ReturnMap> = true;
 /// One component at the nodes of a block.
 using Column = double[block_size];
 
-template <class Scalar>
-void gather(const View<Scalar> &view, int component, int count, Column &to) {
+template <class Scalar, class To>
+void gather(const View<const Scalar> &view, int component, int count, To &to) {
     if (!view.data)
         return;
-    Scalar *from = view.data + component * view.column;
+    const Scalar *from = view.data + component * view.column;
     for (int i = 0; i < count; ++i)
         to[i] = from[i * view.row];
 }
@@ -116,8 +116,8 @@ void scatter(const Column &from, int count, const View<Scalar> &view, int compon
 /// Columns of a block for T tangential components, D = T + 1 in all.
 template <int T> struct Block {
     static constexpr int D = T + 1;
-    Column r[D], gap, slip[T + 1], rho_n, rho_t, branch_in; // slip[T] is not used: no empty arrays
-    Column cos, sin;
+    Column r[D]{}, gap{}, slip[T + 1]{}, rho_n{}, rho_t{}, cos{}, sin{}; // slip[T]: no empty arrays
+    std::uint8_t branch_in[block_size]{};
     Column value[D], branch, by_reaction[D * D], by_motion[D * D];
 
     void load(const Inputs &in, std::size_t first, int count) {
@@ -145,7 +145,7 @@ template <int T> struct Block {
         s.gap = gap[i];
         s.rho_n = rho_n[i];
         s.rho_t = rho_t[i];
-        s.branch = static_cast<Branch>(static_cast<int>(branch_in[i]));
+        s.branch = static_cast<Branch>(branch_in[i]);
         return s;
     }
 
