@@ -7,8 +7,10 @@ from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.fixed_point import FixedPoint
 from dolfinx_contact.friction import Friction
 from dolfinx_contact.friction_cone import load_function, project_cone
+from dolfinx_contact.history import History
 from dolfinx_contact.plane import RigidPlane
 from dolfinx_contact.problem import ContactProblem, Counts, NotConverged, Step
+from dolfinx_contact.wear import Wear
 
 __all__ = [
     "Contact",
@@ -16,11 +18,13 @@ __all__ = [
     "Counts",
     "FixedPoint",
     "Friction",
+    "History",
     "LinearSolverError",
     "NotConverged",
     "RigidPlane",
     "Status",
     "Step",
+    "Wear",
     "bipotential_gap",
     "load_function",
     "project_cone",

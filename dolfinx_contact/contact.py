@@ -6,14 +6,16 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
+import ufl
 from dolfinx import fem
-from dolfinx.mesh import exterior_facet_indices
+from dolfinx.mesh import exterior_facet_indices, meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.friction import Friction
 from dolfinx_contact.plane import RigidPlane
+from dolfinx_contact.wear import Wear
 
 
 class Status(IntEnum):
@@ -46,6 +48,7 @@ class Contact:
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The rigid plane.
         friction: The friction law, the same on all ranks.
+        wear: Archard's law, if worn depth is to open the gap; None costs nothing.
 
     Raises:
         ValueError: on all ranks, for facets that are not boundary facets of the mesh, a space that
@@ -59,9 +62,13 @@ class Contact:
         reaction: Force of the plane on the body, ``shape=(n, gdim)``, local frame.
         status: A ``Status`` per node, ``shape=(n,)``.
         rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
+        dissipation: Work of friction since the start, ``shape=(n,)``, force times length: the sum of
+            ``-(r_t + r_t of the last step) / 2 . slip_increment``, the trapezoidal rule.
+        slip_path: Length of the path slipped while in contact since the start, ``shape=(n,)``.
+        wear_depth: Worn depth, ``shape=(n,)``, length; zero without ``wear``.
     """
 
-    def __init__(self, V, facets, plane: RigidPlane, friction: Friction):
+    def __init__(self, V, facets, plane: RigidPlane, friction: Friction, wear: Wear | None = None):
         if not _dolfinx.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
@@ -73,7 +80,11 @@ class Contact:
             _check_space(V)
             facets = _checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             _check_law(plane, friction, gdim)
-        described = repr((plane, plane.displacement.tolist(), friction))
+            if not (wear is None or isinstance(wear, Wear)):
+                raise ValueError(
+                    f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}."
+                )
+        described = repr((plane, plane.displacement.tolist(), friction, wear))
         same = described == mesh.comm.bcast(described, root=0) or friction.mu.ndim > 1
         blocks = fem.locate_dofs_topological(V, fdim, facets)
         owned = V.dofmap.index_map.size_local
@@ -86,7 +97,8 @@ class Contact:
                 raise ValueError("facets is empty on all ranks: name the facets that may touch.")
             _check_coefficients(friction, self.nodes.size)
 
-        self.V, self.plane, self.friction = V, plane, friction
+        self.V, self.plane, self.friction, self.wear = V, plane, friction, wear
+        self._facets, self._area = facets, None
         self.comm = mesh.comm
         self.law = friction.law(gdim)
         self.frame = plane.frame
@@ -97,8 +109,9 @@ class Contact:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the history: undeformed body, no reactions, the plane where it is now."""
+        """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
         n, gdim = self._dofs.shape
+        self.dissipation, self.slip_path, self.wear_depth = np.zeros((3, n))
         self._converged = _State(
             np.tile(-self.frame @ self.plane.displacement, (n, 1)),
             np.zeros((n, gdim)),
@@ -110,7 +123,8 @@ class Contact:
 
     @property
     def _gap0(self) -> np.ndarray:
-        return (self.x[:, : self.plane.point.size] - self.plane.point) @ self.plane.normal
+        flat = (self.x[:, : self.plane.point.size] - self.plane.point) @ self.plane.normal
+        return flat + self.wear_depth
 
     # -- one iteration -------------------------------------------------------------------------
 
@@ -228,6 +242,14 @@ class Contact:
 
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
+        before = self.previous_reaction
+        if not self.friction.frictionless:
+            work = -0.5 * (before + self.reaction)[:, :-1] * self.slip_increment
+            self.dissipation += work.sum(axis=1)
+            if self.wear is not None:
+                self.wear_depth += self.wear.depth(work, self.area)
+        touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
+        self.slip_path += touched * np.linalg.norm(self.slip_increment, axis=1)
         self._converged = _State(
             self._displacement, self.reaction, self.gap, self.slip_increment, self.status
         )
@@ -236,6 +258,40 @@ class Contact:
         """Return to the last converged state."""
         last = self._converged
         self._displacement, self.reaction, self.gap, self.slip_increment, self.status = last
+
+    def save(self) -> dict[str, np.ndarray]:
+        """All that the next step starts from, as arrays by name; this rank's nodes."""
+        cumulative = ("dissipation", "slip_path", "wear_depth")
+        return {
+            **self._converged._asdict(),
+            **{name: getattr(self, name).copy() for name in cumulative},
+            "plane": self.plane.displacement.copy(),
+        }
+
+    def load(self, saved) -> None:
+        """Take back what ``save`` returned, with the same nodes on this rank.
+
+        Raises:
+            ValueError: an array is missing or of another size.
+        """
+        present = self.save()
+        for name, array in present.items():
+            if name not in saved or saved[name].shape != array.shape:
+                found = saved[name].shape if name in saved else "nothing"
+                raise ValueError(
+                    f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
+                    "for another mesh, another contact or another number of ranks."
+                )
+        self._converged = _State(*(np.array(saved[name]) for name in _State._fields))
+        for name in ("dissipation", "slip_path", "wear_depth"):
+            setattr(self, name, np.array(saved[name]))
+        self.plane.displacement = saved["plane"]
+        self.restore()
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement of the nodes relative to the plane, ``shape=(n, gdim)``, local frame, length."""
+        return self._displacement
 
     @property
     def previous_reaction(self) -> np.ndarray:
@@ -268,6 +324,39 @@ class Contact:
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of the contact surface that belongs to each node, ``shape=(n,)``, reference state.
+
+        The integral of the node's shape function over the facets; a length in two dimensions.
+        Collective at the first call.
+        """
+        if self._area is None:
+            mesh, fdim = self.V.mesh, self.V.mesh.topology.dim - 1
+            mine = np.unique(self._facets[self._facets < mesh.topology.index_map(fdim).size_local])
+            tags = meshtags(mesh, fdim, mine, np.ones(mine.size, dtype=np.int32))
+            ds = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(1)
+            form = fem.form(ufl.TestFunction(self.V)[0] * ds)
+            work = fem.Function(self.V)
+            _dolfinx.assemble_into(work.x, form)
+            self._area = work.x.array[self._dofs[:, 0]]
+        return self._area
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Normal reaction over nodal area, ``shape=(n,)``, force per area.  Collective at first."""
+        return self.reaction[:, -1] / self.area
+
+    def function(self, values, name: str = "f", elsewhere: float = 0.0):
+        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
+        scalars, parent = self.V.sub(0).collapse()
+        node = np.ravel(parent) // self.frame.shape[0]
+        function = fem.Function(scalars, name=name)
+        function.x.array[:] = elsewhere
+        function.x.array[np.argsort(node)[self.nodes]] = values
+        function.x.scatter_forward()
+        return function
 
     def reaction_function(self):
         """Nodal reactions in global components as a Function on ``V``, zero elsewhere."""

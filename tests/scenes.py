@@ -39,6 +39,7 @@ def block(
     length=1.0,
     turn=None,
     tol=1e-10,
+    wear=None,
     **options,
 ):
     """A block whose top is held and moved and whose bottom meets the plane through the origin.
@@ -70,7 +71,7 @@ def block(
     axes = turn[:gdim, :gdim]
     axis = None if gdim == 2 else axes[:, 0]
     plane = dc.RigidPlane(point=np.zeros(gdim), normal=axes[:, -1], axis=axis)
-    contact = dc.Contact(V, facets, plane, dc.Friction(mu=mu, p=p))
+    contact = dc.Contact(V, facets, plane, dc.Friction(mu=mu, p=p), wear=wear)
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=tol, **options)
 
     def move_top(*displacement):

@@ -1,0 +1,39 @@
+"""Archard's wear law: worn depth from the work of friction per area."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class Wear:
+    """Wear that feeds back: after every step worn depth opens the gap of the next one.
+
+    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i`` the work of friction in direction i
+    during the step and ``A`` the nodal area; so the worn volume, the sum of depth times area, is
+    ``sum k_i w_i`` exactly.  With one coefficient and isotropic friction ``k = K / (mu H)`` is Archard's
+    law, K his coefficient and H the hardness [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
+
+    Args:
+        coefficient: k, a number, or a pair for the two friction directions; volume per work, which
+            is one over stress, >= 0.
+
+    Raises:
+        ValueError: a coefficient that is negative, not finite or not real, or more than two.
+    """
+
+    def __init__(self, coefficient):
+        array = np.asarray(coefficient)
+        real = array.dtype.kind in "iuf" and array.shape in ((), (1,), (2,))
+        if not real or not np.isfinite(array).all() or (array < 0).any():
+            raise ValueError(
+                "wear coefficient must be a number or a pair of numbers >= 0, volume per work; got "
+                f"{coefficient!r}."
+            )
+        self.coefficient = array.astype(np.float64)
+
+    def depth(self, work: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length."""
+        return (self.coefficient * work).sum(axis=1) / area
+
+    def __repr__(self):
+        return f"Wear({self.coefficient.tolist()})"
