@@ -14,7 +14,7 @@ except ImportError:
     pass
 
 import dolfinx
-import dolfinx.fem.petsc  # noqa: F401  (a submodule that newer releases do not import by themselves)
+import dolfinx.fem.petsc
 import numpy as np
 from dolfinx import fem, la
 from petsc4py import PETSc

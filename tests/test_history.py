@@ -192,6 +192,7 @@ def test_checkpoints_of_other_problems_are_refused(tmp_path):
 
 KILLED = """
 import sys, os, signal
+import dolfinx_contact
 sys.path.insert(0, {tests!r})
 import scenes, numpy as np
 from pathlib import Path
