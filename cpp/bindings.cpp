@@ -303,6 +303,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
 }
 } // namespace
 
+void bind_condensed(py::module_ &m); // bindings_condensed.cpp
 
 PYBIND11_MODULE(_kernel, m) {
     m.doc() =
@@ -325,4 +326,5 @@ PYBIND11_MODULE(_kernel, m) {
         py::arg("mu"), py::arg("p"), py::arg("dim"), py::arg("axes") = py::none(),
         "The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: "
         "associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).");
+    bind_condensed(m);
 }

@@ -3,6 +3,12 @@
 from dolfinx_contact import _dolfinx  # noqa: F401  (first: releases differ in what they want first)
 from dolfinx_contact.bipotential import bipotential_gap
 from dolfinx_contact.body import LinearSolverError
+from dolfinx_contact.condensed_newton import (
+    CondensedNewton,
+    CondensedNotConverged,
+    CondensedResult,
+    solve_condensed,
+)
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.fixed_point import FixedPoint
 from dolfinx_contact.friction import Friction
@@ -13,6 +19,9 @@ from dolfinx_contact.problem import ContactProblem, Counts, NotConverged, Step
 from dolfinx_contact.wear import Wear
 
 __all__ = [
+    "CondensedNewton",
+    "CondensedNotConverged",
+    "CondensedResult",
     "Contact",
     "ContactProblem",
     "Counts",
@@ -28,4 +37,5 @@ __all__ = [
     "bipotential_gap",
     "load_function",
     "project_cone",
+    "solve_condensed",
 ]

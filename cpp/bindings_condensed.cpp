@@ -1,0 +1,120 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+//
+// The condensed contact problem on NumPy arrays. The GIL is released while it is solved.
+#include <dolfinx_contact/condensed.h>
+
+#include <optional>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+namespace py = pybind11;
+using namespace dolfinx_contact;
+using namespace dolfinx_contact::condensed;
+
+namespace {
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+VectorXd vector(const Array &array, Index size, const char *name) {
+    if (array.size() != size)
+        throw py::value_error(std::string(name) + " must have " + std::to_string(size) +
+                              " entries, not " + std::to_string(array.size()));
+    return Eigen::Map<const VectorXd>(array.data(), size);
+}
+
+Operator make_operator(const Array &W, int dim) {
+    if (dim != 2 && dim != 3)
+        throw py::value_error("dim must be 2 or 3, not " + std::to_string(dim));
+    if (W.ndim() != 2 || W.shape(0) != W.shape(1) || W.shape(0) % dim != 0)
+        throw py::value_error("W must be square with " + std::to_string(dim) + " rows per contact");
+    const Eigen::Map<const RowMajor> map(W.data(), W.shape(0), W.shape(1));
+    return {MatrixXd(map), dim};
+}
+
+template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, Index nodes) {
+    const bool uniform = mu.ndim() == 1;
+    const Index count = uniform ? 1 : nodes;
+    const VectorXd mu_values = vector(mu, T * count, "mu"),
+                   p_values = p ? vector(*p, T * count, "p") : mu_values;
+    std::vector<Tangent<T>> coefficients, rule;
+    for (Index i = 0; i < count; ++i) {
+        coefficients.emplace_back(mu_values.segment<T>(T * i));
+        rule.emplace_back(p_values.segment<T>(T * i));
+    }
+    return make_law<T>(coefficients, rule, uniform);
+}
+
+Solution solve_any(const Operator &op, const Array &mu, const std::optional<Array> &p,
+                   const Array &q, const std::vector<Array> &starts, const Options &options) {
+    const Index size = op.W().rows();
+    const VectorXd free = vector(q, size, "q");
+    std::vector<VectorXd> from;
+    for (const Array &start : starts)
+        from.push_back(vector(start, size, "a start"));
+    if (op.dim() == 2) {
+        const auto any = law<1>(mu, p, op.nodes());
+        const py::gil_scoped_release release;
+        return solve<1>(op, any, free, from, options);
+    }
+    const auto any = law<2>(mu, p, op.nodes());
+    const py::gil_scoped_release release;
+    return solve<2>(op, any, free, from, options);
+}
+
+py::array_t<double> per_contact(const VectorXd &v, std::size_t nodes) {
+    const auto n = static_cast<py::ssize_t>(nodes);
+    py::array_t<double> out({n, n == 0 ? 0 : static_cast<py::ssize_t>(v.size()) / n});
+    std::copy(v.begin(), v.end(), out.mutable_data());
+    return out;
+}
+} // namespace
+
+void bind_condensed(py::module_ &m) {
+    py::class_<Attempt>(m, "CondensedAttempt")
+        .def_readonly("branch", &Attempt::branch)
+        .def_readonly("converged", &Attempt::converged)
+        .def_readonly("iterations", &Attempt::iterations)
+        .def_readonly("seconds", &Attempt::seconds)
+        .def_readonly("error", &Attempt::error)
+        .def_readonly("slip_error", &Attempt::slip_error);
+    py::class_<Solution>(m, "CondensedSolution")
+        .def_property_readonly(
+            "reaction", [](const Solution &s) { return per_contact(s.reaction, s.status.size()); })
+        .def_property_readonly(
+            "displacement",
+            [](const Solution &s) { return per_contact(s.displacement, s.status.size()); })
+        .def_property_readonly(
+            "status",
+            [](const Solution &s) {
+                py::array_t<std::uint8_t> out(static_cast<py::ssize_t>(s.status.size()));
+                for (std::size_t i = 0; i < s.status.size(); ++i)
+                    out.mutable_data()[i] = static_cast<std::uint8_t>(s.status[i]);
+                return out;
+            })
+        .def_readonly("error", &Solution::error)
+        .def_readonly("slip_error", &Solution::slip_error)
+        .def_readonly("iterations", &Solution::iterations)
+        .def_readonly("seconds", &Solution::seconds)
+        .def_readonly("converged", &Solution::converged)
+        .def_readonly("branch", &Solution::branch)
+        .def_readonly("tried", &Solution::tried);
+    py::class_<Operator>(m, "CondensedOperator")
+        .def(py::init(&make_operator), py::arg("W"), py::arg("dim"))
+        .def_property_readonly("dim", &Operator::dim)
+        .def_property_readonly("nodes", &Operator::nodes)
+        .def("prepare", &Operator::prepare, py::call_guard<py::gil_scoped_release>())
+        .def(
+            "solve",
+            [](const Operator &op, const Array &mu, const std::optional<Array> &p, const Array &q,
+               const std::vector<Array> &starts, double tol, double slip_tol, double max_seconds,
+               int max_iterations, int newton_iterations, bool fallbacks) {
+                return solve_any(
+                    op, mu, p, q, starts,
+                    {tol, slip_tol, max_seconds, max_iterations, newton_iterations, fallbacks});
+            },
+            py::arg("mu"), py::arg("p"), py::arg("q"), py::arg("starts"), py::arg("tol"),
+            py::arg("slip_tol"), py::arg("max_seconds"), py::arg("max_iterations"),
+            py::arg("newton_iterations"), py::arg("fallbacks"));
+}

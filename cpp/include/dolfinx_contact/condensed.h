@@ -1,0 +1,388 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed.h
+/// solve_condensed: the contact problem w = q + W r on plain arrays, by Newton's method and, where
+/// that fails, a cascade of fallbacks.
+#pragma once
+
+#include "bipotential.h"
+#include "condensed_fixed_point.h"
+#include "slip_rule.h"
+#include <functional>
+
+namespace dolfinx_contact::condensed {
+/// What a caller may choose.
+struct Options {
+    double tol = 1e-8;      ///< largest error of a solution
+    double slip_tol = 1e-8; ///< largest slip error of a solution
+    double max_seconds = std::numeric_limits<double>::infinity();
+    int max_iterations = 5000;  ///< Newton and fixed-point iterations of all attempts
+    int newton_iterations = 60; ///< Newton iterations of one attempt
+    bool fallbacks = true;
+};
+
+/// One entry of the cascade that was tried.
+struct Attempt {
+    std::string branch;
+    bool converged;
+    int iterations;
+    double seconds, error, slip_error; ///< the errors of the best state so far
+};
+
+/// Reactions and displacements, (T + 1) per node, in the units of q and W.
+struct Solution {
+    VectorXd reaction, displacement;
+    std::vector<Branch> status;
+    double error = std::numeric_limits<double>::infinity();
+    double slip_error = std::numeric_limits<double>::infinity();
+    int iterations = 0;
+    double seconds = 0.0;
+    bool converged = false;
+    std::string branch;
+    std::vector<Attempt> tried;
+};
+
+/// W with what is derived from it once: its normal rows, and its inverse when that begins to pay.
+class Operator {
+  public:
+    /// W (D n, D n), tangential components first; copied.
+    Operator(MatrixXd W, int dim) : W_(std::move(W)), dim_(dim) {}
+
+    const MatrixXd &W() const { return W_; }
+    int dim() const { return dim_; }
+    Index nodes() const { return W_.rows() / dim_; }
+
+    /// Rows and columns of the normal components.
+    const MatrixXd &normal() const {
+        if (normal_.size() == 0 && W_.size() > 0) {
+            const auto rows = Eigen::seqN(dim_ - 1, nodes(), dim_);
+            normal_ = W_(rows, rows);
+        }
+        return normal_;
+    }
+
+    /// The inverse of W, if prepared and if W is regular, else null.
+    const MatrixXd *inverse() const { return inverse_.size() > 0 ? &inverse_ : nullptr; }
+
+    /// Inverts W, so that Newton's method may eliminate sticking nodes. For many solves.
+    /// Returns whether W was regular enough.
+    bool prepare() {
+        if (inverse_.size() == 0 && W_.size() > 0) {
+            const Eigen::PartialPivLU<MatrixXd> lu(W_);
+            if (lu.rcond() > 1e-12)
+                inverse_ = lu.inverse();
+        }
+        return inverse_.size() > 0;
+    }
+
+  private:
+    MatrixXd W_, inverse_;
+    mutable MatrixXd normal_;
+    int dim_;
+};
+
+/// The two errors of a state, and the units in which a problem is scaled.
+template <int P> class Judge {
+  public:
+    static constexpr int D = P + 1;
+
+    Judge(const Operator &op, const AnyLaw<P> &law, const VectorXd &q) : op_(op), law_(law), q_(q) {
+        const Index n = op.nodes();
+        double mean = 0.0;
+        for (Index i = 0; i < n; ++i)
+            mean += std::abs(op.W()(D * i + P, D * i + P)) / static_cast<double>(n);
+        kappa_.resize(n);
+        VectorXd pressed(n);
+        for (Index i = 0; i < n; ++i) {
+            kappa_[i] = 1.0 / std::max(std::abs(op.W()(D * i + P, D * i + P)), 1e-12 * mean);
+            pressed[i] = kappa_[i] * std::max(-q[D * i + P], 0.0);
+            Local<P> loaded = q.segment<D>(D * i);
+            loaded[P] = std::min(loaded[P], 0.0);
+            length_ = std::max(length_, loaded.stableNorm());
+        }
+        load_ = pressed.stableNorm();
+        force_ = length_ / mean;
+    }
+
+    double length() const { return length_; } ///< largest load displacement
+    double force() const { return force_; }   ///< over the mean normal compliance
+    double load() const { return load_; }
+
+    /// Displacement, status and errors of the reactions of a solution.
+    void judge(Solution &s) const {
+        s.displacement = q_ + op_.W() * s.reaction;
+        s.status.resize(static_cast<std::size_t>(op_.nodes()));
+        VectorXd defect(s.reaction.size());
+        double slip = 0.0;
+        std::visit(
+            [&](const auto &source) {
+                for (Index i = 0; i < op_.nodes(); ++i) {
+                    const auto &law = source(static_cast<std::size_t>(i));
+                    constexpr int L = std::decay_t<decltype(law)>::tangents; // 0 without friction
+                    const Local<L> r = s.reaction.segment<D>(D * i).template tail<L + 1>();
+                    const Tangent<L> du = s.displacement.segment<L>(D * i);
+                    const Reaction<L> mapped =
+                        bipotential_map(law, r, s.displacement[D * i + P], du, kappa_[i]);
+                    defect.segment<D>(D * i).setZero();
+                    defect.segment<D>(D * i).template tail<L + 1>() = r - mapped.r;
+                    s.status[static_cast<std::size_t>(i)] = mapped.branch;
+                    slip = std::max(slip, slip_defect(law, r, du, mapped.branch));
+                }
+            },
+            law_);
+        s.error = defect.stableNorm() / load_;
+        s.slip_error = slip > 0.0 ? slip / length_ : 0.0;
+        if (!std::isfinite(s.error) || !std::isfinite(s.slip_error))
+            s.error = s.slip_error = std::numeric_limits<double>::infinity();
+    }
+
+  private:
+    const Operator &op_;
+    const AnyLaw<P> &law_;
+    const VectorXd &q_;
+    VectorXd kappa_;
+    double length_ = 0.0, force_ = 0.0, load_ = 0.0;
+};
+
+/// The solver of one problem: P tangential directions, T of them with friction (T = P or 0).
+template <int T, int P> class Cascade {
+  public:
+    static constexpr int D = T + 1;
+
+    Cascade(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
+        : op_(op), q_(q), options_(options), judge_(op, law, q), coefficients_(law, op.nodes()) {
+        budget_.max_seconds = options.max_seconds;
+        budget_.max_iterations = options.max_iterations;
+    }
+
+    Solution run(const std::vector<VectorXd> &starts) {
+        best_.reaction = VectorXd::Zero(q_.size());
+        judge_.judge(best_);
+        if (judge_.load() > 0.0) {
+            search(starts);
+        } else { // nothing presses: zero reactions are the answer
+            best_.error = best_.slip_error = 0.0;
+            best_.converged = true;
+            best_.branch = "free";
+        }
+        best_.iterations = budget_.iterations;
+        best_.seconds = budget_.seconds();
+        return best_;
+    }
+
+  private:
+    void search(const std::vector<VectorXd> &starts) {
+        const VectorXd zero = VectorXd::Zero(D * op_.nodes()), given = nearest(starts);
+        const auto newton = [this](VectorXd r, double normal, double tangential) {
+            return [this, r, normal, tangential]() mutable {
+                System<T> system = make();
+                system.set_metric(normal, tangential);
+                finish(system, r);
+            };
+        };
+        if (attempt("newton", newton(given, 10.0, 1.0)) || !options_.fallbacks)
+            return;
+        if (!given.isZero(0.0) && attempt("newton from zero", newton(zero, 10.0, 1.0)))
+            return;
+        for (const auto &[normal, tangential] :
+             {std::pair{1.0, 1.0}, {100.0, 10.0}, {1.0, 0.1}, {10.0, 10.0}, {0.1, 0.1}})
+            if (attempt("newton, other metric", newton(given, normal, tangential)))
+                return;
+        const auto path = [this](auto change) {
+            return [this, change] {
+                VectorXd r = VectorXd::Zero(D * op_.nodes());
+                if (follow(r, change)) {
+                    System<T> system = make();
+                    system.set_metric(10.0, 1.0);
+                    finish(system, r);
+                }
+            };
+        };
+        if (T > 0 && !coefficients_.associated() &&
+            attempt("continuation in p", path([](Path &at, double s) { at.rule = s; })))
+            return;
+        if (attempt("fixed point", [this, zero] {
+                VectorXd r = zero;
+                System<T> system = make();
+                system.set_metric(1.0, 1.0);
+                fixed_point(system, r, 1e-6, 400, budget_);
+                system.set_metric(10.0, 1.0);
+                finish(system, r);
+            }))
+            return;
+        if (attempt("homotopy in the load", path([](Path &at, double s) { at.load = s; })))
+            return;
+        if (T > 0)
+            attempt("continuation in mu", path([](Path &at, double s) { at.friction = s; }));
+    }
+
+    /// A problem on the way to the one that is asked for, all ones.
+    struct Path {
+        double rule = 1.0, load = 1.0, friction = 1.0;
+    };
+
+    /// p / mu to the power `rule`, mu times 10^(3 friction - 3), gaps raised until `load` of the
+    /// largest penetration is left.
+    System<T> make(const Path &path = {}) const {
+        System<T> system;
+        system.nodes = op_.nodes();
+        system.W = T == P ? &op_.W() : &op_.normal();
+        system.inverse = T == P ? op_.inverse() : nullptr;
+        const Index size = D * op_.nodes();
+        system.left.resize(size);
+        system.right.resize(size);
+        system.q.resize(size);
+        system.smooth.assign(static_cast<std::size_t>(op_.nodes()), T == 0);
+        const double lift = (1.0 - path.load) * deepest();
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            if constexpr (T > 0) {
+                const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
+                system.smooth[static_cast<std::size_t>(i)] = smooth;
+                for (int c = 0; c < T; ++c) {
+                    const double mu =
+                        smooth ? 1.0
+                               : coefficients_.mu(i, c) * std::pow(10.0, 3.0 * path.friction - 3.0);
+                    system.right[D * i + c] = mu * judge_.force();
+                    system.left[D * i + c] =
+                        mu * std::pow(coefficients_.q2(i, c), path.rule) / judge_.length();
+                    system.q[D * i + c] = q_[(P + 1) * i + c];
+                }
+            }
+            system.right[D * i + T] = judge_.force();
+            system.left[D * i + T] = 1.0 / judge_.length();
+            system.q[D * i + T] = q_[(P + 1) * i + P] + lift;
+        }
+        return system;
+    }
+
+    double deepest() const {
+        double depth = 0.0;
+        for (Index i = 0; i < op_.nodes(); ++i)
+            depth = std::max(depth, -q_[(P + 1) * i + P]);
+        return depth;
+    }
+
+    /// The start of the smallest residual, scaled; zero is always one.
+    VectorXd nearest(const std::vector<VectorXd> &starts) const {
+        System<T> system = make();
+        system.set_metric(10.0, 1.0);
+        State<T> state;
+        VectorXd best = VectorXd::Zero(D * op_.nodes());
+        state.evaluate(system, best, system.displacement(best));
+        double smallest = state.merit;
+        for (const VectorXd &start : starts) {
+            VectorXd r(D * op_.nodes());
+            for (Index i = 0; i < op_.nodes(); ++i)
+                r.template segment<D>(D * i) = start.segment<P + 1>((P + 1) * i).template tail<D>();
+            r = r.cwiseQuotient(system.right).eval();
+            state.evaluate(system, r, system.displacement(r));
+            if (state.merit < smallest) {
+                smallest = state.merit;
+                best = r;
+            }
+        }
+        return best;
+    }
+
+    /// Newton's method to the tolerance, judged on physical reactions; keeps the best state.
+    void finish(const System<T> &system, VectorXd &r) {
+        const auto certified = [&](const VectorXd &mapped) {
+            Solution found;
+            found.reaction = VectorXd::Zero(q_.size());
+            const VectorXd scaled = system.right.cwiseProduct(mapped);
+            for (Index i = 0; i < op_.nodes(); ++i)
+                found.reaction.segment<P + 1>((P + 1) * i).template tail<D>() =
+                    scaled.template segment<D>(D * i);
+            judge_.judge(found);
+            found.converged = found.error <= options_.tol && found.slip_error <= options_.slip_tol;
+            if (found.converged || worst(found) < worst(best_)) {
+                found.tried = std::move(best_.tried);
+                best_ = std::move(found);
+            }
+            return best_.converged;
+        };
+        const double target = 1e3 * std::min(options_.tol, options_.slip_tol);
+        if (Newton<T>(system).solve(r, target, budget_, options_.newton_iterations, certified) !=
+            End::converged) {
+            State<T> state;
+            state.evaluate(system, r, system.displacement(r));
+            certified(state.mapped());
+        }
+    }
+    static double worst(const Solution &s) { return std::max(s.error, s.slip_error); }
+
+    /// Follows the solution from s = 0 to 1, steps halved on failure and doubled after success.
+    bool follow(VectorXd &r, const std::function<void(Path &, double)> &change) {
+        double reached = -1.0, step = 0.25;
+        VectorXd before;
+        double reached_before = -1.0;
+        for (int failures = 0; reached < 1.0;) {
+            const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
+            Path at;
+            change(at, s);
+            System<T> system = make(at);
+            system.set_metric(10.0, 1.0);
+            VectorXd trial = r;
+            if (before.size() > 0 && failures == 0)
+                trial += (s - reached) / (reached - reached_before) * (r - before);
+            const End end =
+                Newton<T>(system).solve(trial, 1e-6, budget_, options_.newton_iterations,
+                                        [](const VectorXd &) { return true; });
+            if (end == End::converged) {
+                if (reached >= 0.0) {
+                    before = r;
+                    reached_before = reached;
+                    step *= 2.0;
+                }
+                r = trial;
+                reached = s;
+                failures = 0;
+            } else {
+                step *= 0.5;
+                if (++failures > 8 || reached < 0.0 || budget_.spent())
+                    return false;
+            }
+        }
+        return true;
+    }
+
+    template <class Try> bool attempt(const char *name, Try &&action) {
+        if (budget_.spent())
+            return true;
+        const int iterations = budget_.iterations;
+        const double seconds = budget_.seconds();
+        action();
+        best_.tried.push_back({name, best_.converged, budget_.iterations - iterations,
+                               budget_.seconds() - seconds, best_.error, best_.slip_error});
+        if (best_.converged)
+            best_.branch = name;
+        return best_.converged;
+    }
+
+    const Operator &op_;
+    const VectorXd &q_;
+    Options options_;
+    Judge<P> judge_;
+    Coefficients<P> coefficients_;
+    Budget budget_;
+    Solution best_;
+};
+
+/// Solves w = q + W r with the law between r and w at every contact.
+///
+/// Component order per contact: T tangential, then the normal one; w_n is the gap, w_t the slip.
+/// W may be rank-deficient and slightly unsymmetric. The errors, both dimensionless:
+/// - error: |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |kappa max(-q_n, 0)|,
+/// Euclidean
+///   over all contacts, kappa = 1 / W_nn the canonical metric of a contact;
+/// - slip_error: largest slip_defect over the load displacement, the largest |(q_t, min(q_n, 0))|.
+///
+/// @param starts reactions to start from; the one of the smallest residual is taken
+template <int T>
+Solution solve(const Operator &op, const AnyLaw<T> &law, const VectorXd &q,
+               const std::vector<VectorXd> &starts, const Options &options) {
+    if (Coefficients<T>(law, op.nodes()).frictionless())
+        return Cascade<0, T>(op, law, q, options).run(starts);
+    return Cascade<T, T>(op, law, q, options).run(starts);
+}
+} // namespace dolfinx_contact::condensed

@@ -1,0 +1,295 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_newton.h
+/// Globalised semismooth Newton method for the condensed contact problem.
+#pragma once
+
+#include "condensed_system.h"
+#include <chrono>
+#include <deque>
+
+namespace dolfinx_contact::condensed {
+/// Why an attempt ended.
+enum class End { converged, line_search, iterations, seconds, not_finite };
+
+/// Iterations and seconds that all attempts share.
+struct Budget {
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start = Clock::now();
+    double max_seconds;
+    int iterations = 0, max_iterations;
+
+    double seconds() const { return std::chrono::duration<double>(Clock::now() - start).count(); }
+    bool spent() const { return iterations >= max_iterations || seconds() >= max_seconds; }
+};
+
+/// One Newton step of a node, with y the unknowns that are left. By compliance
+/// dr = c + B y, L dw + G y = g; by stiffness dw = c + B y, L dr + G y = g.
+template <int T> struct NodeStep {
+    static constexpr int D = T + 1;
+    int m = 0;
+    Eigen::Matrix<double, D, D> B, L, G;
+    Eigen::Matrix<double, D, 1> c, g;
+
+    NodeStep() : B(), L(), G(), c(), g() {
+        B.setZero();
+        L.setZero();
+        G.setZero();
+        c.setZero();
+        g.setZero();
+    }
+};
+
+/// Linearisation with open nodes eliminated: open dr = -r; stick dw = -w; slip dw_n = -w_n,
+/// dr_e - dr_n = rho_n w_n - F_e and (1 - a) dr_s + a rho_t dw_s = -F_s across e.
+template <int T>
+NodeStep<T> by_compliance(const System<T> &system, Index i, const Point<T> &at,
+                          const Eigen::Matrix<double, T + 1, 1> &r,
+                          const Eigen::Matrix<double, T + 1, 1> &w) {
+    const double rho_n = system.rho_n[i], rho_t = system.rho_t[i];
+    NodeStep<T> step;
+    if (at.branch == Branch::open) {
+        step.c = -r;
+        return step;
+    }
+    // the normal row comes first
+    step.m = 1;
+    step.B(T, 0) = 1.0;
+    step.L(0, T) = rho_n;
+    step.g[0] = -rho_n * w[T];
+    if constexpr (T > 0) {
+        if (at.branch == Branch::stick) {
+            step.m = T + 1;
+            for (int c = 0; c < T; ++c) {
+                step.B(c, 1 + c) = 1.0;
+                step.L(1 + c, c) = rho_t;
+                step.g[1 + c] = -rho_t * w[c];
+            }
+        } else if (system.smooth[static_cast<std::size_t>(i)]) {
+            step.c.template head<T>() = -r.template head<T>();
+        } else {
+            const Eigen::Matrix<double, T, 1> F = at.F.template head<T>();
+            step.B.col(0).template head<T>() = at.e;
+            step.c.template head<T>() = (rho_n * w[T] - F.dot(at.e)) * at.e;
+            if constexpr (T == 2) {
+                const Eigen::Vector2d s(-at.e[1], at.e[0]);
+                step.m = 2;
+                step.B.col(1).template head<2>() = s;
+                step.L.row(1).template head<2>() = at.a * rho_t * s.transpose();
+                step.G(1, 1) = 1.0 - at.a;
+                step.g[1] = -F.dot(s);
+            }
+        }
+    }
+    return step;
+}
+
+/// The same linearisation with sticking nodes eliminated; needs the inverse of W.
+template <int T>
+NodeStep<T> by_stiffness(const System<T> &system, Index i, const Point<T> &at,
+                         const Eigen::Matrix<double, T + 1, 1> &r,
+                         const Eigen::Matrix<double, T + 1, 1> &w) {
+    const double rho_n = system.rho_n[i], rho_t = system.rho_t[i];
+    NodeStep<T> step;
+    if (at.branch == Branch::stick) {
+        step.c = -w;
+        return step;
+    }
+    if (at.branch == Branch::open) {
+        step.m = T + 1;
+        step.L.setIdentity();
+        step.g = -r;
+        step.B(T, T) = 1.0 / rho_n;
+        for (int c = 0; c < T; ++c)
+            step.B(c, c) = 1.0 / rho_t;
+        return step;
+    }
+    step.c[T] = -w[T];
+    if constexpr (T > 0) {
+        step.m = T;
+        if (system.smooth[static_cast<std::size_t>(i)]) {
+            for (int c = 0; c < T; ++c) {
+                step.B(c, c) = 1.0 / rho_t;
+                step.L(c, c) = 1.0;
+                step.g[c] = -r[c];
+            }
+        } else {
+            const Eigen::Matrix<double, T, 1> F = at.F.template head<T>();
+            step.B.col(0).template head<T>() = at.e / rho_t;
+            step.L.row(0).template head<T>() = at.e.transpose();
+            step.L(0, T) = -1.0;
+            step.g[0] = rho_n * w[T] - F.dot(at.e);
+            if constexpr (T == 2) {
+                const Eigen::Vector2d s(-at.e[1], at.e[0]);
+                step.B.col(1).template head<2>() = s / rho_t;
+                step.L.row(1).template head<2>() = (1.0 - at.a) * s.transpose();
+                step.G(1, 1) = at.a;
+                step.g[1] = -F.dot(s);
+            }
+        }
+    }
+    return step;
+}
+
+/// Solves J y = rhs. J is singular where W is, with more contacts than the body has degrees of
+/// freedom. A shift of the diagonal, relative to it, then leaves the step in the range of W nearly
+/// as it is; it starts at `shift` and is raised until the solution is one.
+inline VectorXd solve_regularised(const MatrixXd &J, const VectorXd &rhs, double &shift) {
+    constexpr double largest = 1e-4, accuracy = 1e-4, smallest_rcond = 1e-14;
+    for (;; shift = std::max(100.0 * shift, 1e-12)) {
+        MatrixXd shifted = J;
+        if (shift > 0.0)
+            shifted.diagonal().array() += shift * J.diagonal().cwiseAbs().array().max(1e-3);
+        const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> lu(shifted);
+        const VectorXd y = lu.solve(rhs);
+        const bool solved = y.allFinite() && (J * y - rhs).norm() <= accuracy * rhs.norm();
+        if (shift >= largest || (solved && (shift > 0.0 || lu.rcond() > smallest_rcond)))
+            return y;
+    }
+}
+
+/// Newton's method on the residual of a System with a nonmonotone line search
+/// [L. Grippo, F. Lampariello, S. Lucidi, SIAM J. Numer. Anal. 23 (1986)].
+template <int T> class Newton {
+  public:
+    static constexpr int D = T + 1;
+    using Node = Eigen::Matrix<double, D, 1>;
+
+    explicit Newton(const System<T> &system) : system_(system) {}
+
+    /// Iterates from r until certified(r) holds for the reactions that the law returns. It is asked
+    /// once the residual is below `target`, relative to the largest reaction or to one.
+    template <class Certify>
+    End solve(VectorXd &r, double target, Budget &budget, int max_iterations, Certify certified) {
+        VectorXd w = system_.displacement(r), best = r;
+        state_.evaluate(system_, r, w);
+        std::deque<double> memory{state_.merit};
+        double smallest = state_.merit;
+        for (int iteration = 0;; ++iteration) {
+            if (!std::isfinite(state_.merit)) {
+                r = best;
+                return End::not_finite;
+            }
+            const double size = std::max(1.0, r.template lpNorm<Eigen::Infinity>());
+            if (std::sqrt(2.0 * state_.merit) <= target * size && certified(state_.mapped()))
+                return End::converged;
+            if (iteration == max_iterations || budget.spent()) {
+                r = best;
+                return iteration == max_iterations || budget.seconds() < budget.max_seconds
+                           ? End::iterations
+                           : End::seconds;
+            }
+            ++budget.iterations;
+            const VectorXd dr = direction(r, w);
+            const VectorXd dw = system_.change(dr);
+            if (!line_search(r, w, dr, dw, *std::max_element(memory.begin(), memory.end()))) {
+                r = best;
+                return End::line_search;
+            }
+            memory.push_back(state_.merit);
+            if (memory.size() > 8)
+                memory.pop_front();
+            if (state_.merit < smallest) {
+                smallest = state_.merit;
+                best = r;
+            }
+        }
+    }
+
+  private:
+    static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
+
+    /// The smaller of the two eliminations, if there is a choice.
+    VectorXd direction(const VectorXd &r, const VectorXd &w) {
+        Index compliance = 0, stiffness = 0;
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto &point = state_.points[static_cast<std::size_t>(i)];
+            const bool open = point.branch == Branch::open, stick = point.branch == Branch::stick;
+            compliance += open ? 0 : (stick ? D : std::max(T, 1));
+            stiffness += open ? D : (stick ? 0 : T);
+        }
+        const bool stiff = system_.inverse && stiffness < compliance;
+        steps_.clear();
+        offsets_.clear();
+        Index unknowns = 0;
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto &point = state_.points[static_cast<std::size_t>(i)];
+            steps_.push_back(stiff ? by_stiffness<T>(system_, i, point, at(r, i), at(w, i))
+                                   : by_compliance<T>(system_, i, point, at(r, i), at(w, i)));
+            offsets_.push_back(unknowns);
+            unknowns += steps_.back().m;
+        }
+        const VectorXd found = stiff ? eliminate(*system_.inverse, system_.right.cwiseInverse(),
+                                                 system_.left.cwiseInverse(), unknowns)
+                                     : eliminate(*system_.W, system_.left, system_.right, unknowns);
+        return stiff ? system_.change_of_reaction(found) : found;
+    }
+
+    /// c + B y with y from L A (c + B y) + G y = g, A = diag(left) matrix diag(right).
+    VectorXd eliminate(const MatrixXd &matrix, const VectorXd &left, const VectorXd &right,
+                       Index unknowns) {
+        VectorXd found(system_.size());
+        for (Index i = 0; i < system_.nodes; ++i)
+            found.template segment<D>(D * i) = steps_[static_cast<std::size_t>(i)].c;
+        if (unknowns == 0)
+            return found;
+        const VectorXd known = left.cwiseProduct(matrix * right.cwiseProduct(found));
+        MatrixXd J(unknowns, unknowns);
+        VectorXd rhs(unknowns), column(system_.size());
+        for (Index j = 0; j < system_.nodes; ++j) {
+            const auto &from = steps_[static_cast<std::size_t>(j)];
+            const Index J0 = offsets_[static_cast<std::size_t>(j)];
+            for (int k = 0; k < from.m; ++k) {
+                const Node weights = at(right, j).cwiseProduct(from.B.col(k));
+                column.noalias() = matrix.template middleCols<D>(D * j) * weights;
+                column.array() *= left.array();
+                for (Index i = 0; i < system_.nodes; ++i) {
+                    const auto &to = steps_[static_cast<std::size_t>(i)];
+                    const Index I0 = offsets_[static_cast<std::size_t>(i)];
+                    const double *v = column.data() + D * i;
+                    for (int l = 0; l < to.m; ++l) {
+                        double sum = 0.0;
+                        for (int c = 0; c < D; ++c)
+                            sum += to.L(l, c) * v[c];
+                        J(I0 + l, J0 + k) = sum;
+                    }
+                }
+                for (int l = 0; l < from.m; ++l)
+                    J(J0 + l, J0 + k) += from.G(l, k);
+            }
+            rhs.segment(J0, from.m) = (from.g - from.L * at(known, j)).head(from.m);
+        }
+        const VectorXd y = solve_regularised(J, rhs, shift_);
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto &step = steps_[static_cast<std::size_t>(i)];
+            found.template segment<D>(D * i) +=
+                step.B.leftCols(step.m) * y.segment(offsets_[static_cast<std::size_t>(i)], step.m);
+        }
+        return found;
+    }
+
+    bool line_search(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw,
+                     double reference) {
+        constexpr double decrease = 1e-4, shortest = 1e-5;
+        const double slope = 2.0 * state_.merit;
+        State<T> trial;
+        for (double length = 1.0; length >= shortest; length *= 0.5) {
+            const VectorXd r_trial = r + length * dr, w_trial = w + length * dw;
+            trial.evaluate(system_, r_trial, w_trial);
+            if (trial.merit <= reference - decrease * length * slope) {
+                r = r_trial;
+                w = system_.displacement(r);
+                state_.evaluate(system_, r, w);
+                return true;
+            }
+        }
+        return false;
+    }
+
+    const System<T> &system_;
+    State<T> state_;
+    std::vector<NodeStep<T>> steps_;
+    std::vector<Index> offsets_;
+    double shift_ = 0.0;
+};
+} // namespace dolfinx_contact::condensed

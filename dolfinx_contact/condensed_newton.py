@@ -1,0 +1,257 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Newton's method on the contact problem condensed to the contact nodes, w = q + W r."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dolfinx_contact import _kernel
+from dolfinx_contact.friction import Friction
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One method that was tried, and the smallest errors found until its end."""
+
+    branch: str
+    converged: bool
+    iterations: int
+    seconds: float
+    error: float
+    slip_error: float
+
+
+@dataclass(frozen=True)
+class CondensedResult:
+    """Solution of ``solve_condensed``; ``n`` contacts, in three dimensions (in two, one column less).
+
+    Attributes:
+        reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
+        displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
+        status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
+        error: ``|r - proj(r - kappa w)| / |kappa max(-q_n, 0)|``, see ``solve_condensed``.
+        slip_error: Largest defect of the slip rule over the load displacement.
+        iterations: Of all methods tried.
+        seconds: Wall time of all methods tried.
+        branch: The method of the cascade that gave the answer.
+        tried: All that were tried, in order.
+    """
+
+    reaction: np.ndarray
+    displacement: np.ndarray
+    status: np.ndarray
+    error: float
+    slip_error: float
+    iterations: int
+    seconds: float
+    branch: str
+    tried: tuple[Attempt, ...] = field(repr=False)
+
+
+class CondensedNotConverged(RuntimeError):
+    """No method reached the tolerance.
+
+    Attributes:
+        best: The ``CondensedResult`` of the smallest errors found; not a solution.
+        tried: What was tried, a tuple of ``Attempt``.
+    """
+
+    def __init__(self, best: CondensedResult):
+        self.best, self.tried = best, best.tried
+        methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
+        super().__init__(
+            f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
+            f"{best.seconds:.3g} s. Tried (iterations): {methods}. Smaller load steps, or a start r0 "
+            "near the solution, help most often; a body of too few degrees of freedom may have no "
+            "solution at all."
+        )
+
+
+class CondensedNewton:
+    """Options of the globalised semismooth Newton method and its fallbacks.
+
+    Args:
+        slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
+        max_iterations: Iterations of all methods together.
+        newton_iterations: Newton iterations of one attempt.
+        max_seconds: Wall time after which the search ends, seconds.
+        fallbacks: Try other methods where Newton's fails.
+
+    Raises:
+        ValueError: an option is not a positive number.
+    """
+
+    def __init__(
+        self,
+        *,
+        slip_tol: float | None = None,
+        max_iterations: int = 10_000,
+        newton_iterations: int = 60,
+        max_seconds: float = math.inf,
+        fallbacks: bool = True,
+    ):
+        self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol)
+        self.max_iterations = int(positive("max_iterations", max_iterations))
+        self.newton_iterations = int(positive("newton_iterations", newton_iterations))
+        self.max_seconds = positive("max_seconds", max_seconds)
+        self.fallbacks = bool(fallbacks)
+
+    def solve_condensed(self, operator, friction: Friction, q, tol, starts=()) -> CondensedResult:
+        """Solve with a kernel operator; ``solve_condensed`` is the public entry.
+
+        Raises:
+            CondensedNotConverged: nothing that was tried reached ``tol``.
+        """
+        tangents = operator.dim - 1
+        # Friction(0) has no slip rule; a frictionless node of a field gets one that does not matter.
+        p = None if friction.frictionless else np.where(friction.mu > 0, friction.p, 1.0)
+        found = operator.solve(
+            mu=friction.mu[..., :tangents],
+            p=None if p is None else p[..., :tangents],
+            q=q,
+            starts=list(starts),
+            tol=tol,
+            slip_tol=self.slip_tol or tol,
+            max_seconds=self.max_seconds,
+            max_iterations=self.max_iterations,
+            newton_iterations=self.newton_iterations,
+            fallbacks=self.fallbacks,
+        )
+        tried = tuple(
+            Attempt(a.branch, a.converged, a.iterations, a.seconds, a.error, a.slip_error)
+            for a in found.tried
+        )
+        result = CondensedResult(
+            found.reaction, found.displacement, found.status, found.error, found.slip_error,
+            found.iterations, found.seconds, found.branch, tried,
+        )  # fmt: skip
+        if not found.converged:
+            raise CondensedNotConverged(result)
+        return result
+
+    def solve(self, equations, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
+        """One load step of a ``ContactProblem``.
+
+        Args:
+            equations: Offers ``condensed()``, the condensed body, ``trial``, the displacement without
+                reactions, and ``residual(x) -> (residual, error)``.
+            x: Not used: reactions of earlier steps are better starts.
+
+        Returns:
+            The displacement of this rank and the number of iterations.
+        """
+        body = equations.condensed()
+        q = body.free_displacement(equations.trial)
+        starts, iterations, error = body.starts(q), 0, np.inf
+        for factor in (0.1, 1e-3):  # this error is not quite the condensed problem's
+            result = body.solve(self, q, max(factor * tol, 1e-14), starts)
+            iterations += result.iterations
+            equations.tried = result.tried
+            x, previous = body.displacement(equations.trial, result.reaction), error
+            error = equations.residual(x)[1]
+            if error <= tol or not error < previous:
+                break
+            starts = [result.reaction]
+        body.remember(q, result.reaction)
+        return x, iterations
+
+
+def solve_condensed(
+    W, q, friction: Friction, solver=None, tol: float = 1e-8, r0=None, max_seconds=None
+) -> CondensedResult:
+    """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
+
+    No body and no DOLFINx is needed: ``W`` is the compliance between ``n`` contacts, ``q`` their
+    displacement without reactions; per contact (t1, t2, n), ``w_n`` the gap at the end of the step
+    and ``w_t`` the slip over it.  In two dimensions (t, n).
+
+    The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
+
+    - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |kappa max(-q_n, 0)|`` with
+      ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
+    - ``slip_error``: the largest ``|w_t + |w_t| d|`` on slipping contacts (``d`` the unit vector along
+      ``P^-2 r_t``) and ``|w_t|`` on sticking ones, over the largest ``|(q_t, min(q_n, 0))|``.
+
+    Args:
+        W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix (made
+            dense).  May be rank-deficient and slightly unsymmetric.
+        q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
+        friction: The law; coefficients for all contacts or ``shape=(n, 2)`` for each.
+        solver: ``CondensedNewton(...)``; None is one with default options.
+        tol: Largest error and, unless the solver says otherwise, slip error.
+        r0: Reactions to start from, of the shape of ``q``.
+        max_seconds: Wall time after which the search ends, seconds.
+
+    Returns:
+        Reactions, displacements, status, errors and how they were found.
+
+    Raises:
+        ValueError: input that makes no sense.
+        CondensedNotConverged: no method reached ``tol``; carries the best state and what was tried.
+            That is also the answer to a problem without solution.
+    """
+    q = finite("q", q)
+    dim = q.shape[1] if q.ndim == 2 else 3
+    if dim not in (2, 3) or q.ndim > 2 or q.size % dim:
+        raise ValueError(f"q must have shape (n, 3), (n, 2) or (3n,), not {q.shape}.")
+    q = q.reshape(-1, dim)
+    W = finite("W", W.toarray() if hasattr(W, "toarray") else W)
+    if W.shape != (q.size, q.size):
+        raise ValueError(
+            f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
+        )
+    if not isinstance(friction, Friction):
+        raise ValueError(f"friction must be a Friction, not {friction!r}.")
+    if friction.mu.ndim == 2 and len(friction.mu) != len(q):
+        raise ValueError(
+            f"friction has coefficients for {len(friction.mu)} contacts, q has {len(q)}."
+        )
+    friction.law(dim)  # refuses what has no meaning in two dimensions
+    if (np.diag(W)[dim - 1 :: dim] < 0).any():
+        raise ValueError(
+            "W has a negative normal diagonal entry: a contact must give way to its reaction."
+        )
+    if r0 is not None:
+        r0 = finite("r0", r0)
+        if r0.size != q.size:
+            raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
+    solver = CondensedNewton() if solver is None else solver
+    if not isinstance(solver, CondensedNewton):
+        raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
+    if max_seconds is not None:
+        options = vars(solver) | {"max_seconds": max_seconds}
+        solver = CondensedNewton(**options)
+    tol = positive("tol", tol)
+    if tol < 1e-13:
+        raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
+    return solver.solve_condensed(
+        _kernel.CondensedOperator(W, dim), friction, q, tol, () if r0 is None else [r0]
+    )
+
+
+def finite(name: str, value) -> np.ndarray:
+    """A float64 array of finite numbers, or a ``ValueError``."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise ValueError
+    except ValueError:
+        raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} contains NaN or infinity.")
+    return array.astype(np.float64)
+
+
+def positive(name: str, value) -> float:
+    """A positive number, or a ``ValueError``."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not number > 0:
+        raise ValueError(f"{name} must be a positive number, got {value!r}.")
+    return number

@@ -1,0 +1,270 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""solve_condensed on plain arrays: every answer is judged by NumPy code that shares nothing with it."""
+
+import numpy as np
+import pytest
+import scipy.sparse
+import twin_solver
+from condensed_scenes import judge, random_problem
+
+from dolfinx_contact import Friction
+from dolfinx_contact.condensed_newton import (
+    CondensedNewton,
+    CondensedNotConverged,
+    solve_condensed,
+)
+
+TOL = 1e-8
+# The judge's bisection and the solver's projection differ by rounding, nothing else.
+ROUNDING = 1e-6
+
+
+def friction(scene):
+    return (
+        Friction(0)
+        if not scene.mu.any()
+        else Friction(scene.mu, scene.p)
+        if scene.mu.size > 1
+        else Friction(scene.mu[0])
+    )
+
+
+def check(scene, **options):
+    """Solve; judge; return the result."""
+    found = solve_condensed(scene.W, scene.q, friction(scene), **options)
+    tol = options.get("tol", TOL)
+    errors = judge(scene.W, scene.q, scene.mu, scene.p, found.reaction)
+    assert max(errors) <= tol * (1 + ROUNDING) + 1e-13
+    assert errors == pytest.approx((found.error, found.slip_error), rel=1e-3, abs=1e-13)
+    W = scene.W.toarray() if scipy.sparse.issparse(scene.W) else scene.W
+    w = scene.q + (W @ found.reaction.ravel()).reshape(scene.q.shape)
+    assert found.displacement == pytest.approx(
+        w, abs=1e-12 * np.abs(W).max() * np.abs(found.reaction).max()
+    )
+    return found
+
+
+def outcomes(scenes, **options):
+    """Number of scenes solved; all others must say so by an exception that carries a state."""
+    solved = 0
+    for scene in scenes:
+        try:
+            check(scene, **options)
+            solved += 1
+        except CondensedNotConverged as failure:
+            assert failure.tried and np.isfinite(failure.best.reaction).all()
+            assert "newton" in str(failure)
+    return solved
+
+
+def test_random_problems_of_every_rank():
+    """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: right answer or exception, 95 % solved.
+
+    A solution exists in all of them; the worst have more contacts than degrees of freedom, mu above 5
+    and a slip rule at right angles to friction, where the method may fail but must not lie.
+    """
+    count = 150
+    solved = outcomes((random_problem(seed) for seed in range(count)), max_seconds=5)
+    assert solved >= 0.95 * count
+
+
+def test_random_problems_of_usual_friction():
+    """Friction of materials (mu <= 0.5, p ratio <= 10) and W of full rank: all are solved."""
+    for seed in range(100):
+        rank = 3 * (1 + seed % 12)
+        check(
+            random_problem(
+                1000 + seed,
+                contacts=rank // 3,
+                rank=rank,
+                ratio=1 + seed % 10,
+                mu_range=(1e-3, 0.5),
+            )
+        )
+
+
+def test_agrees_with_the_twin():
+    """Where the solution is unique (small friction, regular W) the slow twin finds the same one."""
+    for seed in range(4):
+        scene = random_problem(seed, contacts=3, rank=9, mu_range=(0.05, 0.3), ratio=1.5)
+        scene.W += 5 * np.diag(scene.W).mean() * np.eye(9)
+        scene.q = scene.w - (scene.W @ scene.r.ravel()).reshape(-1, 3)
+        found = check(scene, tol=1e-11)
+        expected = twin_solver.solve(scene.W.reshape(3, 3, 3, 3), scene.q, scene.mu, scene.p)
+        assert found.reaction == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+        assert found.reaction == pytest.approx(scene.r, abs=1e-8)
+
+
+def test_two_dimensions():
+    """(t, n) contacts come from the same template; every rank."""
+    solved = outcomes(random_problem(seed, dim=2, mu_range=(1e-3, 2)) for seed in range(60))
+    assert solved >= 57
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_frictionless_is_the_linear_complementarity_problem(dim):
+    """mu = 0: r_t = 0, r_n >= 0, gap >= 0, one of them zero, for every rank; all are solved."""
+    for seed in range(60):
+        scene = random_problem(seed, dim=dim)
+        scene.mu = np.zeros(dim - 1)
+        scene.r[:, :-1] = 0
+        scene.q = scene.w - (scene.W @ scene.r.ravel()).reshape(-1, dim)
+        found = check(scene)
+        assert not found.reaction[:, :-1].any() and (found.reaction[:, -1] >= 0).all()
+        size = np.abs(scene.q).max()
+        assert (found.displacement[:, -1] >= -1e-6 * size).all()
+
+
+def test_isotropic_and_associated():
+    """The simpler laws give what the full law gives with p written out."""
+    for seed in range(20):
+        scene = random_problem(seed, contacts=6, rank=18, mu_range=(0.05, 0.5))
+        scene.p = scene.mu.copy()
+        scene.W += np.diag(scene.W).mean() * np.eye(18)
+        found = check(scene, tol=1e-11)
+        explicit = solve_condensed(scene.W, scene.q, Friction(scene.mu, 7 * scene.mu), tol=1e-11)
+        assert found.reaction == pytest.approx(explicit.reaction, abs=1e-9)
+        isotropic = solve_condensed(scene.W, scene.q, Friction(scene.mu[0]), tol=1e-11)
+        both = solve_condensed(scene.W, scene.q, Friction((scene.mu[0], scene.mu[0])), tol=1e-11)
+        assert np.array_equal(isotropic.reaction, both.reaction)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("force", [1e-9, 1.0, 1e9])
+def test_units(length, force):
+    """Lengths and forces in other units change nothing but the units, to 1e-8."""
+    for seed in range(10):
+        scene = random_problem(seed, contacts=5, rank=15, mu_range=(0.02, 0.3), ratio=3)
+        reference = check(scene, tol=1e-11)
+        scene.W = scene.W * (length / force)
+        scene.q = scene.q * length
+        found = check(scene, tol=1e-11)
+        scale = np.abs(reference.reaction).max()
+        assert found.reaction / force == pytest.approx(reference.reaction, abs=1e-8 * scale)
+        assert np.array_equal(found.status, reference.status)
+
+
+def test_slightly_unsymmetric():
+    """W as factorisations give it, or worse: unsymmetric by 1e-6."""
+    for seed in range(20):
+        check(
+            random_problem(
+                seed, contacts=6, rank=18, mu_range=(0.01, 0.5), ratio=2, unsymmetric=1e-6
+            )
+        )
+
+
+def test_coefficients_per_contact():
+    """Each contact has its law, frictionless ones among them."""
+    scene = random_problem(3, contacts=6, rank=18, mu_range=(0.1, 0.5))
+    mu = np.random.default_rng(0).uniform(0.1, 0.5, size=(6, 2))
+    mu[2] = 0
+    found = solve_condensed(scene.W, scene.q, Friction(mu, p=(1, 2)))
+    assert not found.reaction[2, :2].any()
+    w = scene.q + (scene.W @ found.reaction.ravel()).reshape(-1, 3)
+    size = np.abs(scene.q).max()
+    for i, (r, x) in enumerate(zip(found.reaction, w)):
+        if found.status[i] == 0:
+            assert not r.any() and x[2] >= 0
+            continue
+        assert abs(x[2]) <= 1e-6 * size
+        if i != 2:
+            assert np.linalg.norm(r[:2] / mu[i]) <= r[2] * (1 + 1e-12)
+            if found.status[i] == 1:
+                assert np.linalg.norm(x[:2]) <= 1e-7 * size
+            else:
+                assert np.cross(x[:2], r[:2] / np.array([1, 2]) ** 2) == pytest.approx(
+                    0, abs=1e-7 * size * np.linalg.norm(r)
+                )
+
+
+def test_nothing_presses():
+    """Gaps everywhere: no reactions, exactly, and no iteration."""
+    scene = random_problem(0, contacts=4)
+    scene.q[:, 2] = np.abs(scene.q[:, 2])
+    found = solve_condensed(scene.W, scene.q, friction(scene))
+    assert not found.reaction.any() and found.iterations == 0 and found.error == 0
+
+
+def test_sparse_and_flat_input():
+    """A SciPy sparse W and a flat q are the same problem."""
+    scene = random_problem(5, contacts=4, rank=12, mu_range=(0.1, 0.5), ratio=2)
+    dense = solve_condensed(scene.W, scene.q, friction(scene))
+    sparse = solve_condensed(scipy.sparse.csr_matrix(scene.W), scene.q.ravel(), friction(scene))
+    assert np.array_equal(dense.reaction, sparse.reaction)
+
+
+def test_the_same_bits_twice():
+    """Nothing depends on time, addresses or random numbers."""
+    for seed in range(20):
+        scene = random_problem(seed, mu_range=(0.01, 1))
+        found = [solve_condensed(scene.W, scene.q, friction(scene)).reaction for _ in range(2)]
+        assert np.array_equal(*found)
+
+
+def test_start_at_the_solution():
+    """From the solution one look is enough."""
+    scene = random_problem(7, contacts=5, rank=15, mu_range=(0.1, 0.4), ratio=2)
+    found = solve_condensed(scene.W, scene.q, friction(scene))
+    again = solve_condensed(scene.W, scene.q, friction(scene), r0=found.reaction)
+    assert again.iterations <= 1
+
+
+def test_infeasible_raises():
+    """Two contacts on one degree of freedom that cannot both stay out of the plane: an exception."""
+    W = np.zeros((6, 6))
+    W[2, 2] = W[5, 5] = 1
+    W[2, 5] = W[5, 2] = -1  # pushing one up pushes the other down
+    q = np.zeros((2, 3))
+    q[:, 2] = -1
+    with pytest.raises(CondensedNotConverged, match="no solution") as caught:
+        solve_condensed(W, q, Friction(0.3))
+    assert caught.value.best.error > 1e-3
+    assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "fixed point"}
+
+
+def test_caps():
+    """A cap on iterations or seconds ends the search with an exception."""
+    scene = random_problem(9, contacts=12, rank=36, mu_range=(1, 5), ratio=100)
+    with pytest.raises(CondensedNotConverged):
+        solve_condensed(scene.W, scene.q, friction(scene), CondensedNewton(max_iterations=1))
+    with pytest.raises(CondensedNotConverged):
+        solve_condensed(scene.W, scene.q, friction(scene), max_seconds=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (dict(W=np.eye(5)), "shape"),
+        (dict(W=np.full((6, 6), np.nan)), "NaN"),
+        (dict(W=-np.eye(6)), "negative normal"),
+        (dict(W="stiff"), "W must be"),
+        (dict(q=np.zeros(5)), "q must"),
+        (dict(q=np.zeros((2, 3, 1))), "q must"),
+        (dict(q=np.full((2, 3), np.inf)), "infinity"),
+        (dict(q=np.zeros((2, 3), complex)), "real"),
+        (dict(friction=0.3), "Friction"),
+        (dict(friction=Friction(np.ones((3, 2)))), "3 contacts"),
+        (dict(tol=0), "tol"),
+        (dict(tol=1e-16), "tol"),
+        (dict(tol=np.nan), "tol"),
+        (dict(solver="newton"), "solver"),
+        (dict(max_seconds=-1), "max_seconds"),
+        (dict(r0=np.zeros(3)), "r0"),
+        (dict(r0=np.full((2, 3), np.nan)), "r0"),
+    ],
+)
+def test_mistakes(change, message):
+    """A mistake is a ValueError that names it."""
+    arguments = dict(W=np.eye(6), q=-np.ones((2, 3)), friction=Friction(0.3)) | change
+    with pytest.raises(ValueError, match=message):
+        solve_condensed(**arguments)
+
+
+@pytest.mark.parametrize("name", ["slip_tol", "max_iterations", "newton_iterations", "max_seconds"])
+def test_options_are_positive(name):
+    """Options of the solver are positive numbers."""
+    for value in (0, -1, np.nan, "many"):
+        with pytest.raises(ValueError, match=name):
+            CondensedNewton(**{name: value})
