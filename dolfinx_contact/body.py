@@ -159,6 +159,13 @@ class ElasticBody:
             self._elastic = self.factorise(self.K)
         return self._elastic(b)
 
+    @property
+    def ksp(self):
+        """The linear solver of K, for many right-hand sides at a time."""
+        if self._elastic is None:
+            self._elastic = self.factorise(self.K)
+        return self._elastic.ksp
+
     def factorise(self, A):
         """A function that applies the inverse of a PETSc matrix, by the options of this body."""
         ksp = PETSc.KSP().create(self.comm)
@@ -184,6 +191,7 @@ class ElasticBody:
                 )
             return right.array_r.copy()
 
+        solve.ksp = ksp
         return solve
 
     def _refuse_rigid_motion(self) -> None:

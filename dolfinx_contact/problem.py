@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
@@ -12,10 +13,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
+from dolfinx_contact.condensed import CondensedBody
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
-from dolfinx_contact.fixed_point import FixedPoint
 
 
 class Counts(NamedTuple):
@@ -38,6 +40,8 @@ class Step:
         iterations: Iterations of the solver; 0 if the contact-free state already was the solution.
         seconds: Wall time of the step.
         counts: Contact nodes open, sticking and slipping.
+        solver: The solver that was used, and why it was chosen where the user did not.
+        tried: What the solver tried, in order, where it has more than one method.
     """
 
     error: float
@@ -47,6 +51,8 @@ class Step:
     iterations: int
     seconds: float
     counts: Counts
+    solver: str
+    tried: tuple = ()
 
 
 class NotConverged(RuntimeError):
@@ -70,8 +76,8 @@ class ContactProblem:
         contacts: The contacts; no node in two of them.
         bcs: Dirichlet conditions; their values may change between steps.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
-        solver: A solver, such as ``FixedPoint()``; None takes what measured best,
-            ``FixedPoint(map="return")``.
+        solver: ``CondensedNewton(...)`` or ``FixedPoint(...)``; None takes the first for small
+            contacts and the second for large ones, and says so in ``step.solver``.
         tol: Largest error of a converged step, see ``dolfinx_contact.error``.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
         petsc_options_prefix: Their prefix.
@@ -98,9 +104,11 @@ class ContactProblem:
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
         with raised_together(u.function_space.mesh.comm):
             self.contacts = _checked_contacts(contacts, u)
-            self.solver = FixedPoint(map="return") if solver is None else solver
+            self.solver = Automatic() if solver is None else solver
             if not callable(getattr(self.solver, "solve", None)):
-                raise ValueError(f"solver {solver!r} is unknown: use None or dc.FixedPoint(...).")
+                raise ValueError(
+                    f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
+                )
             self.tol = _checked_tolerance(tol)
         self.u = u
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
@@ -108,12 +116,14 @@ class ContactProblem:
             for contact in self.contacts:
                 _check_free(contact, self.body.fixed)
         self._stiffened = {}
+        self._condensed = None
         self._assembled = 0
         self.reset()
 
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
         self._states = [np.zeros(self.body.size)] * 2
+        self._past = deque(maxlen=64)  # condensed steps to start from: more than a cycle has
         for contact in self.contacts:
             contact.reset()
         self._restore()
@@ -132,8 +142,9 @@ class ContactProblem:
         start = perf_counter()
         try:
             self._check_input()
-            x, errors, iterations = self._solve()
-            step = self._record(errors, iterations, perf_counter() - start)
+            x, equations, iterations = self._solve()
+            errors = equations.errors
+            step = self._record(equations, iterations, perf_counter() - start)
             if not errors.largest <= self.tol:
                 raise NotConverged(
                     f"not converged: error {step.error:.3e}, slip error {step.slip_error:.3e}, tol "
@@ -160,6 +171,8 @@ class ContactProblem:
         """
         comm = self.body.comm
         mine = {"u": self._states[0], "before": self._states[1]}
+        if self._past:
+            mine["past"] = np.array(self._past)
         for k, contact in enumerate(self.contacts):
             mine.update((f"contact{k}_{name}", array) for name, array in contact.save().items())
         everything = comm.gather(mine, root=0)
@@ -196,31 +209,35 @@ class ContactProblem:
                 prefix = f"contact{k}_"
                 contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
             self._states = [mine["u"], mine["before"]]
+            self._past = deque(map(tuple, mine.get("past", ())), maxlen=self._past.maxlen)
         self._restore()
 
-    def _solve(self) -> tuple[np.ndarray, Errors, int]:
+    def _solve(self) -> tuple[np.ndarray, _ContactEquations, int]:
         body = self.body
         assembled = body.refresh()
         if assembled != self._assembled:
             self._assembled = assembled
             self._stiffened.clear()
+            self._condensed = None
             for contact in self.contacts:
                 contact.set_metric(body.K)
             self._stiffness = [contact.rho for contact in self.contacts]
         b, external = body.load()
         trial = body.solve(b)
         trial[body.fixed] = b[body.fixed]
-        equations = _ContactEquations(self, b, *self._load(trial, external))
+        equations = _ContactEquations(self, b, trial, *self._load(trial, external))
         if not self._touches:
-            return trial, equations.errors_if_open(trial), 0
+            equations.errors = equations.errors_if_open(trial)
+            return trial, equations, 0
         last, before = self._states
         guesses = [self.u.x.array[: body.size].copy(), 2 * last - before]
         for guess in guesses:
             guess[body.fixed] = b[body.fixed]
         x = min(guesses, key=lambda guess: equations.residual(guess)[1])
+        equations.chosen = type(self.solver).__name__
         x, iterations = self.solver.solve(equations, x, self.tol)
         equations.residual(x)
-        return x, equations.errors, iterations
+        return x, equations, iterations
 
     def _load(self, trial: np.ndarray, external: np.ndarray) -> tuple[float, float]:
         """Load and load displacement, see ``dolfinx_contact.error``; notes whether anything touches."""
@@ -259,7 +276,7 @@ class ContactProblem:
             if (extremes[: moved.size] != -extremes[moved.size :]).any():
                 raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
 
-    def _record(self, errors: Errors, iterations: int, seconds: float) -> Step:
+    def _record(self, equations: _ContactEquations, iterations: int, seconds: float) -> Step:
         sums = np.zeros(4)
         penetration = 0.0
         for contact in self.contacts:
@@ -268,13 +285,15 @@ class ContactProblem:
             penetration = max(penetration, -contact.gap.min(initial=0.0))
         *counts, gap = self.body.total(sums)
         return Step(
-            error=errors.error,
-            slip_error=errors.slip_error,
+            error=equations.errors.error,
+            slip_error=equations.errors.slip_error,
             bipotential_gap=float(gap),
             penetration=self.body.largest(np.array([penetration])),
             iterations=iterations,
             seconds=self.body.largest(np.array([seconds])),
             counts=Counts(*(int(count) for count in counts)),
+            solver=equations.chosen,
+            tried=equations.tried,
         )
 
     def _show(self, x: np.ndarray) -> None:
@@ -290,11 +309,21 @@ class ContactProblem:
 class _ContactEquations:
     """What a solver sees of a step: a residual, a correction, a metric and a sum over ranks."""
 
-    def __init__(self, problem, b: np.ndarray, load: float, load_displacement: float):
+    def __init__(self, problem, b, trial, load: float, load_displacement: float):
         self.problem, self.body, self.b = problem, problem.body, b
+        self.trial = trial  # displacement without reactions
+        self.chosen, self.tried = "none: nothing touches", ()
         self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
         self._metric = ("bipotential", 1.0)
+
+    def condensed(self) -> CondensedBody:
+        """The body condensed to its contact nodes, kept while its matrix stands."""
+        problem = self.problem
+        if problem._condensed is None:
+            problem._condensed = CondensedBody(self.body, problem.contacts)
+        problem._condensed.past = problem._past
+        return problem._condensed
 
     def use_metric(self, map: str, factor: float) -> None:
         """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
