@@ -75,6 +75,14 @@ def lagrange_degree(V) -> int | None:
     return element.degree if element.family_name == "P" and continuous else None
 
 
+def cell_nodes(V):
+    """Local node indices of each cell, ``shape=(cells, nodes)``: an adjacency list before 0.8."""
+    nodes = V.dofmap.list
+    if hasattr(nodes, "array"):
+        nodes = nodes.array.reshape(nodes.num_nodes, -1)
+    return nodes
+
+
 def bc_dofs(bc, size: int):
     """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
     dofs, _ = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.rigid_motion import refuse_rigid_motion
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _instances = count()
@@ -86,7 +87,7 @@ class ElasticBody:
                 )
         self._right, self._left = self.K.createVecs()
         self._elastic = None
-        self._refuse_rigid_motion()
+        refuse_rigid_motion(self)
         self._digest = digest
         self._assemblies += 1
         return self._assemblies
@@ -194,27 +195,6 @@ class ElasticBody:
         solve.ksp = ksp
         return solve
 
-    def _refuse_rigid_motion(self) -> None:
-        """Raise if a rigid motion costs no energy; a factorisation would not notice."""
-        modes = _rigid_modes(self.V, self.size, self.comm)
-        held = self.total(modes[self.fixed].T @ modes[self.fixed])
-        values, vectors = np.linalg.eigh(held)
-        # Squares of lengths, relative to the best held motion: 1e-13 is rounding, not distance.
-        free = modes @ vectors[:, values <= 1e-13 * values[-1]]
-        if free.shape[1] == 0:
-            return
-        free[self.fixed] = 0.0
-        energy = self.total(free.T @ np.array([self.multiply(z) for z in free.T]).T)
-        scale = self.total(free.T @ (self.K.getDiagonal().array[:, None] * free))
-        root = np.linalg.inv(np.linalg.cholesky(scale))
-        stiffness = np.linalg.eigvalsh(root @ (energy + energy.T) / 2 @ root.T)
-        if stiffness[0] < 1e-13:
-            raise ValueError(
-                f"nothing holds the body: {int((stiffness < 1e-13).sum())} rigid motion(s) are left "
-                "free by the boundary conditions and cost no energy. Contact alone does not hold it "
-                "here: fix it by Dirichlet conditions, or add a soft spring to F."
-            )
-
 
 def _linear_part(F, u, J):
     """The bilinear form of F, after a check that F is linear in u."""
@@ -240,19 +220,3 @@ def _linear_part(F, u, J):
     if any(c is u for c in derivative.coefficients()):
         raise NotImplementedError("F is not linear in u: nonlinear bodies are not supported yet.")
     return derivative
-
-
-def _rigid_modes(V, size: int, comm) -> np.ndarray:
-    """Translations, and rotations about the middle scaled by the body's size, ``shape=(size, 3 or 6)``."""
-    gdim = V.mesh.geometry.dim
-    x = V.tabulate_dof_coordinates()[: size // gdim, :gdim]
-    low, high = x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)
-    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-    x = (x - (low + high) / 2) / (high - low).max()
-    pairs = [(i, j) for i in range(gdim) for j in range(i)]
-    modes = np.zeros((x.shape[0], gdim, gdim + len(pairs)))
-    modes[:, range(gdim), range(gdim)] = 1.0
-    for k, (i, j) in enumerate(pairs, start=gdim):
-        modes[:, i, k], modes[:, j, k] = -x[:, j], x[:, i]
-    return modes.reshape(size, -1)

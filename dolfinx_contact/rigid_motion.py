@@ -1,0 +1,101 @@
+"""Rigid motions that nothing holds: a factorisation does not notice them, so they are looked for."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from dolfinx_contact import _dolfinx
+
+# Relative energies and squares of lengths below this are rounding, not stiffness or distance.
+ROUNDING = 1e-13
+
+
+def refuse_rigid_motion(body) -> None:
+    """Raise if a part of the body can move rigidly at no cost of energy.
+
+    Every connected part of the mesh is tried: the rigid motions that the boundary conditions
+    leave free must cost energy, which a spring in F gives them.
+
+    Args:
+        body: ElasticBody with its assembled stiffness.  Collective.
+
+    Raises:
+        ValueError: on all ranks, with the number of free motions and where the part is.
+    """
+    gdim = body.V.mesh.geometry.dim
+    x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
+    part, parts = _connected_parts(body.V, body.comm)
+    diagonal = body.K.getDiagonal().array.copy()
+    for k in range(parts):
+        modes = _rigid_modes(x, part[: x.shape[0]] == k, body.comm)
+        held = body.total(modes[body.fixed].T @ modes[body.fixed])
+        values, vectors = np.linalg.eigh(held)
+        free = modes @ vectors[:, values <= ROUNDING * values[-1]]
+        if free.shape[1] == 0:
+            continue
+        free[body.fixed] = 0.0
+        energy = body.total(free.T @ np.array([body.multiply(z) for z in free.T]).T)
+        scale = body.total(free.T @ (diagonal[:, None] * free))
+        root = np.linalg.inv(np.linalg.cholesky(scale))
+        relative = np.linalg.eigvalsh(root @ (energy + energy.T) / 2 @ root.T)
+        if relative[0] < ROUNDING:
+            where = f"one of its {parts} separate parts" if parts > 1 else "the body"
+            raise ValueError(
+                f"nothing holds {where}: {int((relative < ROUNDING).sum())} rigid motion(s) are left "
+                "free by the boundary conditions and cost no energy. Contact alone does not hold it "
+                "here: fix it by Dirichlet conditions, or add a soft spring to F."
+            )
+
+
+def _rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
+    """Translations, and rotations about the middle in units of the size, of the nodes ``here``.
+
+    ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.
+    """
+    n, gdim = x.shape
+    low = x[here].min(axis=0, initial=np.inf)
+    high = x[here].max(axis=0, initial=-np.inf)
+    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    x = (x - (low + high) / 2) / (high - low).max()
+    pairs = [(i, j) for i in range(gdim) for j in range(i)]
+    modes = np.zeros((n, gdim, gdim + len(pairs)))
+    modes[:, range(gdim), range(gdim)] = 1.0
+    for k, (i, j) in enumerate(pairs, start=gdim):
+        modes[:, i, k], modes[:, j, k] = -x[:, j], x[:, i]
+    modes[~here] = 0.0
+    return modes.reshape(gdim * n, -1)
+
+
+def _connected_parts(V, comm) -> tuple[np.ndarray, int]:
+    """Number of the connected part of the mesh that each local node is in, and how many there are."""
+    local = _local_parts(_dolfinx.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
+    # Names that no other rank uses; the owner of a node tells its name to those who see it as ghost.
+    first = comm.exscan(local.max(initial=-1) + 1) or 0
+    name = fem.Function(V)
+    components = V.dofmap.index_map_bs
+    mine = (first + local).astype(np.int64)
+    name.x.array[:] = np.repeat(mine, components)
+    name.x.scatter_forward()
+    owners = name.x.array[::components].astype(np.int64)
+    same = np.unique(np.column_stack([mine, owners]), axis=0)
+    same = np.concatenate(comm.allgather(same))
+    joined = _local_parts(same, same.max() + 1)
+    numbers, part = np.unique(joined[mine], return_inverse=True)
+    everywhere = np.unique(np.concatenate(comm.allgather(numbers)))
+    return np.searchsorted(everywhere, numbers)[part.reshape(-1)], everywhere.size
+
+
+def _local_parts(groups: np.ndarray, size: int) -> np.ndarray:
+    """Smallest index that each of ``size`` nodes is connected to by groups of nodes, ``shape=(m, k)``."""
+    label = np.arange(size)
+    while True:
+        smallest = np.repeat(label[groups].min(axis=1, initial=size), groups.shape[1])
+        following = label.copy()
+        np.minimum.at(following, groups.ravel(), smallest)
+        following = following[following]  # a shortcut that halves the way to the smallest
+        if np.array_equal(following, label):
+            return label
+        label = following
