@@ -46,13 +46,14 @@ class CondensedBody:
         self._counts = self.comm.allgather(len(self._dofs))
         self.nodes = sum(self._counts)
         _check_memory(self.comm, memory(self.nodes, self.dim))
-        W = self._compliance()
+        W = self.compliance()
         self.operator = None
         if self.comm.rank == 0:
             # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
             inert = ~W.any(axis=0) & ~W.any(axis=1)
             W[inert, inert] = np.diag(W).mean() / max(1 - inert.mean(), 1 / W.shape[0])
             self.operator = _kernel.CondensedOperator(W, self.dim)
+            self.operator.prepare()  # pays after some ten iterations
         self.friction = self._gathered_friction()
         self.past: list | deque = []  # (q, r) of earlier steps, kept by the problem
 
@@ -137,7 +138,7 @@ class CondensedBody:
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
 
-    def _compliance(self) -> np.ndarray:
+    def compliance(self) -> np.ndarray:
         """W on rank 0, ``shape=(dim nodes, dim nodes)``; an empty array on the others."""
         body, comm, dim = self._body, self.comm, self.dim
         first = body.K.getOwnershipRange()[0]

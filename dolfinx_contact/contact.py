@@ -62,6 +62,9 @@ class Contact:
         reaction: Force of the plane on the body, ``shape=(n, gdim)``, local frame.
         status: A ``Status`` per node, ``shape=(n,)``.
         rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
+        held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``, set by
+            ``ContactProblem``.  There is neither slip nor friction in them: what the support carries
+            is no reaction of the plane.
         dissipation: Work of friction since the start, ``shape=(n,)``, force times length: the sum of
             ``-(r_t + r_t of the last step) / 2 . slip_increment``, the trapezoidal rule.
         slip_path: Length of the path slipped while in contact since the start, ``shape=(n,)``.
@@ -104,6 +107,7 @@ class Contact:
         self.frame = plane.frame
         self.x = V.tabulate_dof_coordinates()[self.nodes]
         self.rho = None
+        self.held = np.zeros((self.nodes.size, gdim - 1), dtype=bool)
         self._size = gdim * owned
         self._dofs = gdim * self.nodes[:, None] + np.arange(gdim)
         self.reset()
@@ -183,6 +187,7 @@ class Contact:
         self._displacement = (values[self._dofs] - self.plane.displacement) @ self.frame.T
         self.gap = self._gap0 + self._displacement[:, -1]
         self.slip_increment = (self._displacement - self._converged.displacement)[:, :-1]
+        self.slip_increment[self.held] = 0.0
 
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap: a penetration below it is none, length units."""

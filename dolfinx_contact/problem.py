@@ -84,8 +84,8 @@ class ContactProblem:
 
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
-        NotImplementedError: ``F`` is not linear, or tangential displacements of contact nodes are
-            prescribed.
+        NotImplementedError: ``F`` is not linear, or a tangential direction of a contact node is held
+            that is no axis of its contact.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class ContactProblem:
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
         with raised_together(self.body.comm):
             for contact in self.contacts:
-                _check_free(contact, self.body.fixed)
+                contact.held = _held_directions(contact, self.body.fixed)
         self._stiffened = {}
         self._condensed = None
         self._assembled = 0
@@ -441,19 +441,23 @@ def _checked_tolerance(tol) -> float:
     return value
 
 
-def _check_free(contact: Contact, fixed: np.ndarray) -> None:
+def _held_directions(contact: Contact, fixed: np.ndarray) -> np.ndarray:
+    """Tangential directions of the contact nodes that boundary conditions fix, ``shape=(n, gdim - 1)``."""
     free = ~np.isin(contact._dofs, fixed)
-    if free.all():
-        return
     along_normal = np.linalg.norm(free * contact.plane.normal, axis=1)
-    node = np.argmin(free.all(axis=1))
     if (along_normal < 1e-12).any():
         node = np.argmin(along_normal)
         raise ValueError(
             f"the normal displacement of the contact node at {contact.x[node].tolist()} is fixed by a "
             "boundary condition: contact and condition contradict each other, take the node out of one."
         )
-    raise NotImplementedError(
-        f"the contact node at {contact.x[node].tolist()} has a tangential displacement fixed by a "
-        "boundary condition: not supported yet."
-    )
+    # What is left of each local direction without its fixed components: all, nothing, or a part.
+    left = np.linalg.norm(contact.frame[None] * free[:, None, :], axis=2)
+    partly = (left > 1e-12) & (left < 1 - 1e-12)
+    if partly.any():
+        node = np.argmax(partly.any(axis=1))
+        raise NotImplementedError(
+            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along "
+            "none of the axes of its contact: let plane.axis be along or across that direction."
+        )
+    return left[:, :-1] < 0.5

@@ -232,13 +232,17 @@ def test_problem_refuses_other_forms(scene):
 
 
 def test_problem_refuses_conditions_on_contact_nodes(scene):
-    """A fixed normal displacement contradicts contact; a fixed tangential one is not supported yet."""
-    for component, error in ((2, ValueError), (0, NotImplementedError)):
-        sub = scene.V.sub(component)
-        dofs = fem.locate_dofs_topological(sub, 2, scene.facets)
-        bc = fem.dirichletbc(0.0, dofs, sub)
-        with pytest.raises(error, match="boundary condition"):
-            rebuilt(scene, bcs=[*scene.bcs, bc])
+    """A fixed normal displacement contradicts contact; a fixed tangential one leaves the cone."""
+    normal, tangential = (
+        fem.dirichletbc(0.0, fem.locate_dofs_topological(V, 2, scene.facets), V)
+        for V in (scene.V.sub(2), scene.V.sub(0))
+    )
+    with pytest.raises(ValueError, match="boundary condition"):
+        rebuilt(scene, bcs=[*scene.bcs, normal])
+    rebuilt(scene, bcs=[*scene.bcs, tangential])
+    assert scene.contact.held[:, 0].all() and not scene.contact.held[:, 1].any()
+    rebuilt(scene, bcs=scene.bcs)
+    assert not scene.contact.held.any()
 
 
 @pytest.mark.parametrize("held", ["nothing", "one point", "height only", "a hinge", "its top"])

@@ -1,0 +1,203 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The condensed operator of a body, and CondensedNewton as solver of a ContactProblem."""
+
+import numpy as np
+import pytest
+import scenes
+import ufl
+from dolfinx import fem, mesh
+
+import dolfinx_contact as dc
+from dolfinx_contact import condensed
+from dolfinx_contact._dolfinx import functionspace
+
+CASES = {
+    "isotropic": dict(mu=0.2, p=None),
+    "orthotropic": dict(mu=(0.3, 0.15), p=None),
+    "non-associated": dict(mu=(0.3, 0.15), p=(0.05, 0.2)),
+    "frictionless": dict(mu=0.0, p=None),
+    "plane strain": dict(mu=0.2, p=None, cells=(6, 3)),
+}
+PROGRAMME = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006), (0.01, 0, -0.002)]
+
+
+def run(programme=PROGRAMME, **options):
+    """Local reactions of all nodes after each step, and the records of the steps."""
+    scene = scenes.block(**options)
+    reactions, steps = [], []
+    for top in programme:
+        gdim = scene.mesh.geometry.dim
+        scene.move_top(*((top[0], top[2]) if gdim == 2 else top))
+        steps.append(scene.problem.solve())
+        reactions.append(scenes.gathered(scene.contact)[1])
+    return np.array(reactions), steps
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_both_solvers_agree(case):
+    """Reactions of every step agree to 1e-8 between the fixed point and the condensed method."""
+    options = {"tol": 1e-11, **CASES[case]}
+    newton, steps = run(solver=dc.CondensedNewton(), **options)
+    fixed, _ = run(solver=dc.FixedPoint(), **options)
+    assert np.abs(newton - fixed).max() <= 1e-8 * np.abs(fixed).max()
+    for step in steps:
+        assert step.solver == "CondensedNewton"
+        assert max(step.error, step.slip_error) <= 1e-11
+        assert step.tried[-1].converged
+
+
+def test_default_says_what_it_chose_and_why():
+    """Without a solver small contacts take Newton's method; the record names it and the reason."""
+    _, steps = run()
+    for step in steps:
+        assert step.solver.startswith("CondensedNewton (25 contact nodes")
+
+
+def test_default_falls_back(monkeypatch):
+    """Where one solver fails the other one takes over, and the record says so."""
+
+    def give_up(self, equations, x, tol):
+        return x, 1
+
+    monkeypatch.setattr(dc.CondensedNewton, "solve", give_up)
+    reactions, steps = run()
+    assert "then FixedPoint" in steps[0].solver
+    monkeypatch.undo()
+    reference, _ = run()
+    assert np.abs(reactions - reference).max() <= 1e-8 * np.abs(reference).max()
+
+
+def test_memory_is_estimated_before_it_is_taken(monkeypatch):
+    """An operator that would not fit is refused with the alternative named; the default avoids it."""
+    monkeypatch.setattr(condensed, "_available", lambda: 1000.0)
+    with pytest.raises(MemoryError, match="FixedPoint"):
+        run(solver=dc.CondensedNewton())
+    _, steps = run()
+    assert steps[0].solver.startswith("FixedPoint") and "memory" in steps[0].solver
+
+
+def test_operator_is_the_compliance_of_the_contact_nodes():
+    """W r is the displacement that reactions r cause, by a solve with the body itself."""
+    scene = scenes.block()
+    scene.move_top(0, 0, -0.005)
+    scene.problem.solve()
+    problem = scene.problem
+    operator = problem._condensed
+    rng = np.random.default_rng(0)
+    r = rng.normal(size=(operator.nodes, 3))
+    W = operator.compliance()
+    x = problem.body.solve(operator.forces(r))
+    local = operator.gather(x[scene.contact._dofs] @ scene.contact.frame.T)
+    if scene.mesh.comm.rank == 0:
+        expected = (W @ r.ravel()).reshape(-1, 3)
+        assert np.abs(local - expected).max() <= 1e-12 * np.abs(expected).max()
+        assert np.abs(W - W.T).max() <= 1e-12 * np.abs(W).max()
+
+
+def test_operator_is_kept_while_the_matrix_stands():
+    """New loads keep W, a new modulus replaces it, and the answers follow."""
+    scene = scenes.block()
+    scene.move_top(0, 0, -0.005)
+    scene.problem.solve()
+    first, operator = scenes.gathered(scene.contact)[1], scene.problem._condensed
+    scene.move_top(0.001, 0, -0.006)
+    scene.problem.solve()
+    assert scene.problem._condensed is operator
+    scene.modulus.value *= 2
+    scene.problem.reset()
+    scene.move_top(0, 0, -0.005)
+    scene.problem.solve()
+    assert scene.problem._condensed is not operator
+    assert scenes.gathered(scene.contact)[1] == pytest.approx(2 * first, abs=1e-8 * first.max())
+
+
+def test_iterative_linear_solver():
+    """Another linear solver than MUMPS gives W column by column, and the same answers."""
+    iterative = {"ksp_type": "cg", "pc_type": "jacobi", "ksp_rtol": 1e-14, "ksp_max_it": 10_000}
+    options = dict(solver=dc.CondensedNewton(), cells=(2, 2, 1), tol=1e-9)
+    found, _ = run(PROGRAMME[:2], petsc_options=iterative, **options)
+    reference, _ = run(PROGRAMME[:2], **options)
+    assert np.abs(found - reference).max() <= 1e-7 * np.abs(reference).max()
+
+
+def test_failure_carries_what_was_tried():
+    """A step that fails says what was tried; the problem can be used on."""
+    scene = scenes.block(solver=dc.CondensedNewton(max_iterations=1))
+    scene.move_top(0, 0, -0.005)
+    with pytest.raises(dc.NotConverged) as caught:
+        scene.problem.solve()
+    assert caught.value.step.tried and not caught.value.step.tried[-1].converged
+    assert not scene.contact.reaction.any()
+    scene.problem.solver = dc.CondensedNewton()
+    assert scene.problem.solve().error <= scene.problem.tol
+
+
+def test_closing_opening_and_closing_again():
+    """Nodes come into contact, leave it and return; lifted off entirely nothing remains."""
+    scene = scenes.block()
+    for top, touches in [((0, 0, -0.005), True), ((0, 0, 0.1), False), ((0.02, 0, 0.1), False), ((0.02, 0, -0.004), True)]:  # fmt: skip
+        scene.move_top(*top)
+        step = scene.problem.solve()
+        assert (step.counts.open == 25) != touches
+        assert max(step.error, step.slip_error) <= 1e-10
+
+
+def punch(cells, fixed, solver, friction, programme):
+    """Totals of a block on [0, 1] or [-1, 1] whose top is pressed, ``fixed`` holding symmetry planes."""
+    low = [0.0 if axis in fixed else -1.0 for axis in (0, 1)] + [0.0]
+    domain = mesh.create_box(
+        scenes.COMM, [np.array(low), np.array([1.0, 1.0, 0.8])], cells, mesh.CellType.hexahedron
+    )
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    facets = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.0))
+    top = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.8))
+    held = fem.Function(V)
+    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, top))]
+    for axis in fixed:
+        side = mesh.locate_entities_boundary(
+            domain, 2, lambda x, axis=axis: np.isclose(x[axis], 0.0)
+        )
+        dofs = fem.locate_dofs_topological(V.sub(axis), 2, side)
+        bcs.append(fem.dirichletbc(fem.Constant(domain, 0.0), dofs, V.sub(axis)))
+    plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+    contact = dc.Contact(V, facets, plane, friction)
+    F = scenes.elasticity(u, v, 210e3, 0.3)
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=1e-10)
+    found = []
+    for depth in programme:
+        held.x.array[2::3] = -depth
+        problem.solve()
+        x, r = scenes.gathered(contact)
+        # Nodal reactions on a symmetry plane are half (at the corner a quarter) of the whole body's.
+        share = np.prod([np.where(np.isclose(x[:, axis], 0.0), 0.5, 1.0) for axis in fixed], axis=0)
+        found.append((x, r / np.reshape(share, (-1, 1)) if fixed else r))
+    return found
+
+
+@pytest.mark.parametrize("solver", [dc.CondensedNewton, dc.FixedPoint])
+@pytest.mark.parametrize("law", [dict(mu=0.2), dict(mu=(0.3, 0.15), p=(0.05, 0.2))])
+def test_a_quarter_of_the_punch_is_a_quarter_of_the_whole(solver, law):
+    """Symmetry planes by tangential boundary conditions at contact nodes change nothing else."""
+    programme, friction = (0.01, 0.02, 0.012), dc.Friction(**law)
+    whole = punch((4, 4, 2), (), solver(), friction, programme)
+    quarter = punch((2, 2, 2), (0, 1), solver(), friction, programme)
+    for (x, r), (y, part) in zip(whole, quarter):
+        same = [np.argmin(np.linalg.norm(x - point, axis=1)) for point in y]
+        assert np.linalg.norm(x[same] - y) < 1e-12
+        assert np.abs(r[same] - part).max() <= 1e-8 * np.abs(r).max()
+
+
+def test_support_oblique_to_friction_is_refused():
+    """A fixed direction that is no axis of the contact has no meaning in the law: say what to do."""
+    with pytest.raises(NotImplementedError, match="plane.axis"):
+        scene = scenes.block()
+        plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0.5, 0))
+        contact = dc.Contact(scene.V, scene.facets, plane, dc.Friction(0.3))
+        side = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[0], -0.5))
+        Vx = scene.V.sub(0)
+        bc = fem.dirichletbc(
+            fem.Constant(scene.mesh, 0.0), fem.locate_dofs_topological(Vx, 2, side), Vx
+        )
+        dc.ContactProblem(scene.F, scene.u, [contact], bcs=[*scene.bcs, bc])
