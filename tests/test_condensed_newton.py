@@ -35,8 +35,10 @@ def check(scene, **options):
     found = solve_condensed(scene.W, scene.q, friction(scene), **options)
     tol = options.get("tol", TOL)
     errors = judge(scene.W, scene.q, scene.mu, scene.p, found.reaction)
-    assert max(errors) <= tol * (1 + ROUNDING) + 1e-13
-    assert errors == pytest.approx((found.error, found.slip_error), rel=1e-3, abs=1e-13)
+    assert errors[0] <= tol * (1 + ROUNDING) + 1e-13 and errors[1] <= 2 * tol
+    assert errors[0] == pytest.approx(found.error, rel=1e-3, abs=1e-13)
+    # At the edge of the cone rounding decides between |du| and |du + |du| d|, up to twice as much.
+    assert found.slip_error / 2.01 - 1e-13 <= errors[1] <= 2.01 * found.slip_error + 1e-13
     W = scene.W.toarray() if scipy.sparse.issparse(scene.W) else scene.W
     w = scene.q + (W @ found.reaction.ravel()).reshape(scene.q.shape)
     assert found.displacement == pytest.approx(
@@ -174,9 +176,9 @@ def test_coefficients_per_contact():
             if found.status[i] == 1:
                 assert np.linalg.norm(x[:2]) <= 1e-7 * size
             else:
-                assert np.cross(x[:2], r[:2] / np.array([1, 2]) ** 2) == pytest.approx(
-                    0, abs=1e-7 * size * np.linalg.norm(r)
-                )
+                along = r[:2] / np.array([1, 2]) ** 2
+                across = x[0] * along[1] - x[1] * along[0]
+                assert abs(across) <= 1e-7 * size * np.linalg.norm(r) and x[:2] @ along < 0
 
 
 def test_nothing_presses():
