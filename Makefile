@@ -7,7 +7,6 @@
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/include/dolfinx_contact/*.h)
-python_files = dolfinx_contact demos tests tools/probe.py
 
 punch: .venv/ready
 	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
@@ -26,8 +25,8 @@ test-wheel: .venv-wheel/ready
 
 format: .venv/ready
 	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')
-	.venv/bin/ruff format $(python_files)
-	.venv/bin/ruff check --fix $(python_files)
+	.venv/bin/ruff format .
+	.venv/bin/ruff check --fix .
 
 stubs: .venv/ready
 	tools/stubs
