@@ -186,11 +186,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
 
     law.def(
         "load_function",
-        [](const Law &self, const Array &r) {
-            return Call(self, "r", r).number([](const auto &node, const auto &s) {
-                return load_function(node, s.r);
-            });
-        },
+        [](const Law &self, const Array &r) { return Call(self, "r", r).number(LoadFunction{}); },
         r, "f = |M^-1 r_t| - r_n, shape (n,)  [dSFMH07, Eq. (1)]");
     law.def(
         "project",
@@ -207,13 +203,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
     law.def(
         "scaled_map",
         [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
-            return Call(self, "r", r)
-                .gap(gap)
-                .slip(slip)
-                .rho(rho)
-                .reaction([](const auto &node, const auto &s) {
-                    return scaled_map(node, s.r, s.gap, s.slip, s.rho_n);
-                });
+            return Call(self, "r", r).gap(gap).slip(slip).rho(rho).reaction(ScaledMap{});
         },
         r, gap, slip, rho, "The same in scaled variables, in closed form: (r, branch)");
     law.def(
@@ -227,14 +217,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
     law.def(
         "project_jacobian",
         [](const Law &self, const Array &tau) {
-            const py::tuple all =
-                Call(self, "tau", tau).linearisation([](const auto &node, const auto &s) {
-                    constexpr int tangents = std::decay_t<decltype(node)>::tangents;
-                    Linearisation<tangents> out;
-                    out.value = project(node, s.r, &out.by_reaction);
-                    out.by_motion.setZero();
-                    return out;
-                });
+            const py::tuple all = Call(self, "tau", tau).linearisation(ProjectionJacobian{});
             return py::make_tuple(all[0], all[1], all[2]);
         },
         tau, "project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))");
@@ -245,22 +228,14 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
                 .gap(gap)
                 .slip(slip)
                 .rho(rho)
-                .linearisation([](const auto &node, const auto &s) {
-                    return bipotential_jacobian(node, s.r, s.gap, s.slip, s.rho_n);
-                });
+                .linearisation(BipotentialJacobian{});
         },
         r, gap, slip, rho,
         "bipotential_map and its derivatives: (r, branch, by r, by (slip, gap))");
     law.def(
         "scaled_jacobian",
         [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
-            return Call(self, "r", r)
-                .gap(gap)
-                .slip(slip)
-                .rho(rho)
-                .linearisation([](const auto &node, const auto &s) {
-                    return scaled_jacobian(node, s.r, s.gap, s.slip, s.rho_n);
-                });
+            return Call(self, "r", r).gap(gap).slip(slip).rho(rho).linearisation(ScaledJacobian{});
         },
         r, gap, slip, rho, "scaled_map and its derivatives: (r, branch, by r, by (slip, gap))");
     law.def(
@@ -271,9 +246,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
                 .gap(gap)
                 .slip(slip)
                 .rho(rho_n, rho_t)
-                .linearisation([](const auto &node, const auto &s) {
-                    return return_jacobian(node, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
-                });
+                .linearisation(ReturnJacobian{});
         },
         r, gap, slip, rho_n, rho_t,
         "return_map and its derivatives: (r, branch, by r, by (slip, gap))");
@@ -281,23 +254,13 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
     law.def(
         "bipotential_gap",
         [](const Law &self, const Array &r, const Array &gap, const Array &slip) {
-            return Call(self, "r", r)
-                .gap(gap)
-                .slip(slip)
-                .number([](const auto &node, const auto &s) {
-                    return bipotential_gap(node, s.r, s.gap, s.slip);
-                });
+            return Call(self, "r", r).gap(gap).slip(slip).number(BipotentialGap{});
         },
         r, gap, slip, "Gap of the bi-potential for r in the cone and gap >= 0, shape (n,)");
     law.def(
         "slip_defect",
         [](const Law &self, const Array &r, const Array &slip, const Branches &branch) {
-            return Call(self, "r", r)
-                .slip(slip)
-                .branch(branch)
-                .number([](const auto &node, const auto &s) {
-                    return slip_defect(node, s.r, s.slip, s.branch);
-                });
+            return Call(self, "r", r).slip(slip).branch(branch).number(SlipDefect{});
         },
         r, slip, branch, "Part of the slip increment that the slip rule does not explain, (n,)");
 }

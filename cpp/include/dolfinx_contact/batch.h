@@ -10,7 +10,7 @@
 #pragma once
 
 #include "law.h"
-#include "return_map.h"
+#include "maps.h"
 
 namespace dolfinx_contact {
 /// Component j of node i is data[i * row + j * column]. Without data: an array that is not there.
@@ -45,52 +45,8 @@ struct Outputs {
     View<double> by_motion{};    ///< likewise
 };
 
-/// What a function of one node may look at.
-template <int T> struct State {
-    Local<T> r;
-    double gap;
-    Tangent<T> slip;
-    double rho_n, rho_t;
-    Branch branch;
-};
-
-// Maps whose boundary branch needs the root of a secular equation say how they start. Over many
-// nodes the equations of a block are then solved side by side.
-
-struct EuclideanProjection {
-    template <class Law, class S> auto start(const Law &law, const S &s) const {
-        return start_projection(law, s.r);
-    }
-    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
-        return project(law, s.r);
-    }
-};
-
-struct BipotentialMap {
-    template <class Law, class S> auto start(const Law &law, const S &s) const {
-        return start_projection(law, predictor(law, s.r, s.gap, s.slip, s.rho_n));
-    }
-    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
-        return bipotential_map(law, s.r, s.gap, s.slip, s.rho_n);
-    }
-};
-
-struct ReturnMap {
-    template <class Law, class S> auto start(const Law &law, const S &s) const {
-        return start_return(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
-    }
-    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
-        return return_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
-    }
-};
-
 namespace detail {
 inline constexpr int block_size = 64;
-
-template <class F> inline constexpr bool has_start = false;
-template <> inline constexpr bool has_start<EuclideanProjection> = true;
-template <> inline constexpr bool has_start<BipotentialMap> = true;
-template <> inline constexpr bool has_start<ReturnMap> = true;
 
 /// One component at the nodes of a block.
 using Column = double[block_size];
@@ -100,8 +56,11 @@ void gather(const View<const Scalar> &view, int component, int count, To &to) {
     if (!view.data)
         return;
     const Scalar *from = view.data + component * view.column;
-    for (int i = 0; i < count; ++i)
-        to[i] = from[i * view.row];
+    if (view.row == 1)
+        std::copy_n(from, count, to);
+    else
+        for (int i = 0; i < count; ++i)
+            to[i] = from[i * view.row];
 }
 
 template <class Scalar>
@@ -109,16 +68,20 @@ void scatter(const Column &from, int count, const View<Scalar> &view, int compon
     if (!view.data)
         return;
     Scalar *to = view.data + component * view.column;
-    for (int i = 0; i < count; ++i)
-        to[i * view.row] = static_cast<Scalar>(from[i]);
+    if (view.row == 1)
+        for (int i = 0; i < count; ++i)
+            to[i] = static_cast<Scalar>(from[i]);
+    else
+        for (int i = 0; i < count; ++i)
+            to[i * view.row] = static_cast<Scalar>(from[i]);
 }
 
 /// Columns of a block for T tangential components, D = T + 1 in all.
 template <int T> struct Block {
     static constexpr int D = T + 1;
-    Column r[D]{}, gap{}, slip[T + 1]{}, rho_n{}, rho_t{}, cos{}, sin{}; // slip[T]: no empty arrays
+    Column r[D]{}, gap{}, slip[D]{}, rho_n{}, rho_t{}, cos{}, sin{}; // slip[T] is not used
     std::uint8_t branch_in[block_size]{};
-    Column value[D], branch, by_reaction[D * D], by_motion[D * D];
+    Column value[D], branch, p[D], scale, by_reaction[D * D], by_motion[D * D];
 
     void load(const Inputs &in, std::size_t first, int count) {
         const auto r_in = in.r.from_node(first), slip_in = in.slip.from_node(first);
@@ -131,8 +94,13 @@ template <int T> struct Block {
         gather(in.rho_n.from_node(first), 0, count, rho_n);
         gather(in.rho_t.from_node(first), 0, count, rho_t);
         gather(in.branch.from_node(first), 0, count, branch_in);
-        gather(in.axes.from_node(first), 0, count, cos);
-        gather(in.axes.from_node(first), 1, count, sin);
+        if constexpr (T == 2)
+            if (in.axes.data) {
+                gather(in.axes.from_node(first), 0, count, cos);
+                gather(in.axes.from_node(first), 1, count, sin);
+                rotate(r[0], r[1], 1.0, count);
+                rotate(slip[0], slip[1], 1.0, count);
+            }
     }
 
     [[gnu::always_inline]] State<T> state(int i) const {
@@ -151,14 +119,21 @@ template <int T> struct Block {
 
     [[gnu::always_inline]] void keep(double result, int i) { value[0][i] = result; }
 
-    [[gnu::always_inline]] void keep(const Reaction<T> &result, int i) {
+    [[gnu::always_inline]] void keep(const CodedReaction<T> &result, int i) {
         for (int k = 0; k < D; ++k)
             value[k][i] = result.r[k];
-        branch[i] = static_cast<double>(static_cast<int>(result.branch));
+        branch[i] = result.branch;
+    }
+
+    [[gnu::always_inline]] void keep(const Start<T> &start, int i) {
+        keep(CodedReaction<T>{start.r, start.branch}, i);
+        for (int k = 0; k < D; ++k)
+            p[k][i] = start.p[k];
+        scale[i] = start.scale;
     }
 
     void keep(const Linearisation<T> &result, int i) {
-        keep(result.value, i);
+        keep(CodedReaction<T>{result.value.r, static_cast<double>(result.value.branch)}, i);
         for (int a = 0; a < D; ++a)
             for (int b = 0; b < D; ++b) {
                 by_reaction[a * D + b][i] = result.by_reaction(a, b);
@@ -182,6 +157,15 @@ template <int T> struct Block {
             rotate(J[k * D], J[k * D + 1], -1.0, count);
     }
 
+    template <class Result> void rotate_back(int count) {
+        if constexpr (T == 2 && !std::is_same_v<Result, double>)
+            rotate(value[0], value[1], -1.0, count);
+        if constexpr (T == 2 && std::is_same_v<Result, Linearisation<T>>) {
+            rotate_matrix_back(by_reaction, count);
+            rotate_matrix_back(by_motion, count);
+        }
+    }
+
     template <class Result>
     void store(const Outputs &out, int tangents, std::size_t first, int count) const {
         const auto value_out = out.value.from_node(first);
@@ -201,69 +185,60 @@ template <int T> struct Block {
     }
 };
 
-/// The function at the nodes of a block, from `first` on.
+/// Solves the equations of the unfinished nodes of a block, some at a time.
 template <class Source, class F, int T>
-void evaluate(const Source &source, F f, std::size_t first, int size, Block<T> &block) {
-    using Law = typename Source::Law;
-    const auto law = [&](int i) -> const Law & {
-        return source(first + static_cast<std::size_t>(i));
+void finish(const Source &source, F f, std::size_t first, int size, Block<T> &block) {
+    const auto law = [&](int i) { return source(first + static_cast<std::size_t>(i)); };
+    const auto equation = [&](int i) {
+        Local<T> p;
+        for (int k = 0; k <= T; ++k)
+            p[k] = block.p[k][i];
+        return f.equation(law(i), p);
     };
-    if constexpr (!has_start<F> || T == 0 || is_isotropic<Law>) {
-        for (int i = 0; i < size; ++i)
-            block.keep(f(law(i), block.state(i)), i);
+    const auto keep = [&](int i, const SecularRoot<T> &root) {
+        const double R = f.radius(block.p[T][i], block.scale[i], root.s);
+        block.keep(CodedReaction<T>{boundary_point(law(i), R, root.e), 2.0}, i);
+    };
+    int nodes[block_size], count = 0;
+    for (int i = 0; i < size; ++i) {
+        nodes[count] = i;
+        count += block.branch[i] == unfinished ? 1 : 0;
+    }
+    if constexpr (is_isotropic<typename Source::Law>) {
+        for (int l = 0; l < count; ++l)
+            keep(nodes[l], root_for(law(nodes[l]), equation(nodes[l])));
     } else {
-        Projection<T> starts[block_size];
-        int unfinished[block_size], count = 0;
-        for (int i = 0; i < size; ++i) {
-            starts[i] = f.start(law(i), block.state(i));
-            block.keep(starts[i].result, i);
-            unfinished[count] = i;
-            count += starts[i].unfinished ? 1 : 0;
-        }
         constexpr int lanes = 16;
         SecularEquations<T, lanes> equations;
         for (int done = 0; done < count; done += lanes) {
-            const int together = std::min(lanes, count - done), *nodes = unfinished + done;
+            const int together = std::min(lanes, count - done);
             for (int l = 0; l < together; ++l)
-                equations.set(l, starts[nodes[l]].equation);
+                equations.set(l, equation(nodes[done + l]));
             equations.solve(together);
-            for (int l = 0; l < together; ++l) {
-                const int i = nodes[l];
-                block.keep(finish(law(i), starts[i], equations.root(l)), i);
-            }
+            for (int l = 0; l < together; ++l)
+                keep(nodes[done + l], equations.root(l));
         }
     }
 }
 } // namespace detail
 
-/// out = f(law of node i, State of node i) for all nodes i < count, where f gives a number, a
-/// Reaction or a Linearisation. Nothing in the loop asks which law it is: visit an AnyLaw around
-/// the call.
+/// out = f(law of node i, State of node i) for all nodes i < count, where f is one of maps.h or
+/// alike. Nothing in the loop asks which law it is: visit an AnyLaw around the call.
 template <class Source, class F>
 void for_each_node(const Source &source, std::size_t count, const Inputs &in, const Outputs &out,
                    F f) {
     constexpr int T = Source::Law::tangents;
     using Result = decltype(f(source(0), State<T>{}));
-    constexpr bool scalar = std::is_same_v<Result, double>;
     detail::Block<T> block;
     for (std::size_t first = 0; first < count; first += detail::block_size) {
         const int size = static_cast<int>(std::min<std::size_t>(detail::block_size, count - first));
         block.load(in, first, size);
-        const bool rotated = T == 2 && in.axes.data;
-        if constexpr (T == 2)
-            if (rotated) {
-                block.rotate(block.r[0], block.r[1], 1.0, size);
-                block.rotate(block.slip[0], block.slip[1], 1.0, size);
-            }
-        detail::evaluate(source, f, first, size, block);
-        if constexpr (T == 2 && !scalar)
-            if (rotated) {
-                block.rotate(block.value[0], block.value[1], -1.0, size);
-                if constexpr (std::is_same_v<Result, Linearisation<T>>) {
-                    block.rotate_matrix_back(block.by_reaction, size);
-                    block.rotate_matrix_back(block.by_motion, size);
-                }
-            }
+        for (int i = 0; i < size; ++i)
+            block.keep(f(source(first + static_cast<std::size_t>(i)), block.state(i)), i);
+        if constexpr (T > 0 && std::is_same_v<Result, Start<T>>)
+            detail::finish(source, f, first, size, block);
+        if (in.axes.data)
+            block.template rotate_back<Result>(size);
         block.template store<Result>(out, in.tangents, first, size);
     }
 }

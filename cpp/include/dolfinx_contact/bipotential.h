@@ -29,8 +29,8 @@ template <class Law, int T = Law::tangents>
 /// Predictor of [dSFMH07, Section 2]:
 /// tau_t = r_t - rho Q^2 du_t,  tau_n = r_n - rho (x_n + |M Q^2 du_t|).
 template <class Law, int T = Law::tangents>
-Local<T> predictor(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
-                   double rho) {
+[[gnu::always_inline]] inline Local<T> predictor(const Law &law, const Local<T> &r, double gap,
+                                                 const Tangent<T> &slip, double rho) {
     Local<T> tau;
     for (int i = 0; i < T; ++i)
         tau[i] = r[i] - rho * (law.q2(i) * slip[i]);
@@ -59,28 +59,40 @@ template <class Law, int T = Law::tangents>
     return tau;
 }
 
-/// Predictor and corrector in the scaled variables; the projection on the unit cone has a closed
-/// form. Same fixed points as bipotential_map, other iterates (unless M is the identity). Without a
-/// jump, so that a loop over nodes vectorises.
+/// A reaction and the number of its branch as a double: one type, for loops to vectorise.
+template <int T> struct CodedReaction {
+    Local<T> r;
+    double branch;
+};
+
+/// scaled_map without a jump.
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap,
-                                                     const Tangent<T> &slip, double rho) {
+[[gnu::always_inline]] inline CodedReaction<T> coded_scaled_map(const Law &law, const Local<T> &r,
+                                                                double gap, const Tangent<T> &slip,
+                                                                double rho) {
     const Local<T> tau = scaled_predictor(law, r, gap, slip, rho);
     Tangent<T> t;
     for (int i = 0; i < T; ++i)
         t[i] = tau[i];
     const double n = tau[T], length = norm<T>(t);
-    // apex, inside or boundary: 0, n or (length + n) / 2
-    const double radius = std::max(std::max(0.5 * length + 0.5 * n, n), 0.0);
-    constexpr double tiny = std::numeric_limits<double>::denorm_min();
-    const double shrink = std::min(radius / std::max(length, tiny), 1.0);
-    const double inside_code = law.mu(0) > 0.0 ? 1.0 : 2.0;
-    const double closed = length <= -n ? 0.0 : 1.0, code = length <= n ? inside_code : 2.0;
-    Reaction<T> result{tau, static_cast<Branch>(static_cast<int>(closed * code))};
+    // apex, inside or boundary: 0, n or (length + n) / 2. A max with a constant would make g++
+    // split the cases again, hence |.| for max(., 0) and + tiny against 0 / 0.
+    const double half = 0.5 * std::max(0.5 * length + 0.5 * n, n), radius = half + std::abs(half);
+    const double shrink = std::min(length, radius) / (length + tiny);
+    CodedReaction<T> result{tau, length <= -n ? 0.0 : (length <= n ? inside_code(law) : 2.0)};
     for (int i = 0; i < T; ++i)
         result.r[i] = law.mu(i) * (shrink * t[i]);
     result.r[T] = radius;
     return result;
+}
+
+/// Predictor and corrector in the scaled variables; the projection on the unit cone has a closed
+/// form. Same fixed points as bipotential_map, other iterates (unless M is the identity).
+template <class Law, int T = Law::tangents>
+Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
+                       double rho) {
+    const CodedReaction<T> coded = coded_scaled_map(law, r, gap, slip, rho);
+    return {coded.r, branch_of(coded.branch)};
 }
 
 /// Unit vector along M Q^2 du_t. The dual norm has a kink at du_t = 0; there, the limit for a slip
@@ -155,12 +167,16 @@ Linearisation<T> scaled_jacobian(const Law &law, const Local<T> &r, double gap,
 ///     r_n x_n + (r_n - |x|) |w| + |x| |w| |e_x + e_w|^2 / 2.
 /// r_n - |x| below zero (r outside by rounding) counts as zero.
 template <class Law, int T = Law::tangents>
-double bipotential_gap(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip) {
+[[gnu::always_inline]] inline double bipotential_gap(const Law &law, const Local<T> &r, double gap,
+                                                     const Tangent<T> &slip) {
     const Tangent<T> x = in_units_of_ellipse(law, r), w = scaled_slip(law, slip);
     const double x_length = norm<T>(x), w_length = norm<T>(w);
-    double work = r[T] * gap + std::max(r[T] - x_length, 0.0) * w_length;
-    if (x_length > 0.0 && w_length > 0.0)
-        work += 0.5 * x_length * w_length * (x / x_length + w / w_length).squaredNorm();
-    return work;
+    double chord2 = 0.0;
+    for (int i = 0; i < T; ++i) {
+        const double chord = x[i] / (x_length + tiny) + w[i] / (w_length + tiny);
+        chord2 += chord * chord;
+    }
+    return r[T] * gap + std::max(r[T] - x_length, 0.0) * w_length +
+           0.5 * (x_length * w_length) * chord2;
 }
 } // namespace dolfinx_contact

@@ -6,12 +6,11 @@
 #pragma once
 
 #include "secular.h"
-#include <limits>
 
 namespace dolfinx_contact {
 /// M^-1 t, the tangential vector in units of the friction ellipse.
 template <class Law, int T = Law::tangents>
-Tangent<T> in_units_of_ellipse(const Law &law, const Local<T> &r) {
+[[gnu::always_inline]] inline Tangent<T> in_units_of_ellipse(const Law &law, const Local<T> &r) {
     Tangent<T> x;
     for (int i = 0; i < T; ++i)
         x[i] = r[i] / divisor(law, i);
@@ -20,26 +19,40 @@ Tangent<T> in_units_of_ellipse(const Law &law, const Local<T> &r) {
 
 /// Load function f = |M^-1 r_t| - r_n, [dSFMH07, Eq. (1)]; f <= 0 is membership of the cone.
 template <class Law, int T = Law::tangents>
-double load_function(const Law &law, const Local<T> &r) {
+[[gnu::always_inline]] inline double load_function(const Law &law, const Local<T> &r) {
     return norm<T>(in_units_of_ellipse(law, r)) - r[T];
 }
 
-/// A projection on the cone, up to the root of a secular equation where one is needed.
-template <int T> struct Projection {
-    Reaction<T> result;          ///< valid unless unfinished
-    bool unfinished;             ///< a boundary point of which the root is not known yet
-    SecularEquation<T> equation; ///< of the unfinished
-    double R0, R1;               ///< the boundary point is R (M e, 1) with R = R0 + R1 s
+/// A projection on the cone up to its boundary branch, without a jump, for loops to vectorise.
+template <int T> struct Start {
+    Local<T> r;    ///< the result, unless unfinished
+    double branch; ///< number of its branch, or `unfinished`
+    Local<T> p;    ///< what the equation of the boundary point is made of
+    double scale;
 };
 
-/// The boundary point R (M e, 1), |e| = 1, that a root stands for.
+/// In the place of a branch: a boundary point, for which a secular equation is to be solved.
+inline constexpr double unfinished = 3.0;
+
+/// Point R (M e, 1) of the boundary of the cone, |e| = 1.
 template <class Law, int T = Law::tangents>
-Reaction<T> finish(const Law &law, const Projection<T> &start, const SecularRoot<T> &root) {
-    Reaction<T> result{Local<T>::Zero(), Branch::slip};
-    result.r[T] = start.R0 + start.R1 * root.s;
+Local<T> boundary_point(const Law &law, double R, const Tangent<T> &e) {
+    Local<T> r;
     for (int i = 0; i < T; ++i)
-        result.r[i] = law.mu(i) * (result.r[T] * root.e[i]);
-    return result;
+        r[i] = law.mu(i) * (R * e[i]);
+    r[T] = R;
+    return r;
+}
+
+/// The root of an equation that a law gave: closed form where all b_i and all c_i are the same.
+template <class Law, int T = Law::tangents>
+SecularRoot<T> root_for(const Law &, const SecularEquation<T> &equation) {
+    if constexpr (is_isotropic<Law>) {
+        const double length = norm<T>(equation.a);
+        return {(length - equation.c[0]) / equation.b[0], Tangent<T>::Constant(length),
+                equation.a / length};
+    } else
+        return solve<T>(equation);
 }
 
 /// Boundary branch of the Euclidean projection, for tau neither in the cone nor in its polar.
@@ -63,41 +76,42 @@ SecularEquation<T> boundary_equation(const Law &law, const Local<T> &tau) {
     return equation;
 }
 
-/// The root where all b_i and all c_i are the same.
-template <int T> SecularRoot<T> isotropic_root(const SecularEquation<T> &equation) {
-    const double length = norm<T>(equation.a);
-    return {(length - equation.c[0]) / equation.b[0], Tangent<T>::Constant(length),
-            equation.a / length};
-}
-
-/// First part of project: the branch, and the result or the equation for it.
+/// First part of project, with p = tau / scale.
 template <class Law, int T = Law::tangents>
-Projection<T> start_projection(const Law &law, const Local<T> &tau) {
-    const PowerOfTwo scale = power_of_two(largest<T + 1>(tau));
-    Local<T> p = tau;
+[[gnu::always_inline]] inline Start<T> start_projection(const Law &law, const Local<T> &tau) {
+    const PowerOfTwo two = power_of_two(largest<T + 1>(tau));
+    Start<T> start{tau, 0.0, tau, two.up};
     double sum = 0.0, polar2 = 0.0, ellipse2 = 0.0;
     for (int i = 0; i <= T; ++i) {
-        p[i] *= scale.down;
-        sum += p[i];
+        start.p[i] *= two.down;
+        sum += start.p[i];
     }
-    const double n = p[T];
     for (int i = 0; i < T; ++i) {
-        const double dual = p[i] * divisor(law, i), x = p[i] / divisor(law, i);
+        const double dual = start.p[i] * divisor(law, i), x = start.p[i] / divisor(law, i);
         polar2 += dual * dual;
         ellipse2 += x * x;
     }
-    Projection<T> start{{tau, Branch::slip}, false, {}, std::max(tau[T], 0.0), scale.up};
-    if (!std::isfinite(sum))
-        start.result.r.setConstant(std::numeric_limits<double>::quiet_NaN());
-    else if (std::sqrt(polar2) <= -n) // tau in the polar cone, the apex included
-        start.result = {Local<T>::Zero(), Branch::open};
-    else if (std::sqrt(ellipse2) <= n)
-        start.result.branch = inside_branch(law);
-    else if constexpr (T > 0) {
-        start.unfinished = true;
-        start.equation = boundary_equation(law, p);
-    }
+    const double n = start.p[T], nan = 0.0 * sum; // NaN if tau is not finite, else zero
+    const bool open = std::sqrt(polar2) <= -n;    // tau in the polar cone, the apex included
+    start.branch = open ? 0.0 : (std::sqrt(ellipse2) <= n ? inside_code(law) : unfinished);
+    start.scale += nan;
+    for (int i = 0; i <= T; ++i)
+        start.r[i] = (open ? 0.0 : tau[i]) + nan;
     return start;
+}
+
+/// R of the boundary point of a Euclidean projection.
+inline double euclidean_radius(double p_n, double scale, double s) {
+    return (std::max(p_n, 0.0) + s) * scale;
+}
+
+/// Derivative of a projection on the branches that are not the boundary.
+template <int T> Jacobian<T> derivative_off_boundary(double branch) {
+    Jacobian<T> J = Jacobian<T>::Zero();
+    if (branch == 1.0)
+        J.setIdentity();
+    J(T, T) = branch > 0.0 ? 1.0 : 0.0;
+    return J;
 }
 
 /// Derivative of the boundary branch, of degree zero in tau. With h_i = 1/d_i, v_i = mu_i e_i h_i
@@ -129,24 +143,21 @@ Jacobian<T> boundary_derivative(const Law &law, double tau_n, const SecularRoot<
 /// Euclidean projection on the friction cone, the corrector of [dSFMH07, Section 2].
 ///
 /// Any finite tau gives a finite result, at any magnitude: tau is scaled by a power of two first.
-/// tau with an infinite or NaN component gives NaN and Branch::slip. If `derivative` is given, it
-/// receives d r / d tau on the branch taken, at a kink one of the limits of derivatives nearby.
+/// tau with an infinite or NaN component gives NaN. If `derivative` is given, it receives d r / d
+/// tau on the branch taken, at a kink one of the limits of derivatives nearby.
 template <class Law, int T = Law::tangents>
 Reaction<T> project(const Law &law, const Local<T> &tau, Jacobian<T> *derivative = nullptr) {
-    const Projection<T> start = start_projection(law, tau);
-    if (derivative) {
-        const bool inside = !start.unfinished && start.result.branch != Branch::open;
-        *derivative =
-            start.result.r[T] * 0.0 + (inside ? 1.0 : 0.0) * Jacobian<T>::Identity().array();
-    }
+    const Start<T> start = start_projection(law, tau);
     if constexpr (T > 0)
-        if (start.unfinished) {
-            const SecularRoot<T> root =
-                is_isotropic<Law> ? isotropic_root<T>(start.equation) : solve<T>(start.equation);
+        if (start.branch == unfinished) {
+            const SecularRoot<T> root = root_for(law, boundary_equation(law, start.p));
             if (derivative)
-                *derivative = boundary_derivative(law, tau[T] / start.R1, root);
-            return finish(law, start, root);
+                *derivative = boundary_derivative(law, start.p[T], root);
+            const double R = euclidean_radius(start.p[T], start.scale, root.s);
+            return {boundary_point(law, R, root.e), Branch::slip};
         }
-    return start.result;
+    if (derivative)
+        *derivative = derivative_off_boundary<T>(start.branch);
+    return {start.r, branch_of(start.branch)};
 }
 } // namespace dolfinx_contact

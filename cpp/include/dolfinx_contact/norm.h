@@ -7,20 +7,24 @@
 #include "friction.h"
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace dolfinx_contact {
+/// Added to a length that is a divisor, against 0 / 0; lengths above 1e-291 stay what they are.
+inline constexpr double tiny = std::numeric_limits<double>::min();
+
 /// Two powers of two whose product is one.
 struct PowerOfTwo {
     double down, up;
 };
 
-/// The power of two for which magnitude * down lies in [1, 2); less for magnitude < 2^-1021, zero
-/// included. No branch and no library call, so that loops with it vectorise.
+/// The power of two for which magnitude * down lies in [4, 8); less for magnitude < 2^-960, zero
+/// included. Bits of the exponent, no comparison and no library call: loops with it vectorise.
 [[gnu::always_inline]] inline PowerOfTwo power_of_two(double magnitude) {
     constexpr std::uint64_t exponent = 0x7ffULL << 52U, twice_bias = 2046ULL << 52U;
-    const double clamped = std::min(std::max(magnitude, 0x1p-1021), 0x1p1021);
+    const double within_range = 0.25 * magnitude + 0x1p-1021; // so that up and down are normal
     std::uint64_t bits = 0;
-    std::memcpy(&bits, &clamped, sizeof bits);
+    std::memcpy(&bits, &within_range, sizeof bits);
     const std::uint64_t up_bits = bits & exponent, down_bits = twice_bias - up_bits;
     PowerOfTwo scale{};
     std::memcpy(&scale.up, &up_bits, sizeof bits);
@@ -31,8 +35,8 @@ struct PowerOfTwo {
 /// max |v_i|
 template <int N>
 [[gnu::always_inline]] inline double largest(const Eigen::Matrix<double, N, 1> &v) {
-    double magnitude = 0.0;
-    for (int i = 0; i < N; ++i)
+    double magnitude = std::abs(v[0]);
+    for (int i = 1; i < N; ++i)
         magnitude = std::max(magnitude, std::abs(v[i]));
     return magnitude;
 }

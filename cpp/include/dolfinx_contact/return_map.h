@@ -9,28 +9,54 @@
 #include "slip_rule.h"
 
 namespace dolfinx_contact {
-/// First part of return_map: the branch, and the result or the equation for it.
+/// First part of return_map, with p = (z / |z|, R / |z|) and R for the scale.
 template <class Law, int T = Law::tangents>
-Projection<T> start_return(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
-                           double rho_n, double rho_t) {
+[[gnu::always_inline]] inline Start<T> start_return(const Law &law, const Local<T> &r, double gap,
+                                                    const Tangent<T> &slip, double rho_n,
+                                                    double rho_t) {
     const double n = r[T] - rho_n * gap;
-    Projection<T> start{{Local<T>::Zero(), Branch::open}, false, {}, n, 0.0};
-    if (n <= 0.0)
-        return start;
+    Start<T> start{r, 0.0, r, n};
     Tangent<T> z;
-    start.result.r[T] = n;
     for (int i = 0; i < T; ++i) {
-        start.result.r[i] = r[i] - rho_t * slip[i];
-        z[i] = start.result.r[i] / divisor(law, i);
+        start.r[i] = r[i] - rho_t * slip[i];
+        z[i] = start.r[i] / divisor(law, i);
     }
+    start.r[T] = n;
     const double length = norm<T>(z);
-    start.result.branch = inside_branch(law);
-    if constexpr (T > 0)
-        if (!(length <= n)) {
-            start.unfinished = true;
-            start.equation = {z / length, inverse_p_squared(law), Tangent<T>::Constant(n / length)};
-        }
+    const bool open = n <= 0.0;
+    start.branch = open ? 0.0 : (length <= n ? inside_code(law) : unfinished);
+    for (int i = 0; i < T; ++i)
+        start.p[i] = z[i] / (length + tiny);
+    start.p[T] = n / (length + tiny);
+    for (int i = 0; i <= T; ++i)
+        start.r[i] = open ? 0.0 : start.r[i];
     return start;
+}
+
+/// Secular equation of the boundary branch: a = z / |z|, b_i = 1 / p_i^2, c_i = R / |z|.
+template <class Law, int T = Law::tangents>
+SecularEquation<T> return_equation(const Law &law, const Local<T> &p) {
+    return {p.template head<T>(), inverse_p_squared(law), Tangent<T>::Constant(p[T])};
+}
+
+/// Derivative of the boundary branch by (tau, R): with c = R / |z|, g_i = e_i / d_i, v_i = g_i /
+/// p_i^2, S = sum e_i v_i,  dx_i = c dz_i / d_i - v_i (c g . dz - dR) / S.
+template <class Law, int T = Law::tangents>
+Jacobian<T> return_derivative(const Law &law, const SecularEquation<T> &equation,
+                              const SecularRoot<T> &root) {
+    const double c = equation.c[0];
+    const Tangent<T> g = root.e.cwiseQuotient(root.d), v = g.cwiseProduct(equation.b);
+    const double S = root.e.dot(v);
+    Jacobian<T> J = Jacobian<T>::Zero();
+    for (int i = 0; i < T; ++i) {
+        const double mu = divisor(law, i);
+        for (int j = 0; j < T; ++j)
+            J(i, j) = -c * mu * v[i] * g[j] / (S * divisor(law, j));
+        J(i, i) += c / root.d[i];
+        J(i, T) = mu * v[i] / S;
+    }
+    J(T, T) = 1.0;
+    return J;
 }
 
 /// With R = max(0, r_n - rho_n x_n), tau = r_t - rho_t du_t, z = M^-1 tau: the node sticks if
@@ -41,34 +67,22 @@ Projection<T> start_return(const Law &law, const Local<T> &r, double gap, const 
 /// e_i d_i = z_i / |z|,  d_i = s / p_i^2 + R / |z|,  |e| = 1.
 ///
 /// If `derivative` is given, it receives the derivative by (tau, r_n - rho_n x_n) on the branch
-/// taken: with c = R / |z|, g_i = e_i / d_i, v_i = g_i / p_i^2, S = sum e_i v_i,
-///     dx_i = c dz_i / d_i - v_i (c g . dz - dR) / S.
+/// taken.
 template <class Law, int T = Law::tangents>
 Reaction<T> return_map(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
                        double rho_n, double rho_t, Jacobian<T> *derivative = nullptr) {
-    const Projection<T> start = start_return(law, r, gap, slip, rho_n, rho_t);
-    if (derivative)
-        *derivative = (start.result.branch == Branch::open ? 0.0 : 1.0) * Jacobian<T>::Identity();
+    const Start<T> start = start_return(law, r, gap, slip, rho_n, rho_t);
     if constexpr (T > 0)
-        if (start.unfinished) {
-            const SecularRoot<T> root =
-                is_isotropic<Law> ? isotropic_root<T>(start.equation) : solve<T>(start.equation);
-            if (derivative) {
-                const double c = start.equation.c[0];
-                const Tangent<T> g = root.e.cwiseQuotient(root.d),
-                                 v = g.cwiseProduct(start.equation.b);
-                const double S = root.e.dot(v);
-                for (int i = 0; i < T; ++i) {
-                    const double mu = divisor(law, i);
-                    for (int j = 0; j < T; ++j)
-                        (*derivative)(i, j) = -c * mu * v[i] * g[j] / (S * divisor(law, j));
-                    (*derivative)(i, i) += c / root.d[i];
-                    (*derivative)(i, T) = mu * v[i] / S;
-                }
-            }
-            return finish(law, start, root);
+        if (start.branch == unfinished) {
+            const SecularEquation<T> equation = return_equation(law, start.p);
+            const SecularRoot<T> root = root_for(law, equation);
+            if (derivative)
+                *derivative = return_derivative(law, equation, root);
+            return {boundary_point(law, start.scale, root.e), Branch::slip};
         }
-    return start.result;
+    if (derivative)
+        *derivative = derivative_off_boundary<T>(start.branch);
+    return {start.r, branch_of(start.branch)};
 }
 
 /// return_map with its derivatives on the branch taken.

@@ -1,0 +1,111 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file maps.h
+/// The functions of one node as function objects of a law and a State, for for_each_node of
+/// batch.h.
+#pragma once
+
+#include "return_map.h"
+
+namespace dolfinx_contact {
+/// What a function of one node may look at.
+template <int T> struct State {
+    Local<T> r;
+    double gap;
+    Tangent<T> slip;
+    double rho_n, rho_t;
+    Branch branch;
+};
+
+// Where the boundary branch of a map needs the root of a secular equation, its object gives a
+// Start, and says of what equation, and which radius R of the boundary point the root means. The
+// equations of many nodes are then solved side by side.
+
+struct EuclideanProjection {
+    template <class Law, class S>
+    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
+        return start_projection(law, s.r);
+    }
+    template <class Law, class P> auto equation(const Law &law, const P &p) const {
+        return boundary_equation(law, p);
+    }
+    double radius(double p_n, double scale, double s) const {
+        return euclidean_radius(p_n, scale, s);
+    }
+};
+
+struct BipotentialMap : EuclideanProjection {
+    template <class Law, class S>
+    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
+        return start_projection(law, predictor(law, s.r, s.gap, s.slip, s.rho_n));
+    }
+};
+
+struct ReturnMap {
+    template <class Law, class S>
+    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
+        return start_return(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
+    }
+    template <class Law, class P> auto equation(const Law &law, const P &p) const {
+        return return_equation(law, p);
+    }
+    double radius(double, double scale, double) const { return scale; }
+};
+
+struct ScaledMap {
+    template <class Law, class S>
+    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
+        return coded_scaled_map(law, s.r, s.gap, s.slip, s.rho_n);
+    }
+};
+
+struct LoadFunction {
+    template <class Law, class S>
+    [[gnu::always_inline]] double operator()(const Law &law, const S &s) const {
+        return load_function(law, s.r);
+    }
+};
+
+struct BipotentialGap {
+    template <class Law, class S>
+    [[gnu::always_inline]] double operator()(const Law &law, const S &s) const {
+        return bipotential_gap(law, s.r, s.gap, s.slip);
+    }
+};
+
+struct SlipDefect {
+    template <class Law, class S> double operator()(const Law &law, const S &s) const {
+        return slip_defect(law, s.r, s.slip, s.branch);
+    }
+};
+
+// Derivatives.
+
+struct ProjectionJacobian {
+    template <class Law, class S, int T = Law::tangents>
+    Linearisation<T> operator()(const Law &law, const S &s) const {
+        Linearisation<T> out;
+        out.value = project(law, s.r, &out.by_reaction);
+        out.by_motion.setZero();
+        return out;
+    }
+};
+
+struct BipotentialJacobian {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return bipotential_jacobian(law, s.r, s.gap, s.slip, s.rho_n);
+    }
+};
+
+struct ScaledJacobian {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return scaled_jacobian(law, s.r, s.gap, s.slip, s.rho_n);
+    }
+};
+
+struct ReturnJacobian {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return return_jacobian(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
+    }
+};
+} // namespace dolfinx_contact
