@@ -28,6 +28,9 @@ class Automatic:
         if nodes > CROSSOVER:
             why = f"{nodes} contact nodes, more than {CROSSOVER}"
             solvers.reverse()
+        elif equations.body.ksp.getPC().getType() not in ("lu", "cholesky"):
+            why = "without a factorisation the condensed operator would cost too many solves"
+            solvers.reverse()
         elif not fits:
             why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
             solvers.reverse()

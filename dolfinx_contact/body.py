@@ -12,18 +12,13 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
-from dolfinx_contact.rigid_motion import refuse_rigid_motion
+from dolfinx_contact.linear_solver import LinearSolver
+from dolfinx_contact.rigid_motion import refuse_rigid_motion, rigid_modes
 
-DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _instances = count()
-
-
-class LinearSolverError(RuntimeError):
-    """PETSc's linear solver did not solve; the message has its reason and options."""
 
 
 class ElasticBody:
@@ -34,7 +29,8 @@ class ElasticBody:
         u: Displacement.
         bcs: Dirichlet conditions; their values may change between steps, their places not.
         J: Derivative of ``F``; found by UFL if None.
-        petsc_options: Options of the solver; by default a factorisation by MUMPS.
+        petsc_options: Options of the solver; by default a factorisation by MUMPS, for large bodies
+            conjugate gradients with multigrid, see ``linear_solver.py``.
         petsc_options_prefix: Their prefix.
 
     Raises:
@@ -54,7 +50,7 @@ class ElasticBody:
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
         fixed = [_dolfinx.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
-        self._options = DIRECT if petsc_options is None else dict(petsc_options)
+        self._options = None if petsc_options is None else dict(petsc_options)
         self._prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest = None
         self._assemblies = 0
@@ -155,45 +151,30 @@ class ElasticBody:
     # -- solves --------------------------------------------------------------------------------
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """K^-1 b; the factorisation is made at the first call and kept while K stands."""
+        """K^-1 b; the solver is set up at the first call and kept while K stands."""
         if self._elastic is None:
-            self._elastic = self.factorise(self.K)
-        return self._elastic(b)
+            self._elastic = self.solver(self.K)
+        return self._elastic.solve(b)
 
     @property
     def ksp(self):
         """The linear solver of K, for many right-hand sides at a time."""
         if self._elastic is None:
-            self._elastic = self.factorise(self.K)
+            self._elastic = self.solver(self.K)
         return self._elastic.ksp
 
-    def factorise(self, A):
-        """A function that applies the inverse of a PETSc matrix, by the options of this body."""
-        ksp = PETSc.KSP().create(self.comm)
-        ksp.setOptionsPrefix(self._prefix)
-        ksp.setOperators(A)
-        options = PETSc.Options()
-        options.prefixPush(self._prefix)
-        for key, value in self._options.items():
-            options[key] = value
-        ksp.setFromOptions()
-        for key in self._options:
-            del options[key]
-        options.prefixPop()
-        right, left = A.createVecs()
+    def solver(self, A) -> LinearSolver:
+        """The solver of another matrix on ``V`` by the options of this body."""
+        return LinearSolver(A, self._options, self._prefix, self._rigid_modes)
 
-        def solve(b: np.ndarray) -> np.ndarray:
-            left.array_w[:] = b
-            ksp.solve(left, right)
-            if ksp.getConvergedReason() < 0:
-                raise LinearSolverError(
-                    f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) "
-                    f"after {ksp.getIterationNumber()} iterations; options {self._options}."
-                )
-            return right.array_r.copy()
-
-        solve.ksp = ksp
-        return solve
+    def _rigid_modes(self) -> np.ndarray:
+        """Orthonormal rigid motions that vanish at fixed degrees of freedom."""
+        gdim = self.V.mesh.geometry.dim
+        x = self.V.tabulate_dof_coordinates()[: self.size // gdim, :gdim]
+        modes = rigid_modes(x, np.ones(len(x), dtype=bool), self.comm)
+        modes[self.fixed] = 0.0
+        lower = np.linalg.cholesky(self.total(modes.T @ modes))
+        return np.linalg.solve(lower, modes.T).T
 
 
 def _linear_part(F, u, J):

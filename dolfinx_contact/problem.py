@@ -336,11 +336,14 @@ class _ContactEquations:
             contact.rho = factor * stiffness
             contact.add_springs(A, contact.springs(map))
         stiffened.clear()  # one factorisation at a time: memory counts more than a second try
-        stiffened[metric] = self.body.factorise(A)
+        stiffened[metric] = self.body.solver(A)
 
     def correction(self, residual: np.ndarray) -> np.ndarray:
-        """Displacement that removes the residual while the springs hold the contact nodes."""
-        correction = self.problem._stiffened[self._metric](residual)
+        """Displacement that removes the residual while the springs hold the contact nodes.
+
+        One application of the preconditioner: exact with a factorisation, one cycle of multigrid.
+        """
+        correction = self.problem._stiffened[self._metric].apply(residual)
         correction[self.body.fixed] = 0.0
         return correction
 

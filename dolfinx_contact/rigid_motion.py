@@ -29,7 +29,7 @@ def refuse_rigid_motion(body) -> None:
     part, parts = _connected_parts(body.V, body.comm)
     diagonal = body.K.getDiagonal().array.copy()
     for k in range(parts):
-        modes = _rigid_modes(x, part[: x.shape[0]] == k, body.comm)
+        modes = rigid_modes(x, part[: x.shape[0]] == k, body.comm)
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
         free = modes @ vectors[:, values <= ROUNDING * values[-1]]
@@ -49,7 +49,7 @@ def refuse_rigid_motion(body) -> None:
             )
 
 
-def _rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
+def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
     """Translations, and rotations about the middle in units of the size, of the nodes ``here``.
 
     ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.

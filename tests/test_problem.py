@@ -6,6 +6,7 @@ import scenes
 from mpi4py import MPI
 
 import dolfinx_contact as dc
+from dolfinx_contact.linear_solver import MULTIGRID
 
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 CASES = {
@@ -247,8 +248,17 @@ def test_linear_solver_is_the_users_choice():
     options = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": 1e-12}
     other, scene = run(petsc_options=options, petsc_options_prefix="mine_")
     assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
+    assert scene.problem.solve().solver.startswith("FixedPoint (without a factorisation")
     with pytest.raises(dc.LinearSolverError, match="ksp_max_it"):
         run(petsc_options={**options, "ksp_max_it": 1})
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_one_multigrid_cycle_per_iteration_is_enough(case):
+    """Without any inner solve, multigrid and fixed point together reach what a factorisation reaches."""
+    reference, _ = run(**CASES[case])
+    other, _ = run(petsc_options=MULTIGRID, solver=dc.FixedPoint(map="return"), **CASES[case])
+    assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
 
 
 def test_same_scene_twice_gives_the_same_bits():

@@ -1,0 +1,88 @@
+"""PETSc behind two verbs: solve a linear system, and apply its preconditioner once."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+
+# Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. What previous
+# solutions combine to is where the next solve starts: under a proportional load it is the solution.
+MULTIGRID = {
+    "ksp_type": "cg",
+    "ksp_rtol": 1e-12,
+    "ksp_guess_type": "fischer",
+    "ksp_guess_fischer_model": "1,3",
+    "pc_type": "gamg",
+    "pc_gamg_type": "agg",
+    "pc_gamg_agg_nsmooths": 1,
+    "pc_gamg_threshold": 0.01,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 2,
+    "mg_levels_pc_type": "jacobi",
+}
+
+# Unknowns beyond which a multigrid cycle is cheaper than a back-solve with a factorisation.
+LARGE = 50_000
+
+
+class LinearSolverError(RuntimeError):
+    """PETSc's linear solver did not solve; the message has its reason and options."""
+
+
+class LinearSolver:
+    """A matrix and the PETSc solver that its user's options describe.
+
+    Args:
+        A: Assembled PETSc matrix.
+        options: PETSc options without prefix; None takes ``DIRECT``, or ``MULTIGRID`` if ``A`` is large.
+        prefix: Prefix of the options.
+        near_nullspace: Function that returns the rigid motions, ``shape=(n, 6 or 3)``, orthonormal, zero
+            at fixed degrees of freedom; called only where the preconditioner is no factorisation.
+    """
+
+    def __init__(self, A, options, prefix: str, near_nullspace):
+        if options is None:
+            options = DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
+        self._options = options
+        self.ksp = PETSc.KSP().create(A.comm)
+        self.ksp.setOptionsPrefix(prefix)
+        if options.get("pc_type") not in ("lu", "cholesky"):
+            vectors = []
+            for mode in near_nullspace().T:
+                vectors.append(A.createVecRight())
+                vectors[-1].array_w[:] = mode
+            A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
+        self.ksp.setOperators(A)
+        database = PETSc.Options()
+        database.prefixPush(prefix)
+        for key, value in options.items():
+            database[key] = value
+        self.ksp.setFromOptions()
+        self.ksp.setUp()  # reads the options of the levels, which must still be there
+        for key in options:
+            del database[key]
+        database.prefixPop()
+        self._right, self._left = A.createVecs()
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """A^-1 b to the tolerance of the options; arrays of owned degrees of freedom.
+
+        Raises:
+            LinearSolverError: PETSc did not converge.
+        """
+        self._left.array_w[:] = b
+        self.ksp.solve(self._left, self._right)
+        if self.ksp.getConvergedReason() < 0:
+            raise LinearSolverError(
+                f"PETSc's linear solver failed (KSPConvergedReason {self.ksp.getConvergedReason()}) "
+                f"after {self.ksp.getIterationNumber()} iterations; options {self._options}."
+            )
+        return self._right.array_r.copy()
+
+    def apply(self, b: np.ndarray) -> np.ndarray:
+        """The preconditioner applied once: a back-solve, or one multigrid cycle."""
+        self._left.array_w[:] = b
+        self.ksp.getPC().apply(self._left, self._right)
+        return self._right.array_r.copy()
