@@ -9,6 +9,7 @@
 #include "condensed_fixed_point.h"
 #include "slip_rule.h"
 #include <functional>
+#include <random>
 
 namespace dolfinx_contact::condensed {
 /// What a caller may choose.
@@ -212,8 +213,33 @@ template <int T, int P> class Cascade {
             return;
         if (attempt("homotopy in the load", path([](Path &at, double s) { at.load = s; })))
             return;
-        if (T > 0)
-            attempt("continuation in mu", path([](Path &at, double s) { at.friction = s; }));
+        if (T > 0 &&
+            attempt("continuation in mu", path([](Path &at, double s) { at.friction = s; })))
+            return;
+        // Small problems with large friction may have solutions that no path from zero leads to.
+        std::minstd_rand random(1);
+        const Index starts_tried = std::min<Index>(300, 10000 / (D * op_.nodes()));
+        for (Index k = 0; k < starts_tried; ++k)
+            if (attempt("random starts", newton(random_start(random), k % 3 == 1 ? 1.0 : 10.0,
+                                                k % 3 == 2 ? 0.1 : 1.0)))
+                return;
+    }
+
+    /// Reactions in the cone, of any size about one; the same in every run and on every machine.
+    VectorXd random_start(std::minstd_rand &random) const {
+        const auto uniform = [&random] {
+            return static_cast<double>(random() - std::minstd_rand::min()) /
+                   static_cast<double>(std::minstd_rand::max() - std::minstd_rand::min());
+        };
+        VectorXd r(D * op_.nodes());
+        const double size = std::pow(10.0, 2.0 * uniform() - 1.0);
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            const double normal = uniform() < 0.3 ? 0.0 : size * uniform();
+            r[D * i + T] = normal;
+            for (int c = 0; c < T; ++c)
+                r[D * i + c] = normal * (1.4 * uniform() - 0.7);
+        }
+        return r;
     }
 
     /// A problem on the way to the one that is asked for, all ones.
@@ -316,6 +342,8 @@ template <int T, int P> class Cascade {
         double reached = -1.0, step = 0.25;
         VectorXd before;
         double reached_before = -1.0;
+        constexpr double shortest = 1e-4;
+        const int last_iteration = budget_.iterations + 2000;
         for (int failures = 0; reached < 1.0;) {
             const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
             Path at;
@@ -339,7 +367,9 @@ template <int T, int P> class Cascade {
                 failures = 0;
             } else {
                 step *= 0.5;
-                if (++failures > 8 || reached < 0.0 || budget_.spent())
+                ++failures;
+                if (step < shortest || reached < 0.0 || budget_.spent() ||
+                    budget_.iterations >= last_iteration)
                     return false;
             }
         }

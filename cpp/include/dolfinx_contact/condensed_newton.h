@@ -132,20 +132,17 @@ NodeStep<T> by_stiffness(const System<T> &system, Index i, const Point<T> &at,
 }
 
 /// Solves J y = rhs. J is singular where W is, with more contacts than the body has degrees of
-/// freedom. A shift of the diagonal, relative to it, then leaves the step in the range of W nearly
-/// as it is; it starts at `shift` and is raised until the solution is one.
-inline VectorXd solve_regularised(const MatrixXd &J, const VectorXd &rhs, double &shift) {
-    constexpr double largest = 1e-4, accuracy = 1e-4, smallest_rcond = 1e-14;
-    for (;; shift = std::max(100.0 * shift, 1e-12)) {
-        MatrixXd shifted = J;
-        if (shift > 0.0)
-            shifted.diagonal().array() += shift * J.diagonal().cwiseAbs().array().max(1e-3);
-        const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> lu(shifted);
-        const VectorXd y = lu.solve(rhs);
-        const bool solved = y.allFinite() && (J * y - rhs).norm() <= accuracy * rhs.norm();
-        if (shift >= largest || (solved && (shift > 0.0 || lu.rcond() > smallest_rcond)))
-            return y;
+/// freedom; the shortest of the steps that fit best is taken then.
+inline VectorXd solve_any_rank(const MatrixXd &J, const VectorXd &rhs) {
+    constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
+    {
+        const Eigen::PartialPivLU<MatrixXd> lu(J);
+        if (lu.rcond() > smallest_rcond)
+            return lu.solve(rhs);
     }
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition(J.rows(), J.cols());
+    decomposition.setThreshold(threshold);
+    return decomposition.compute(J).solve(rhs);
 }
 
 /// Newton's method on the residual of a System with a nonmonotone line search
@@ -259,7 +256,7 @@ template <int T> class Newton {
             }
             rhs.segment(J0, from.m) = (from.g - from.L * at(known, j)).head(from.m);
         }
-        const VectorXd y = solve_regularised(J, rhs, shift_);
+        const VectorXd y = solve_any_rank(J, rhs);
         for (Index i = 0; i < system_.nodes; ++i) {
             const auto &step = steps_[static_cast<std::size_t>(i)];
             found.template segment<D>(D * i) +=
@@ -290,6 +287,5 @@ template <int T> class Newton {
     State<T> state_;
     std::vector<NodeStep<T>> steps_;
     std::vector<Index> offsets_;
-    double shift_ = 0.0;
 };
 } // namespace dolfinx_contact::condensed
