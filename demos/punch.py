@@ -52,7 +52,7 @@ class Parameters:
     young: float = 210e3
     poisson: float = 0.3
     # Left open by the paper:
-    unload_to: float = 0.02  # displacement of the top face when unloaded
+    unload_to: float | tuple[float, ...] = 0.02  # top face when unloaded; or one per cycle
     top: str = "bonded"  # "bonded": the top face does not move sideways; "free": it does
     point: tuple[float, float] | None = None  # P is the contact node nearest to this
 
@@ -182,15 +182,25 @@ class Punch:
 
 
 def programme(parameters: Parameters) -> list[float]:
-    """Displacements of the top face at the end of every load step [dSFMH07, Fig. 2]."""
-    low, high = parameters.unload_to, parameters.depth
-    if not 0 <= low < high:
-        raise ValueError(f"unload_to must lie in [0, depth), got {low} with depth {high}.")
+    """Displacements of the top face at the end of every load step [dSFMH07, Fig. 2].
+
+    Raises:
+        ValueError: an unloading that is none, fewer than one cycle or increment, or a list
+            ``unload_to`` with another number of entries than cycles.
+    """
     for name in ("cycles", "loading", "unloading"):
         if getattr(parameters, name) < 1:
             raise ValueError(f"{name} must be at least 1, got {getattr(parameters, name)}.")
+    lows, high = np.ravel(parameters.unload_to).tolist(), parameters.depth
+    if not all(0 <= low < high for low in lows):
+        shown = lows[0] if len(lows) == 1 else lows
+        raise ValueError(f"unload_to must lie in [0, depth), got {shown} with depth {high}.")
+    if len(lows) not in (1, parameters.cycles):
+        raise ValueError(
+            f"unload_to must be one number or one per cycle ({parameters.cycles}), got {lows}."
+        )
     start, steps = 0.0, []
-    for _ in range(parameters.cycles):
+    for low in lows if len(lows) > 1 else lows * parameters.cycles:
         steps += np.linspace(start, high, parameters.loading + 1)[1:].tolist()
         steps += np.linspace(high, low, parameters.unloading + 1)[1:].tolist()
         start = low

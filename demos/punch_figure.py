@@ -14,12 +14,13 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-OPEN, STICK, SLIP = 0, 1, 2
+OPEN, STICK, SLIP, REVERSE = 0, 1, 2, 3
 ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
     STICK: Patch(facecolor="#4a90c4", edgecolor="black", label="stick, $f<0$"),
     SLIP: Patch(facecolor="#f0a33a", edgecolor="#f0a33a", label="slip, $f=0$"),
     OPEN: Patch(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
 }
+INWARD = Patch(facecolor="#a04a00", edgecolor="#a04a00", label="reverse slip, inwards, $f=0$")
 
 
 class ContactMap(NamedTuple):
@@ -131,20 +132,30 @@ def draw(maps, title, file, point=None) -> None:
         figure.savefig(file, dpi=150)
 
 
-def draw_zones(axes, disc: ContactMap):
-    """Map of f with zones and slip vectors; returns what a colour bar needs."""
+def draw_zones(axes, disc: ContactMap, inward=None):
+    """Map of f with zones and slip vectors; returns what a colour bar needs.
+
+    Args:
+        axes: Where to draw.
+        disc: What to draw.
+        inward: Nodes whose slip has a colour of its own, ``shape=(n,)``; None for none.
+    """
     status = disc.status[disc.faces.ravel()]
+    zones = {SLIP: ZONES[SLIP], OPEN: ZONES[OPEN]}
+    if inward is not None:
+        inward = np.asarray(inward)[disc.faces.ravel()] & (status == SLIP)
+        status = np.where(inward, REVERSE, status)
+        zones[REVERSE] = INWARD
     f = disc.load_function / disc.area() / disc.mean_pressure()
     image = _colour(axes, disc, f, status == STICK, cmap="Blues_r", clim=(-1.2, 0))
-    for zone in (SLIP, OPEN):
-        patch = ZONES[zone]
+    for zone, patch in zones.items():
         axes.add_collection(
             PolyCollection(
                 disc.quarters().reshape(-1, 4, 2)[status == zone],
                 facecolor=patch.get_facecolor(),
                 edgecolor=patch.get_edgecolor(),
                 hatch=patch.get_hatch(),
-                linewidth=0.6 if zone == SLIP else 0,
+                linewidth=0 if zone == OPEN else 0.6,
             )
         )
     axes.add_collection(LineCollection(disc.borders(), colors="black", linewidths=1.8))

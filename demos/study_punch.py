@@ -1,0 +1,137 @@
+"""The study of [dSFMH07, Section 3]: six cycles of cases A, B and C, all figures on one page.
+
+Every step is kept; a study that was stopped continues where it was, and one with other numbers
+begins anew.  With --explore also what the paper's text leaves open: ends of unloading, support of
+the top face, increments, mesh.  The page is OUTPUT/study.html.  Runs on any number of MPI ranks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+from punch import CASES, Parameters, programme
+from study_run import Run, compute
+from tqdm import tqdm
+
+# isort: split
+from mpi4py import MPI
+
+COMM = MPI.COMM_WORLD
+
+
+def variants(base: Parameters, cycles: int, unload_to, refine: int) -> dict[str, Parameters]:
+    """What the paper leaves open, one change at a time.
+
+    Args:
+        base: What is changed.
+        cycles: Of the variants, but for meshes: those run one cycle.
+        unload_to: Ends of unloading, mm.
+        refine: How often the mesh is refined, each time one variant.
+    """
+    few = replace(base, cycles=cycles)
+    runs = {f"unload to {low:g} mm": replace(few, unload_to=low) for low in unload_to}
+    deeper = tuple(base.depth * (0.6 - 0.4 * k / max(cycles - 1, 1)) for k in range(cycles))
+    runs["deeper every cycle"] = replace(few, unload_to=deeper)
+    runs["top free"] = replace(few, top="free")
+    for factor in (2, 4):
+        increments = factor * base.loading, factor * base.unloading
+        name = "{}+{} increments".format(*increments)
+        runs[name] = replace(few, loading=increments[0], unloading=increments[1])
+    for level in range(1, refine + 1):
+        runs[f"mesh refined {level}x"] = replace(base, cycles=1, refine=base.refine + level)
+    return runs
+
+
+def plan(options) -> dict[str, dict[str, Parameters]]:
+    """Parameters by variant and case; the paper's own programme is ``base``."""
+    unload_to = tuple(options.unload_to)
+    base = Parameters(
+        cycles=options.cycles,
+        unload_to=unload_to if len(unload_to) > 1 else unload_to[0],
+        loading=options.loading,
+        unloading=options.unloading,
+        top=options.top,
+        tol=options.tol,
+        refine=options.refine,
+        point=tuple(options.point[0]) if options.point else None,
+    )
+    runs = {"base": base}
+    if options.explore:
+        ends = [low for low in options.explore_unload_to if low != base.unload_to]
+        runs.update(variants(base, options.explore_cycles, ends, options.explore_refine))
+    return {
+        name: {case: replace(parameters, case=case) for case in options.cases}
+        for name, parameters in runs.items()
+    }
+
+
+def compute_all(runs, output: Path, points, mesh_options) -> dict[str, dict[str, Run]]:
+    """Compute what is missing, with one progress bar for everything; read it on rank 0."""
+    total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
+    with tqdm(total=total, unit="step", disable=COMM.rank != 0, smoothing=0.1) as bar:
+        for name, cases in runs.items():
+            for case, parameters in cases.items():
+                bar.set_description(f"case {case}, {name}")
+                compute(parameters, directory_of(output, name, case), points, bar, **mesh_options)
+    if COMM.rank != 0:
+        return {}
+    return {
+        name: {case: Run(directory_of(output, name, case)) for case in cases}
+        for name, cases in runs.items()
+    }
+
+
+def directory_of(output: Path, name: str, case: str) -> Path:
+    return output / "runs" / name.replace(" ", "_") / case
+
+
+def arguments(argv=None) -> argparse.Namespace:
+    default = Parameters()
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    add = parser.add_argument
+    add("--cases", nargs="+", choices=CASES, default=list(CASES), help="Table 1 of the paper")
+    add("--cycles", type=int, default=6, help="of loading and unloading")
+    add("--loading", type=int, default=default.loading, help="increments of a loading")
+    add("--unloading", type=int, default=default.unloading, help="increments of an unloading")
+    unload_to = dict(type=float, nargs="+", metavar="MM")
+    add("--unload-to", **unload_to, default=[default.unload_to], help="end of unloading: one for "
+        "all cycles, or one for each")  # fmt: skip
+    add("--top", choices=("bonded", "free"), default=default.top, help="top face, sideways")
+    add("--tol", type=float, default=default.tol, help="error at which a step ends")
+    add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
+    add("--divisions", type=int, default=8, help="of the sides of the mesh's blocks")
+    add("--layers", type=int, default=4, help="of the mesh")
+    add("--point", type=float, nargs=2, action="append", metavar=("X", "Y"),
+        help="P, mm (default: 3/4 R at 45 degrees); again for more tracked nodes")  # fmt: skip
+    add("--wear-coefficient", type=float, default=3e-8, metavar="K",
+        help="worn volume per work of friction, mm^3/(N mm)")  # fmt: skip
+    add("--explore", action="store_true", help="compute what the paper leaves open, too")
+    add("--explore-cycles", type=int, default=3, help="cycles of its variants")
+    add("--explore-unload-to", **unload_to, default=[0.0, 0.01, 0.02, 0.05], help="its unloadings")
+    add("--explore-refine", type=int, default=1, help="its finer meshes; each costs ten times more")
+    add("--data-only", action="store_true", help="compute, but draw nothing and write no page")
+    add("--output", type=Path, metavar="DIR", default=Path("results/study"), help="what is written")
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> None:
+    logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
+    options = arguments(argv)
+    mesh_options = dict(divisions=options.divisions, layers=options.layers)
+    more_points = [tuple(point) for point in (options.point or [])[1:]]
+    runs = compute_all(plan(options), options.output, more_points, mesh_options)
+    if options.data_only or COMM.rank != 0:
+        return
+    from study_page import report  # draws: not needed by the other ranks
+
+    report(runs, options.output, options.wear_coefficient)
+    print(f"page      {options.output / 'study.html'}\nfigures   {options.output / 'figures'}")
+
+
+if __name__ == "__main__":
+    main()
