@@ -1,8 +1,10 @@
 # make punch    the paper's punch: the table, a picture and ParaView files in results/punch
+# make study    six cycles of cases A, B, C: all figures on one page, results/study/study.html;
+#               EXPLORE=1 also computes what the paper leaves open
 # make test     all tests: the C++ ones, and the Python ones on 1, 2 and 3 MPI ranks
-# Both set up .venv first (tools/setup), when something it was made from has changed.
+# All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch test test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study test test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -10,6 +12,9 @@ made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 
 punch: .venv/ready
 	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
+
+study: .venv/ready
+	.venv/bin/python demos/study_punch.py --output results/study $(if $(EXPLORE),--explore) $(ARGS)
 
 test: test-cpp test-python
 
