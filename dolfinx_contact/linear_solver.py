@@ -55,15 +55,13 @@ class LinearSolver:
                 vectors[-1].array_w[:] = mode
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.ksp.setOperators(A)
-        database = PETSc.Options()
-        database.prefixPush(prefix)
+        database = PETSc.Options(prefix)  # deletes what it sets: PETSc 3.18 has room for 512 options
         for key, value in options.items():
             database[key] = value
         self.ksp.setFromOptions()
         self.ksp.setUp()  # reads the options of the levels, which must still be there
         for key in options:
             del database[key]
-        database.prefixPop()
         self._right, self._left = A.createVecs()
 
     def solve(self, b: np.ndarray) -> np.ndarray:
