@@ -1,0 +1,142 @@
+# %% [markdown]
+# # Fretting: cyclic partial slip that wears
+#
+# The cylinder of `demo_partial_slip.py`, now of a common material, stands on a plane that goes to and fro by a
+# prescribed stroke too small to slide it as a whole. Where it slips it wears, worn depth opens the gap, and the
+# pressure moves to where it sticks.
+#
+# ## Notation
+#
+# As in the demo of partial slip; $s$ displacement of the plane, $w$ worn depth, $k$ wear coefficient, volume per work
+# (one over stress), $D$ dissipation. Units: mm, N, MPa, per millimetre of the cylinder.
+#
+# ## Strong form
+#
+# $$ -\operatorname{div} \sigma(u) = 0, \qquad x_n = \frac{x^2}{2R} + u_n + w \ge 0, \quad p \ge 0, \quad x_n\, p = 0,
+#    \quad |q| \le \mu p, \qquad \dot w = -k\, q\, \dot u_t , $$
+#
+# the last being Archard's law with $k = K / \mu H$, which `dc.Wear` takes after every step: what a step wears opens
+# the gap of the next. The rig keeps the load: after every step the approach of the far boundary is corrected
+# by what is missing in $P$ over the stiffness of the contact.
+#
+# ## What must come out
+#
+# No closed form, but balances. Worn volume is $k D$. Over a cycle that repeats itself elastic energy does not change, so
+# the plane's work $\oint Q \,\mathrm{d}s$, a quantity of the whole body, is the dissipation, a sum over slipping nodes. Nothing
+# wears where nothing slips, and there the pressure has to grow, as the load stays.
+#
+# ## Weak form
+#
+# $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v. $$
+
+# %%
+from __future__ import annotations
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+from demo_partial_slip import COMM, A, R, cylinder
+from rounded_body import along_face
+
+YOUNG, POISSON = 1000.0, 0.3
+COEFFICIENT = 20.0  # 1/MPa: a cycle stands for the wear of many thousand
+APPROACH = 3.0 * A**2 / (2 * R)
+STROKE = 0.6 * A**2 / (2 * R)  # amplitude, mm
+QUARTER = 3  # steps from the middle to the end of a stroke
+
+# %% [markdown]
+# ## Code
+#
+# A cycle is middle, right, left, middle. `dc.History` keeps a row for each step.
+
+
+# %%
+def fret(cycles: int, wear: dc.Wear | None):
+    """Press, then move the plane to and fro; the history, the load, and profiles before and after each cycle."""
+    problem, held = cylinder(YOUNG, POISSON, wear)
+    contact = problem.contacts[0]
+
+    def press(approach: float) -> float:
+        held.value[1] = -approach
+        problem.solve()
+        return contact.force()[1]
+
+    low, load = press(0.98 * APPROACH), press(APPROACH)
+    stiffness = (load - low) / (0.02 * APPROACH)
+    history = dc.History(problem)
+    profiles = [profile(contact)]
+    ramp = np.arange(1, 4 * QUARTER + 1) / QUARTER
+    positions = STROKE * np.interp(ramp, [0, 1, 3, 4], [0, 1, -1, 0])
+    for cycle in range(1, cycles + 1):
+        for position in positions:
+            contact.plane.displacement = np.array([position, 0.0])
+            history.record(problem.solve(), cycle=cycle, position=float(position))
+            if wear is not None:
+                held.value[1] -= (load - contact.force()[1]) / stiffness
+        profiles.append(profile(contact))
+    return history, load, profiles
+
+
+def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
+    """Positions, pressure, slip path and worn depth along the face."""
+    pressure = contact.reaction[:, 1] / contact.area
+    names = ("x", "pressure", "slip_path", "depth")
+    arrays = along_face(contact, pressure, contact.slip_path, contact.wear_depth)
+    return dict(zip(names, arrays))
+
+
+# %% [markdown]
+# ## Result
+#
+# Without wear the second and the third cycle are alike: that is shakedown into a steady loop. There, $\oint Q \,\mathrm{d}s = D$.
+# Both are taken by the trapezoidal rule, for which the balance of energy closes by algebra; so this says that
+# nothing is lost in between, not that the steps are small enough.
+#
+# With wear, over six cycles:
+#
+# 1. worn volume is $k D$, to rounding, after every step, and the load stays within 1 %;
+# 2. from the third cycle on some nodes in the middle do not slip, and these do not wear at all;
+# 3. pressure in the middle grows, where most is worn it falls, and the contact becomes wider.
+
+
+# %%
+def main() -> None:
+    """Fret without and with wear; print and assert what is claimed above."""
+    steps = 4 * QUARTER
+    history, _, _ = fret(3, None)
+    force, position = history.column("contact0_force_x"), history.column("position")
+    dissipated = history.column("contact0_dissipation")[steps - 1 :: steps]
+    work = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(position))[steps - 2 :: steps]
+    second, third = np.diff(dissipated)
+    loop = np.diff(work)[-1]
+    if COMM.rank == 0:
+        print(f"without wear: dissipation {second:.4e}, {third:.4e} N a cycle, work {loop:.4e}")
+    assert abs(third / second - 1) < 1e-6 and abs(loop / third - 1) < 1e-6
+
+    history, load, profiles = fret(6, dc.Wear(COEFFICIENT))
+    dissipated = history.column("contact0_dissipation")
+    volume = history.column("contact0_worn_volume")
+    assert (np.abs(volume / (COEFFICIENT * dissipated) - 1) < 1e-12).all()
+    assert (np.abs(history.column("contact0_force_y") / load - 1) < 0.01).all()
+
+    new, worn = profiles[0], profiles[-1]
+    for earlier, later in zip(profiles[2:], profiles[3:]):
+        slip, wear = (later[name] - earlier[name] for name in ("slip_path", "depth"))
+        core = (later["pressure"] > 0) & (slip < 1e-9 * slip.max())
+        assert core.sum() >= 5 and np.abs(wear[core]).max() < 1e-9 * wear.max()
+    middle, deepest = np.abs(new["x"]).argmin(), worn["depth"].argmax()
+    assert core[middle] and not core[deepest]
+    change = [worn["pressure"][node] / new["pressure"][node] - 1 for node in (middle, deepest)]
+    touching = [np.count_nonzero(profile["pressure"]) for profile in (new, worn)]
+    if COMM.rank == 0:
+        print(
+            f"with wear: deepest {worn['depth'].max():.2e} mm, load {load:.4f} N, pressure", end=" "
+        )
+        print(f"{change[0]:+.1%} in the middle, {change[1]:+.1%} where it is deepest;", end=" ")
+        print(f"{touching[0]} nodes touch at first, {touching[1]} at last")
+    assert change[0] > 0.05 and change[1] < -0.3 and touching[1] > touching[0]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+# %% [markdown]
+# # A quarter of the punch
+#
+# The punch of [dSFMH07, Section 3] is symmetric about two planes, and so is its friction, whose principal directions
+# lie in them. A quarter of it with symmetry conditions is therefore enough. Its contact nodes on the planes of symmetry
+# are held in one tangential direction by a boundary condition, which must not be mistaken for friction.
+#
+# ## Notation
+#
+# $u$ displacement, $\sigma$ stress, $r = (r_t, r_n)$ reaction of the plane on the body. Units: mm, N, MPa.
+#
+# ## Strong form
+#
+# $$ -\operatorname{div} \sigma(u) = 0, \qquad u = (0, 0, -\delta) \text{ on the top face}, $$
+#
+# contact and friction with the plane $z = 0$ on the bottom face, for the whole body; and for the quarter $x, y > 0$ in addition
+#
+# $$ u_x = 0,\; \sigma_{xy} = \sigma_{xz} = 0 \text{ on } x = 0, \qquad u_y = 0,\; \sigma_{xy} = \sigma_{yz} = 0 \text{ on } y = 0. $$
+#
+# On a contact node with $x = 0$ there is neither slip nor friction along $x$: what the support carries there is
+# the force between the two halves of the body, not a reaction of the plane. `dc.Contact` calls such directions `held`.
+#
+# ## Weak form
+#
+# $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v . $$
+
+# %%
+from __future__ import annotations
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact._dolfinx import functionspace
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+COMM = MPI.COMM_WORLD
+RADIUS, HEIGHT, E, NU = 10.0, 10.0, 210e3, 0.3
+MU, P = (0.30, 0.15), (0.05, 0.20)  # case C of [dSFMH07, Table 1]
+DEPTHS = (0.05, 0.1, 0.08, 0.05, 0.02)  # loading, then unloading, with reverse slip
+
+
+# %% [markdown]
+# ## Code
+#
+# The cross section is a square of $n \times n$ quadrilaterals bent into a disc, $(x, y) \mapsto
+# (x \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole.
+
+
+# %%
+def punch(quarter: bool, cells: int = 8):
+    """The punch or its quarter, ``cells`` across the diameter; the problem and a setter of the depth."""
+    low, across = (0.0, cells // 2) if quarter else (-1.0, cells)
+    domain = mesh.create_box(
+        COMM,
+        [np.array([low, low, 0.0]), np.array([1.0, 1.0, 1.0])],
+        [across, across, cells // 2],
+        cell_type=mesh.CellType.hexahedron,
+    )
+    facets = {
+        name: mesh.locate_entities_boundary(
+            domain, 2, lambda x, i=axis, at=value: np.isclose(x[i], at)
+        )
+        for name, axis, value in (("bottom", 2, 0), ("top", 2, 1), ("x", 0, 0), ("y", 1, 0))
+    }
+    x, y, z = domain.geometry.x.T.copy()
+    disc = [x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)]
+    domain.geometry.x[:] = np.stack([RADIUS * disc[0], RADIUS * disc[1], HEIGHT * z], axis=1)
+
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    strain = ufl.sym(ufl.grad(u))
+    lame, shear = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
+    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2 * shear * strain
+    F = ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx(metadata={"quadrature_degree": 3})
+
+    pressed, zero = fem.Constant(domain, np.zeros(3)), fem.Constant(domain, 0.0)
+    bcs = [fem.dirichletbc(pressed, fem.locate_dofs_topological(V, 2, facets["top"]), V)]
+    for i, side in enumerate("xy" if quarter else ""):
+        dofs = fem.locate_dofs_topological(V.sub(i), 2, facets[side])
+        bcs.append(fem.dirichletbc(zero, dofs, V.sub(i)))
+    plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+    contact = dc.Contact(V, facets["bottom"], plane, dc.Friction(mu=MU, p=P))
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-11), pressed
+
+
+# %% [markdown]
+# A node on one plane of symmetry has half the reaction, the node on both a quarter, because the other part is that
+# of the missing body; along the held direction the reaction of the whole is zero.
+
+
+# %%
+def run(quarter: bool) -> list[dict]:
+    """Press and unload; for each step totals, and reactions of the nodes with x, y >= 0, by position."""
+    problem, pressed = punch(quarter)
+    contact, results = problem.contacts[0], []
+    for depth in DEPTHS:
+        pressed.value[2] = -depth
+        step = problem.solve()
+        x, r = (np.concatenate(COMM.allgather(part)) for part in (contact.x, contact.reaction))
+        dissipation = COMM.allreduce(contact.dissipation.sum(), op=MPI.SUM)
+        here = (x[:, :2] > -1e-9 * RADIUS).all(axis=1)
+        x, r = x[here], r[here]
+        if quarter:
+            r = r * 2.0 ** np.isclose(x[:, :2], 0.0).sum(axis=1)[:, None]
+        order = np.lexsort(np.round(x / RADIUS, 9).T)
+        totals = np.array([contact.force()[2], dissipation])
+        results.append({"x": x[order], "r": r[order], "totals": totals, "counts": step.counts})
+    return results
+
+
+# %% [markdown]
+# ## Result
+#
+# After each step of loading and unloading, the quarter has the reactions of the whole, node by node, to 1e-8 of the
+# largest, and a quarter of its total force and of its dissipation.
+
+
+# %%
+def main() -> None:
+    """Solve both and compare."""
+    for whole, part, depth in zip(run(False), run(True), DEPTHS):
+        assert np.abs(whole["x"] - part["x"]).max() < 1e-9 * RADIUS
+        largest = np.abs(whole["r"]).max()
+        difference = np.abs(whole["r"] - part["r"]).max() / largest
+        totals = np.abs(4 * part["totals"] / whole["totals"] - 1).max()
+        if COMM.rank == 0:
+            stick, slip = whole["counts"].stick, whole["counts"].slip
+            print(
+                f"{depth:.2f} mm: whole {whole['totals'][0]:.1f} N, {stick} stick, {slip} slip;",
+                end=" ",
+            )
+            print(f"4 quarters {4 * part['totals'][0]:.1f} N, nodes differ by {difference:.0e}")
+        assert difference < 1e-8 and totals < 1e-8
+
+
+if __name__ == "__main__":
+    main()
