@@ -1,0 +1,247 @@
+"""The study of the punch: what it writes, its energy balance, its measures, and that it resumes."""
+
+import csv
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+pytest.importorskip("gmsh")
+pytest.importorskip("matplotlib")
+pytest.importorskip("tqdm")
+sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+import study_punch
+from punch import Parameters, Punch, programme
+from punch_figure import ContactMap
+from study_measures import hysteresis, plateau, zones
+from study_run import EnergyBalance, Run, compute
+from study_work import TERMS
+
+COMM = MPI.COMM_WORLD
+DEMOS = Path(__file__).parents[1] / "demos"
+COARSE = ["--divisions", "2", "--layers", "1", "--cycles", "2"]
+FIGURES = "fig3 fig4 fig5 fig6 fig7 fig4_node1 fig7_node1 unloading1 unloading_last".split()
+FIGURES += "dissipation wear cycles energy convergence".split()
+
+
+@pytest.fixture(scope="module")
+def study():
+    """Directory of a coarse study with all variants, shared by all ranks."""
+    made = tempfile.mkdtemp() if COMM.rank == 0 else None
+    directory = Path(COMM.bcast(made))
+    options = "--explore --explore-cycles 2 --explore-unload-to 0 --point 4 4 --point 9 1".split()
+    study_punch.main([*COARSE, *options, "--output", str(directory)])
+    COMM.barrier()
+    yield directory
+    COMM.barrier()
+    if COMM.rank == 0:
+        shutil.rmtree(directory)
+
+
+def rows(file):
+    with open(file, newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_study_writes_everything(study):
+    """Each figure exists as SVG and PNG with its data as CSV, and the page has all, by itself."""
+    for name in FIGURES:
+        stem = study / "figures" / name
+        assert "<svg" in stem.with_suffix(".svg").read_text()[:1000], name
+        assert stem.with_suffix(".png").read_bytes().startswith(b"\x89PNG"), name
+        assert len(rows(stem.with_suffix(".csv"))) > 3, name
+    page = (study / "study.html").read_text()
+    assert page.count("data:image/svg+xml;base64,") == len(list((study / "figures").glob("*.svg")))
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert "&quot;unload_to&quot;: 0.02" in page
+
+
+def test_numbers_of_the_page_are_those_of_the_files(study):
+    """Work per cycle is the same in history, CSV and page, and so is the worn volume."""
+    page = (study / "study.html").read_text()
+    for row in rows(study / "figures" / "cycles.csv"):
+        table = Run(study / "runs" / "base" / row["case"]).table
+        ends = np.r_[0, table["contact0_dissipation"][14::15]]
+        work = float(row["dissipation_Nmm"])
+        assert work == pytest.approx(np.diff(ends)[int(row["cycle"]) - 1], rel=1e-9)
+        assert f"<td>{work:.4g}</td>" in page
+        assert float(row["worn_volume_mm3"]) == pytest.approx(3e-8 * work, rel=1e-12)
+    depths = rows(study / "figures" / "wear.csv")
+    for case in "ABC":
+        volume = sum(float(r["depth_nm"]) * 1e-6 * float(r["area"]) for r in depths if r["case"] == case)  # fmt: skip
+        mine = [r for r in rows(study / "figures" / "cycles.csv") if r["case"] == case]
+        assert volume == pytest.approx(sum(float(r["worn_volume_mm3"]) for r in mine), rel=1e-9)
+
+
+def closes(table, needed):
+    """The identity closes in every step with all its terms, and not without one of those needed."""
+    terms = {name: table[name] for name in TERMS if name != "dissipation_trapezoidal"}
+    largest = np.abs([table["platen_work"], *terms.values()]).max(axis=0)
+    left = table["platen_work"] - sum(terms.values())
+    assert (np.abs(left) <= 1e-9 * largest).all()
+    assert (np.abs(table["residual_mean"]) <= 1e-9 * largest).all()
+    for name in needed:
+        assert (np.abs(left + terms[name]) > 1e-4 * largest).any(), name
+    for name in ("half_du_K_du", "dissipation_end", "closing"):
+        assert (terms[name] >= -1e-9 * largest).all(), name
+
+
+@pytest.mark.parametrize("variant", ["base", "unload_to_0_mm", "top_free"])
+def test_energy_balance_closes(study, variant):
+    """Work of the platen = change of elastic energy + dissipation + what the scheme adds."""
+    for case in "ABC":
+        table = Run(study / "runs" / variant / case).table
+        closes(table, ["elastic_change", "dissipation_end", "half_du_K_du"])
+
+
+def test_energy_balance_of_a_punch_that_opens_and_closes():
+    """A punch that is lifted off and set down again: the closing nodes have their term."""
+    punch = Punch(Parameters(case="C"), divisions=2, layers=1)
+    balance, table = EnergyBalance(punch), []
+    for displacement in (0.05, 0.1, -0.02, 0.06, 0.1):
+        balance.open()
+        punch.press(displacement)
+        table.append(balance.close())
+    assert table[3]["closing"] > 0.0
+    table = {name: np.array([row[name] for row in table]) for name in table[0]}
+    closes(table, ["elastic_change", "dissipation_end", "half_du_K_du", "closing"])
+
+
+def test_every_statement_is_decided_by_the_data(study):
+    """Verdicts follow from the answers of single runs, and every run was asked."""
+    answers = rows(study / "figures" / "answers.csv")
+    verdicts = rows(study / "figures" / "statements.csv")
+    assert len(verdicts) == len({row["statement"] for row in answers}) > 15
+    asked = {row["variant"] for row in answers}
+    assert asked == {row["variant"] for row in rows(study / "figures" / "variants.csv")}
+    assert {"base", "top free", "unload to 0 mm", "mesh refined 1x"} <= asked
+    for verdict in verdicts:
+        parts = re.findall(r"(\d+)/(\d+)", verdict["runs in which it holds"])
+        held, of = (sum(int(part[k]) for part in parts) for k in (0, 1))
+        expected = "holds in all" if held == of else "depends" if held else "holds in none"
+        assert verdict["verdict"] == expected
+
+
+def strip(status, slip=None):
+    """A run of one step on a strip of squares, two nodes wide, whose upper row has these statuses."""
+    n = len(status)
+    x = np.array([(k, row) for row in (0.0, 1.0) for k in range(n)]) - ((n - 1) / 2, 0)
+    faces = np.array([(k, k + 1, n + k + 1, n + k) for k in range(n - 1)])
+    status = np.r_[np.full(n, 2), status]
+    slip = np.zeros((2 * n, 2)) if slip is None else slip
+    disc = ContactMap(x, faces, np.ones((2 * n, 3)), slip, status, np.zeros(2 * n))
+    parameters = SimpleNamespace(radius=np.linalg.norm(x, axis=1).max())
+    return SimpleNamespace(disc=lambda step: disc, area=np.ones(2 * n), parameters=parameters)
+
+
+def test_zones_are_pieces_connected_by_edges():
+    """Stick zones are counted by edges of faces; nodes across a diagonal are not neighbours."""
+    assert zones(strip([2, 2, 2, 2, 2]), 1).count == 0
+    assert zones(strip([1, 1, 2, 1, 2]), 1).count == 2
+    assert zones(strip([1, 1, 1, 1, 1]), 1).count == 1
+    diagonal = strip([2, 2, 1, 2, 2])
+    diagonal.disc(1).status[1] = 1  # below and beside it
+    assert zones(diagonal, 1).count == 2
+    assert zones(diagonal, 1).fraction == pytest.approx(0.2)
+    assert np.isnan(zones(diagonal, 1).inner)
+    run = strip([2, 2, 2, 2, 2])
+    run.disc(1).slip_increment[0] = (0.1, 0)  # from the left end to the middle
+    assert zones(run, 1).inner == pytest.approx(2 / np.hypot(2, 1))
+
+
+def curve(force, slip, loading):
+    """A run of one cycle with a given force-slip curve."""
+    zero = np.zeros(len(slip))
+    table = dict(zip(("contact0_force_z", "node0_displacement_t1"), map(np.array, (force, slip))))
+    table["node0_displacement_t2"] = zero
+    return SimpleNamespace(
+        table=table, loaded=lambda c: loading, unloaded=lambda c: len(slip) if c else 0
+    )
+
+
+def test_plateau_and_hysteresis_of_known_curves():
+    """A straight way up and back has neither; a point that waits at the peak waits after it."""
+    straight = curve([1, 2, 1, 0], [1, 2, 1, 0], 2)
+    assert hysteresis(straight, 1) == pytest.approx(0, abs=1e-15)
+    assert plateau(straight, 1) == (0, 0)
+    waits = curve([1, 2, 1, 0], [1, 2, 2, 0], 2)
+    assert plateau(waits, 1) == (0, 0.5)
+    assert hysteresis(waits, 1) == pytest.approx(0.5)
+    assert plateau(curve([1, 2, 3, 2, 0], [2, 2, 2, 1, 0], 3), 1) == (pytest.approx(2 / 3), 0)
+
+
+def test_programme_with_an_end_per_unloading():
+    """``unload_to`` may be one number or one per cycle; anything else is refused by name."""
+    parameters = Parameters(cycles=3, loading=1, unloading=1, unload_to=(0.05, 0.02, 0.0))
+    assert programme(parameters) == [0.1, 0.05, 0.1, 0.02, 0.1, 0.0]
+    for wrong in ((0.01, 0.02), (0.01, 0.02, 0.2), -0.1, (0.0, 0.0, np.nan), ()):
+        with pytest.raises(ValueError, match="unload_to"):
+            programme(Parameters(cycles=3, unload_to=wrong))
+
+
+def test_other_settings_begin_anew(study):
+    """A complete run costs nothing the second time; one with another number is computed again."""
+    directory = study / "runs" / "again"
+    mesh = dict(divisions=2, layers=1)
+    parameters = Parameters(loading=1, unloading=1)
+    for wanted in (parameters, parameters, Parameters(loading=1, unloading=2)):
+        before = None if COMM.rank or not directory.exists() else directory.stat().st_ctime_ns
+        compute(wanted, directory, **mesh)
+        COMM.barrier()
+        run = Run(directory)
+        assert len(run.table["step"]) == wanted.loading + wanted.unloading
+        assert run.parameters == wanted
+        if COMM.rank == 0 and before and wanted == parameters:
+            assert directory.stat().st_ctime_ns == before
+        COMM.barrier()
+
+
+@pytest.mark.skipif(COMM.size > 1, reason="starts processes of its own")
+def test_killed_study_continues_to_the_same_bits(tmp_path):
+    """Killed at any moment, twice, and started again, it ends with the numbers of one never killed."""
+    launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
+    alone = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
+    command = [sys.executable, DEMOS / "study_punch.py", *COARSE, "--cases", "C", "--data-only"]
+
+    def start(directory):
+        return subprocess.Popen(
+            [*command, "--output", directory], stderr=subprocess.PIPE, env=alone
+        )
+
+    for step in (4, 17):
+        process = start(tmp_path / "killed")
+        run = tmp_path / "killed" / "runs" / "base" / "C"
+        deadline = time.monotonic() + 100
+        while not any(int(f.stem[-4:]) >= step for f in run.glob("checkpoint_*.npz")):
+            assert process.poll() is None and time.monotonic() < deadline
+            time.sleep(1e-3)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        assert process.returncode == -signal.SIGKILL
+        assert len(list((run / "steps").iterdir())) < 30
+    for name in ("killed", "straight"):
+        process = start(tmp_path / name)
+        said = process.communicate(timeout=100)[1].decode()
+        assert process.returncode == 0, said
+    killed, straight = (tmp_path / n / "runs" / "base" / "C" for n in ("killed", "straight"))
+    one, other = (rows(run / "history.csv") for run in (killed, straight))
+    assert len(one) == len(other) == 30
+    for a, b in zip(one, other):
+        assert {**a, "seconds": None} == {**b, "seconds": None}
+    for k in range(1, 31):
+        fields = [np.load(run / "steps" / f"{k:04d}.npz") for run in (killed, straight)]
+        for name in fields[0].files:
+            assert np.array_equal(fields[0][name], fields[1][name]), (k, name)
