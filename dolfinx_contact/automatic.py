@@ -10,7 +10,7 @@ from dolfinx_contact import condensed
 from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.fixed_point import FixedPoint
 
-CROSSOVER = 1500  # contact nodes, see docs/solvers.md
+CROSSOVER = 400  # contact nodes, see docs/solvers.md
 
 
 class Automatic:

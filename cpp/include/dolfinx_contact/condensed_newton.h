@@ -131,10 +131,35 @@ NodeStep<T> by_stiffness(const System<T> &system, Index i, const Point<T> &at,
     return step;
 }
 
+/// Solves J y = rhs with factors in single precision and iterative refinement; false if that does
+/// not converge, because J is too badly conditioned for it.
+inline bool solve_in_single(const MatrixXd &J, const VectorXd &rhs, VectorXd &y) {
+    constexpr double accuracy = 1e-12, contraction = 0.1;
+    const double scale = rhs.lpNorm<Eigen::Infinity>();
+    Eigen::MatrixXf single = J.cast<float>();
+    const Eigen::PartialPivLU<Eigen::Ref<Eigen::MatrixXf>> lu(single);
+    y.setZero(rhs.size());
+    VectorXd rest = rhs;
+    for (double size = scale; size > accuracy * scale;) {
+        const Eigen::VectorXf unit = (rest / size).cast<float>();
+        y += size * lu.solve(unit).cast<double>();
+        rest = rhs - J * y;
+        const double after = rest.lpNorm<Eigen::Infinity>();
+        if (!(after <= contraction * size))
+            return after <= 1e2 * accuracy * scale;
+        size = after;
+    }
+    return true;
+}
+
 /// Solves J y = rhs. J is singular where W is, with more contacts than the body has degrees of
 /// freedom; the shortest of the steps that fit best is taken then.
 inline VectorXd solve_any_rank(const MatrixXd &J, const VectorXd &rhs) {
     constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
+    constexpr Index worth_it = 128; // below, double precision costs nothing
+    VectorXd y;
+    if (J.rows() >= worth_it && solve_in_single(J, rhs, y))
+        return y;
     {
         const Eigen::PartialPivLU<MatrixXd> lu(J);
         if (lu.rcond() > smallest_rcond)
