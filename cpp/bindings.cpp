@@ -163,7 +163,14 @@ PyLaw<T> make_py_law(const Array &mu, const std::optional<Array> &p,
             throw py::value_error("axes have no meaning in two dimensions");
         view("axes", *axes, {uniform ? axes->shape(0) : mu.shape(0), 2});
         law.nodes = axes->shape(0);
-        law.axes = Array::ensure(axes->attr("copy")());
+        const bool turns = std::visit(
+            [](const auto &source) {
+                using Law = typename std::decay_t<decltype(source)>::Law;
+                return Law::tangents == 2 && !is_isotropic<Law>;
+            },
+            law.any);
+        if (turns) // others are the same in every direction
+            law.axes = Array::ensure(axes->attr("copy")());
     }
     return law;
 }

@@ -50,6 +50,9 @@ class Friction:
             ``shape=(n, 2)`` with a pair for each node. Zero is frictionless.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
+        axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
+            ``(cos, sin)`` in the tangential part of the local frame, ``shape=(n, 2)``. Omitted: the
+            frame's own first direction.
 
     Raises:
         ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
@@ -58,14 +61,15 @@ class Friction:
     Attributes:
         mu: ``shape=(2,)`` or ``(n, 2)``.
         p: Normalised to ``max(p / mu) = 1``, same shape as ``mu``; zero where ``mu`` is.
+        axes: ``shape=(n, 2)`` or None.
         frictionless: All ``mu`` are zero.
         isotropic: Both directions have the same ``mu`` and ``p`` everywhere.
         associated: ``p`` is proportional to ``mu`` everywhere.
     """
 
-    __slots__ = ("mu", "p", "frictionless", "isotropic", "associated", "_laws")
+    __slots__ = ("mu", "p", "axes", "frictionless", "isotropic", "associated", "_laws")
 
-    def __init__(self, mu, p=None, k=None):
+    def __init__(self, mu, p=None, k=None, *, axes=None):
         given = f"mu={mu!r}, p={p!r}, k={k!r}"
         mu_given = mu
         mu = _coefficients("mu", mu)
@@ -116,6 +120,7 @@ class Friction:
         set_ = object.__setattr__
         set_(self, "mu", mu)
         set_(self, "p", p)
+        set_(self, "axes", None if axes is None else _unit_vectors(axes, mu))
         set_(self, "frictionless", not positive.any())
         set_(self, "associated", bool(np.all(q == 1.0)))
         set_(self, "isotropic", self.associated and bool(np.all(mu[..., 0] == mu[..., 1])))
@@ -128,7 +133,7 @@ class Friction:
 
     def __reduce__(self):
         p = np.where(self.mu > 0, self.p, 1.0)
-        return Friction, (self.mu, p)
+        return _restore, (self.mu, p, self.axes)
 
     def __repr__(self):
         if self.mu.ndim == 2:
@@ -153,12 +158,14 @@ class Friction:
                 "in two dimensions there is one tangential direction: give mu as one number and no "
                 f"p, not {self!r}"
             )
+        if dim == 2 and self.axes is not None:
+            raise ValueError("in two dimensions there is one tangential direction: give no axes")
         if dim not in self._laws:
             mu = np.ascontiguousarray(self.mu[..., : dim - 1])
             p = None
             if not self.associated:
                 p = np.where(self.mu > 0, self.p, 1.0)
-            self._laws[dim] = _kernel.make_law(mu, p, dim)
+            self._laws[dim] = _kernel.make_law(mu, p, dim, self.axes)
         return self._laws[dim]
 
 
@@ -173,3 +180,27 @@ def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
     positive = np.where(mu > 0, mu, 1.0)
     log_q = (float(exponent) - 1.0) * np.log(positive)
     return np.exp(log_q - log_q.max(axis=-1, keepdims=True))
+
+
+def _unit_vectors(axes, mu: np.ndarray) -> np.ndarray:
+    given = np.asarray(axes)
+    if given.dtype.kind != "f" or given.ndim != 2 or given.shape[1] != 2:
+        raise ValueError(
+            f"axes must be real numbers of shape (n, 2), not {given.dtype} of {given.shape}"
+        )
+    if mu.ndim == 2 and len(given) != len(mu):
+        raise ValueError(f"axes are for {len(given)} nodes, mu for {len(mu)}")
+    length = np.linalg.norm(given, axis=1)
+    wrong = ~(np.abs(length - 1.0) < 1e-6)
+    if wrong.any():
+        raise ValueError(
+            f"axes must be unit vectors (cos, sin), not {given[wrong][0]} of length "
+            f"{length[wrong][0]}"
+        )
+    unit = given.astype(np.float64) / length[:, None]
+    unit.flags.writeable = False
+    return unit
+
+
+def _restore(mu, p, axes) -> Friction:
+    return Friction(mu, p, axes=axes)

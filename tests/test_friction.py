@@ -72,6 +72,18 @@ def test_coefficients_per_node():
     assert Friction((0.3, 0.15), p=np.ones((4, 2))).mu.shape == (4, 2)
 
 
+def test_axes_per_node():
+    """Principal axes are kept as unit vectors; they matter only where friction is not isotropic, and
+    have no meaning in two dimensions."""
+    axes = np.array([[1.0, 0.0], [0.6, 0.8]])
+    friction = Friction((0.3, 0.1), axes=axes)
+    assert np.array_equal(friction.axes, axes) and friction.law(3).nodes == 2
+    assert np.array_equal(pickle.loads(pickle.dumps(friction)).axes, axes)
+    assert Friction(0.3, axes=axes).law(3).kind == "isotropic"
+    with pytest.raises(ValueError, match="give no axes"):
+        Friction(0.3, axes=axes).law(2)
+
+
 def test_immutable_and_unchanged_by_a_pickle():
     """Nothing of a Friction can be assigned, and a copy by pickle is the same law."""
     for friction in (Friction((0.3, 0.15), (0.05, 0.2)), Friction(0), Friction(np.ones((2, 2)))):
@@ -114,6 +126,10 @@ def test_immutable_and_unchanged_by_a_pickle():
         (dict(mu=0.3, k=np.nan), ("k", "nan")),
         (dict(mu=0.3, k=True), ("k", "True")),
         (dict(mu=0.3, k=(1, 2)), ("k", "(1, 2)")),
+        (dict(mu=0.3, axes=np.ones((2, 2))), ("axes", "1.41421", "unit vectors")),
+        (dict(mu=0.3, axes=np.array([[np.nan, 0]])), ("axes", "nan")),
+        (dict(mu=0.3, axes=np.ones(2)), ("axes", "(2,)")),
+        (dict(mu=np.ones((3, 2)), axes=np.array([[1.0, 0]])), ("axes", "1", "3")),
     ],
     ids=repr,
 )

@@ -189,15 +189,15 @@ template <int T> struct Block {
 template <class Source, class F, int T>
 void finish(const Source &source, F f, std::size_t first, int size, Block<T> &block) {
     const auto law = [&](int i) { return source(first + static_cast<std::size_t>(i)); };
-    const auto equation = [&](int i) {
-        Local<T> p;
+    const auto p = [&](int i) {
+        Local<T> v;
         for (int k = 0; k <= T; ++k)
-            p[k] = block.p[k][i];
-        return f.equation(law(i), p);
+            v[k] = block.p[k][i];
+        return v;
     };
+    const auto equation = [&](int i) { return f.equation(law(i), p(i)); };
     const auto keep = [&](int i, const SecularRoot<T> &root) {
-        const double R = f.radius(block.p[T][i], block.scale[i], root.s);
-        block.keep(CodedReaction<T>{boundary_point(law(i), R, root.e), 2.0}, i);
+        block.keep(CodedReaction<T>{f.point(law(i), p(i), block.scale[i], root), 2.0}, i);
     };
     int nodes[block_size], count = 0;
     for (int i = 0; i < size; ++i) {

@@ -34,16 +34,6 @@ template <int T> struct Start {
 /// In the place of a branch: a boundary point, for which a secular equation is to be solved.
 inline constexpr double unfinished = 3.0;
 
-/// Point R (M e, 1) of the boundary of the cone, |e| = 1.
-template <class Law, int T = Law::tangents>
-Local<T> boundary_point(const Law &law, double R, const Tangent<T> &e) {
-    Local<T> r;
-    for (int i = 0; i < T; ++i)
-        r[i] = law.mu(i) * (R * e[i]);
-    r[T] = R;
-    return r;
-}
-
 /// The root of an equation that a law gave: closed form where all b_i and all c_i are the same.
 template <class Law, int T = Law::tangents>
 SecularRoot<T> root_for(const Law &, const SecularEquation<T> &equation) {
@@ -100,9 +90,19 @@ template <class Law, int T = Law::tangents>
     return start;
 }
 
-/// R of the boundary point of a Euclidean projection.
-inline double euclidean_radius(double p_n, double scale, double s) {
-    return (std::max(p_n, 0.0) + s) * scale;
+/// Boundary point of a Euclidean projection. R mu_i e_i = p_i (1 - g_i) = p_i R mu_i^2 / d_i with
+/// g_i = (R - p_n) / d_i: of the two, the one with the smaller rounding error.
+template <class Law, int T = Law::tangents>
+Local<T> euclidean_point(const Law &law, const Local<T> &p, double scale,
+                         const SecularRoot<T> &root) {
+    const double R = std::max(p[T], 0.0) + root.s, drop = std::max(-p[T], 0.0) + root.s;
+    Local<T> r;
+    for (int i = 0; i < T; ++i) {
+        const double g = drop / root.d[i], mu2 = law.mu(i) * law.mu(i);
+        r[i] = (g < 0.5 ? p[i] - p[i] * g : p[i] * (R * mu2 / root.d[i])) * scale;
+    }
+    r[T] = R * scale;
+    return r;
 }
 
 /// Derivative of a projection on the branches that are not the boundary.
@@ -153,8 +153,7 @@ Reaction<T> project(const Law &law, const Local<T> &tau, Jacobian<T> *derivative
             const SecularRoot<T> root = root_for(law, boundary_equation(law, start.p));
             if (derivative)
                 *derivative = boundary_derivative(law, start.p[T], root);
-            const double R = euclidean_radius(start.p[T], start.scale, root.s);
-            return {boundary_point(law, R, root.e), Branch::slip};
+            return {euclidean_point(law, start.p, start.scale, root), Branch::slip};
         }
     if (derivative)
         *derivative = derivative_off_boundary<T>(start.branch);

@@ -18,8 +18,8 @@ template <int T> struct State {
 };
 
 // Where the boundary branch of a map needs the root of a secular equation, its object gives a
-// Start, and says of what equation, and which radius R of the boundary point the root means. The
-// equations of many nodes are then solved side by side.
+// Start, and says of which equation, and which boundary point the root stands for. The equations of
+// many nodes are then solved side by side.
 
 struct EuclideanProjection {
     template <class Law, class S>
@@ -29,8 +29,9 @@ struct EuclideanProjection {
     template <class Law, class P> auto equation(const Law &law, const P &p) const {
         return boundary_equation(law, p);
     }
-    double radius(double p_n, double scale, double s) const {
-        return euclidean_radius(p_n, scale, s);
+    template <class Law, class P, class Root>
+    auto point(const Law &law, const P &p, double scale, const Root &root) const {
+        return euclidean_point(law, p, scale, root);
     }
 };
 
@@ -49,7 +50,10 @@ struct ReturnMap {
     template <class Law, class P> auto equation(const Law &law, const P &p) const {
         return return_equation(law, p);
     }
-    double radius(double, double scale, double) const { return scale; }
+    template <class Law, class P, class Root>
+    auto point(const Law &law, const P &, double scale, const Root &root) const {
+        return return_point(law, scale, root);
+    }
 };
 
 struct ScaledMap {

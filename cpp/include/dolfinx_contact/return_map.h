@@ -39,6 +39,16 @@ SecularEquation<T> return_equation(const Law &law, const Local<T> &p) {
     return {p.template head<T>(), inverse_p_squared(law), Tangent<T>::Constant(p[T])};
 }
 
+/// Boundary point R (M e, 1).
+template <class Law, int T = Law::tangents>
+Local<T> return_point(const Law &law, double R, const SecularRoot<T> &root) {
+    Local<T> r;
+    for (int i = 0; i < T; ++i)
+        r[i] = law.mu(i) * (R * root.e[i]);
+    r[T] = R;
+    return r;
+}
+
 /// Derivative of the boundary branch by (tau, R): with c = R / |z|, g_i = e_i / d_i, v_i = g_i /
 /// p_i^2, S = sum e_i v_i,  dx_i = c dz_i / d_i - v_i (c g . dz - dR) / S.
 template <class Law, int T = Law::tangents>
@@ -78,7 +88,7 @@ Reaction<T> return_map(const Law &law, const Local<T> &r, double gap, const Tang
             const SecularRoot<T> root = root_for(law, equation);
             if (derivative)
                 *derivative = return_derivative(law, equation, root);
-            return {boundary_point(law, start.scale, root.e), Branch::slip};
+            return {return_point(law, start.scale, root), Branch::slip};
         }
     if (derivative)
         *derivative = derivative_off_boundary<T>(start.branch);
