@@ -2,9 +2,10 @@
 # make study    six cycles of cases A, B, C: all figures on one page, results/study/study.html;
 #               EXPLORE=1 also computes what the paper leaves open
 # make test     all tests: the C++ ones, and the Python ones on 1, 2 and 3 MPI ranks
+# make stress   every solver on some 480 scenes, each answer judged by the NumPy twin; resumable
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study test test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress test test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -12,6 +13,9 @@ made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 
 punch: .venv/ready
 	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
+
+stress: .venv/ready
+	.venv/bin/python benchmarks/stress.py --output results/stress $(ARGS)
 
 study: .venv/ready
 	.venv/bin/python demos/study_punch.py --output results/study $(if $(EXPLORE),--explore) $(ARGS)
