@@ -92,7 +92,7 @@ def block(depth: float, friction: dc.Friction, comm=COMM) -> dc.ContactProblem:
 
 
 # %%
-STRAIGHT = 10  # steps before the turn, and after it
+STRAIGHT = 6  # steps before the turn, and after it
 
 
 def path() -> np.ndarray:
