@@ -93,17 +93,17 @@ template <int T> struct PyLaw {
             return value;
         }
 
-        template <class F> py::tuple reaction(F f) const {
+        template <class F> std::pair<Array, Branches> reaction(F f) const {
             Array value = vectors();
             Branches branch({n});
             Outputs out;
             out.value = written(value);
             out.branch = written(branch);
             run(out, f);
-            return py::make_tuple(value, branch);
+            return {value, branch};
         }
 
-        template <class F> py::tuple linearisation(F f) const {
+        template <class F> std::tuple<Array, Branches, Array, Array> linearisation(F f) const {
             Array value = vectors(), by_reaction = zeros<double>({n, D, D}),
                   by_motion = zeros<double>({n, D, D});
             Branches branch({n});
@@ -113,7 +113,7 @@ template <int T> struct PyLaw {
             out.by_reaction = written(by_reaction);
             out.by_motion = written(by_motion);
             run(out, f);
-            return py::make_tuple(value, branch, by_reaction, by_motion);
+            return {value, branch, by_reaction, by_motion};
         }
 
       private:
@@ -224,8 +224,8 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
     law.def(
         "project_jacobian",
         [](const Law &self, const Array &tau) {
-            const py::tuple all = Call(self, "tau", tau).linearisation(ProjectionJacobian{});
-            return py::make_tuple(all[0], all[1], all[2]);
+            const auto all = Call(self, "tau", tau).linearisation(ProjectionJacobian{});
+            return std::make_tuple(std::get<0>(all), std::get<1>(all), std::get<2>(all));
         },
         tau, "project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))");
     law.def(

@@ -1,0 +1,349 @@
+"""
+Kernel of dolfinx_contact: friction law, cone and maps on NumPy arrays.
+
+Local frame (t1, t2, n), or (t, n) in two dimensions. r, tau: (n, dim); gap, rho:
+(n,); slip: (n, dim - 1); branch: uint8, 0 open, 1 stick, 2 slip. All float64 of any
+strides, read in place.
+"""
+
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+
+__all__: list[str] = [
+    "CondensedAttempt",
+    "CondensedOperator",
+    "CondensedSolution",
+    "Law2D",
+    "Law3D",
+    "make_law",
+]
+
+class Law2D:
+    def bipotential_gap(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gap of the bi-potential for r in the cone and gap >= 0, shape (n,)
+        """
+    def bipotential_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        bipotential_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def bipotential_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Predictor and corrector of [dSFMH07, Section 2]: (r, branch)
+        """
+    def load_function(
+        self, r: numpy.typing.NDArray[numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        f = |M^-1 r_t| - r_n, shape (n,)  [dSFMH07, Eq. (1)]
+        """
+    def project(
+        self, tau: numpy.typing.NDArray[numpy.float64]
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Euclidean projection on the friction cone: (r, branch)  [dSFMH07, Section 2]
+        """
+    def project_jacobian(
+        self, tau: numpy.typing.NDArray[numpy.float64]
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))
+        """
+    def return_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho_n: numpy.typing.NDArray[numpy.float64],
+        rho_t: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        return_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def return_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho_n: numpy.typing.NDArray[numpy.float64],
+        rho_t: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Projection in the metric of the slip rule: (r, branch)
+        """
+    def scaled_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        scaled_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def scaled_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        The same in scaled variables, in closed form: (r, branch)
+        """
+    def slip_defect(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        branch: numpy.typing.NDArray[numpy.uint8],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Part of the slip increment that the slip rule does not explain, (n,)
+        """
+    @property
+    def dim(self) -> int: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def nodes(self) -> int | None:
+        """
+        Number of nodes it has coefficients for, or None.
+        """
+
+class Law3D:
+    def bipotential_gap(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gap of the bi-potential for r in the cone and gap >= 0, shape (n,)
+        """
+    def bipotential_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        bipotential_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def bipotential_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Predictor and corrector of [dSFMH07, Section 2]: (r, branch)
+        """
+    def load_function(
+        self, r: numpy.typing.NDArray[numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        f = |M^-1 r_t| - r_n, shape (n,)  [dSFMH07, Eq. (1)]
+        """
+    def project(
+        self, tau: numpy.typing.NDArray[numpy.float64]
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Euclidean projection on the friction cone: (r, branch)  [dSFMH07, Section 2]
+        """
+    def project_jacobian(
+        self, tau: numpy.typing.NDArray[numpy.float64]
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))
+        """
+    def return_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho_n: numpy.typing.NDArray[numpy.float64],
+        rho_t: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        return_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def return_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho_n: numpy.typing.NDArray[numpy.float64],
+        rho_t: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Projection in the metric of the slip rule: (r, branch)
+        """
+    def scaled_jacobian(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.uint8],
+        numpy.typing.NDArray[numpy.float64],
+        numpy.typing.NDArray[numpy.float64],
+    ]:
+        """
+        scaled_map and its derivatives: (r, branch, by r, by (slip, gap))
+        """
+    def scaled_map(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        gap: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        rho: numpy.typing.NDArray[numpy.float64],
+    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        The same in scaled variables, in closed form: (r, branch)
+        """
+    def slip_defect(
+        self,
+        r: numpy.typing.NDArray[numpy.float64],
+        slip: numpy.typing.NDArray[numpy.float64],
+        branch: numpy.typing.NDArray[numpy.uint8],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Part of the slip increment that the slip rule does not explain, (n,)
+        """
+    @property
+    def dim(self) -> int: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def nodes(self) -> int | None:
+        """
+        Number of nodes it has coefficients for, or None.
+        """
+
+class CondensedAttempt:
+    @property
+    def branch(self) -> str: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def slip_error(self) -> float: ...
+
+class CondensedSolution:
+    @property
+    def branch(self) -> str: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def displacement(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def reaction(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def slip_error(self) -> float: ...
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.uint8]: ...
+    @property
+    def tried(self) -> list[CondensedAttempt]: ...
+
+class CondensedOperator:
+    def __init__(
+        self,
+        W: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        dim: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
+    def prepare(self) -> bool: ...
+    def solve(
+        self,
+        mu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        starts: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
+        tol: typing.SupportsFloat | typing.SupportsIndex,
+        slip_tol: typing.SupportsFloat | typing.SupportsIndex,
+        max_seconds: typing.SupportsFloat | typing.SupportsIndex,
+        max_iterations: typing.SupportsInt | typing.SupportsIndex,
+        newton_iterations: typing.SupportsInt | typing.SupportsIndex,
+        fallbacks: bool,
+    ) -> CondensedSolution: ...
+    @property
+    def dim(self) -> int: ...
+    @property
+    def nodes(self) -> int: ...
+
+def make_law(
+    mu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None,
+    dim: typing.SupportsInt | typing.SupportsIndex,
+    axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+) -> typing.Any:
+    """
+    The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).
+    """
