@@ -31,8 +31,8 @@ CAPTIONS = {  # in the order of the page; what to see in each figure stands in d
     "fig5": "Figure 5. Friction force at P against the programme.",
     "fig6": "Figure 6. Slip of P against the programme; shaded where P sticks.",
     "fig7": "Figure 7. Applied force against slip of P.",
-    "dissipation": "Work of friction per area, one logarithmic scale; values below it are in its lowest "
-    "colour, among them the few negative ones of the trapezoidal rule.",
+    "dissipation": "Work of friction per area by the trapezoidal rule, on one logarithmic scale; what is "
+    "below it has its lowest colour.",
     "wear": "Archard's worn depth: coefficient times work of friction over nodal area.",
     "cycles": "How the work of friction settles.",
     "energy": "The energy balance and what it leaves open in each step.",
@@ -49,13 +49,14 @@ algebra; the trapezoidal balance therefore closes for any increments, and its cl
 The trapezoidal rule is used for dissipation because it converges: see the table of variants.</p>"""
 
 
-def report(runs: dict[str, dict[str, Run]], output: Path, wear: float) -> None:
+def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=()) -> None:
     """Draw all figures, write all tables and the page.
 
     Args:
         runs: By variant and case; ``base`` is the paper's programme.
         output: Directory of the study.
         wear: Worn volume per work of friction, mm^3/(N mm).
+        failures: What did not converge, as text.
     """
     base = runs["base"]
     figures = Figures(base, output / "figures")
@@ -79,7 +80,7 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float) -> None:
     write_csv(here / "answers.csv", answers)
     write_csv(here / "statements.csv", verdicts(answers))
     write_csv(here / "times.csv", times(base))
-    (output / "study.html").write_text(page(base, here, wear), encoding="utf-8")
+    (output / "study.html").write_text(page(base, here, wear, failures), encoding="utf-8")
 
 
 def verdicts(answers: list[dict]) -> list[dict]:
@@ -131,7 +132,7 @@ def times(base: dict[str, Run]) -> list[dict]:
     ]
 
 
-def page(base: dict[str, Run], directory: Path, wear: float) -> str:
+def page(base: dict[str, Run], directory: Path, wear: float, failures=()) -> str:
     """The page, from the files in ``directory``: its numbers are those of the CSV files."""
     first = next(iter(base.values()))
     cases = ", ".join(base)
@@ -163,6 +164,7 @@ def page(base: dict[str, Run], directory: Path, wear: float) -> str:
         + f". Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it.</p>",
         "<h2>Variants</h2>",
         table(directory / "variants.csv"),
+        *(f"<p>Not converged: {html.escape(failure)}</p>" for failure in failures),
         "<h2>Times and errors</h2>",
         table(directory / "times.csv"),
         "<h2>Parameters</h2>",

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import argparse
 import logging
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 from punch import CASES, Parameters, programme
 from study_run import Run, compute
 from tqdm import tqdm
+
+import dolfinx_contact as dc
 
 # isort: split
 from mpi4py import MPI
@@ -68,20 +71,34 @@ def plan(options) -> dict[str, dict[str, Parameters]]:
     }
 
 
-def compute_all(runs, output: Path, points, mesh_options) -> dict[str, dict[str, Run]]:
-    """Compute what is missing, with one progress bar for everything; read it on rank 0."""
+def compute_all(runs, output: Path, points, mesh_options):
+    """Compute what is missing, with one progress bar for everything.
+
+    Returns:
+        Complete runs by variant and case, read by rank 0; and what did not converge, as text.
+    """
+    failures = []
     total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
     with tqdm(total=total, unit="step", disable=COMM.rank != 0, smoothing=0.1) as bar:
         for name, cases in runs.items():
             for case, parameters in cases.items():
                 bar.set_description(f"case {case}, {name}")
-                compute(parameters, directory_of(output, name, case), points, bar, **mesh_options)
+                directory = directory_of(output, name, case)
+                try:
+                    compute(parameters, directory, points, bar, **mesh_options)
+                except dc.NotConverged as error:  # a variant less, not a study less
+                    failures.append(f"case {case}, {name}: {error}")
     if COMM.rank != 0:
-        return {}
-    return {
-        name: {case: Run(directory_of(output, name, case)) for case in cases}
+        return {}, failures
+    complete = {
+        name: {
+            case: run
+            for case, run in ((case, Run(directory_of(output, name, case))) for case in cases)
+            if run.complete
+        }
         for name, cases in runs.items()
     }
+    return {name: cases for name, cases in complete.items() if cases}, failures
 
 
 def directory_of(output: Path, name: str, case: str) -> Path:
@@ -124,12 +141,15 @@ def main(argv=None) -> None:
     options = arguments(argv)
     mesh_options = dict(divisions=options.divisions, layers=options.layers)
     more_points = [tuple(point) for point in (options.point or [])[1:]]
-    runs = compute_all(plan(options), options.output, more_points, mesh_options)
+    runs, failures = compute_all(plan(options), options.output, more_points, mesh_options)
+    if any(", base:" in failure for failure in failures):
+        sys.exit("\n".join(failures) if COMM.rank == 0 else 1)
     if options.data_only or COMM.rank != 0:
         return
     from study_page import report  # draws: not needed by the other ranks
 
-    report(runs, options.output, options.wear_coefficient)
+    print(*failures, "drawing", sep="\n")
+    report(runs, options.output, options.wear_coefficient, failures)
     print(f"page      {options.output / 'study.html'}\nfigures   {options.output / 'figures'}")
 
 

@@ -205,6 +205,11 @@ class Run:
         self.friction = CASES[self.parameters.case]
 
     @property
+    def complete(self) -> bool:
+        """Whether all steps were computed."""
+        return len(self.table["step"]) == self.unloaded(self.parameters.cycles)
+
+    @property
     def case(self) -> str:
         return self.parameters.case
 

@@ -25,7 +25,7 @@ from study_run import Run
 
 SMALL = 0.05  # what "quasi-linear" and "no noticeable difference" may deviate, relative
 ROUNDING = 1e-9  # radii that differ by less, over R, are one
-NOT_ASKED = np.nan, None  # of runs with one cycle, or without anything to compare
+NOT_ASKED = np.nan, None  # of runs without anything to compare
 
 
 class Statement(NamedTuple):
@@ -38,6 +38,16 @@ class Statement(NamedTuple):
     cases: str  # which cases it is about; several at once if ``together``
     decide: Callable  # Run, or dict of Runs by case -> value, whether it holds
     together: bool = False
+
+
+def _later(decide):
+    """The same question, asked only of runs with a second cycle."""
+
+    def asked(subject):
+        runs = subject.values() if isinstance(subject, dict) else [subject]
+        return NOT_ASKED if any(run.parameters.cycles == 1 for run in runs) else decide(subject)
+
+    return asked
 
 
 def _centre(run):
@@ -53,21 +63,19 @@ def _peripheral(run):
 
 def _shrink(run):
     first, last = (zones(run, run.unloaded(c)).fraction for c in (1, run.parameters.cycles))
-    if run.parameters.cycles == 1 or not first:
+    if not first:
         return NOT_ASKED
     return last / first, last < 0.9 * first
 
 
 def _fragment(run):
     first, last = (zones(run, run.unloaded(c)).count for c in (1, run.parameters.cycles))
-    if run.parameters.cycles == 1 or not first:
+    if not first:
         return NOT_ASKED
     return last - first, last > first
 
 
 def _within(run):
-    if run.parameters.cycles == 1:
-        return NOT_ASKED
     counts = [z.count for z in unloading(run, 1)]
     ends = [zones(run, run.unloaded(c)).count for c in range(1, run.parameters.cycles + 1)]
     return float(np.ptp(counts) - np.ptp(ends)), np.ptp(counts) > np.ptp(ends)
@@ -103,15 +111,13 @@ def _asymmetric(cycle):
 def _plateau(side):
     def decide(run):
         parts = [plateau(run, c)[side] for c in range(2, run.parameters.cycles + 1)]
-        return (min(parts), min(parts) > 0) if parts else NOT_ASKED
+        return min(parts), min(parts) > 0
 
     return decide
 
 
 def _plateau_elsewhere(run):
     """Area of the nodes that slip in the last cycle but are still at its last loading increment."""
-    if run.parameters.cycles == 1:
-        return NOT_ASKED
     start, top, end = (
         run.unloaded(run.parameters.cycles - 1),
         *(step(run.parameters.cycles) for step in (run.loaded, run.unloaded)),
@@ -172,30 +178,30 @@ STATEMENTS = [
     Statement("peripheral", S + F(3), "During the first unloading the periphery (r > 3/4 R) "
         "begins to stick.", "area fraction of the periphery gained; > 0.1", "ABC", _peripheral),
     Statement("shrink", S + F(3), "From cycle to cycle the stick zones after unloading shrink.",
-        "stuck area, last cycle over first; < 0.9", "ABC", _shrink),
+        "stuck area, last cycle over first; < 0.9", "ABC", _later(_shrink)),
     Statement("fragment", S + F(3), "From cycle to cycle they break into more pieces.",
-        "pieces after the last unloading less those after the first; > 0", "ABC", _fragment),
+        "pieces after the last unloading less those after the first; > 0", "ABC", _later(_fragment)),
     Statement("reverse1", S + F(3), "Reverse slip begins at the rim and advances inwards "
         "(first unloading).", "change of its innermost radius / R; begins beyond 3/4, < 0",
         "ABC", _reverse(first)),
     Statement("reverseN", S + F(3), "Reverse slip begins at the rim and advances inwards "
-        "(last unloading).", "the same", "ABC", _reverse(last)),
+        "(last unloading).", "the same", "ABC", _later(_reverse(last))),
     Statement("A_closed", S + F(4), "Isotropic: loading and unloading show no noticeable difference "
         "in the force-slip curve of P (last cycle).", "difference in slip / range; <= 0.05",
-        "A", _bounded(hysteresis, last)),
+        "A", _later(_bounded(hysteresis, last))),
     Statement("BC_first", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
         "(first cycle).", "non-linearity of loading; <= 0.05 < that of unloading", "BC",
         _asymmetric(first)),
     Statement("BC_last", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
-        "(last cycle).", "the same", "BC", _asymmetric(last)),
+        "(last cycle).", "the same", "BC", _later(_asymmetric(last))),
     Statement("plateau", S + F(6), "From the second cycle on P is still at the end of loading, before "
-        "the peak.", "part of loading before the peak; > 0", "ABC", _plateau(0)),
+        "the peak.", "part of loading before the peak; > 0", "ABC", _later(_plateau(0))),
     Statement("plateau_elsewhere", S + F(6), "There are other choices of P for which it is so (last "
         "cycle).", "share of the area that slips in the cycle but is still before the peak; > 0.05",
-        "ABC", _plateau_elsewhere),
+        "ABC", _later(_plateau_elsewhere)),
     Statement("A_linear", S + F(7), "Isotropic: the force-slip curve is quasi-linear (loading of the "
         "last cycle).", "non-linearity of loading; <= 0.05", "A",
-        _bounded(loading_nonlinearity, last)),
+        _later(_bounded(loading_nonlinearity, last))),
     Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more "
         "than A by a fifth or more.", "all work of B over that of A; > 1.2", "AB",
         _against("A", "B", 1.2), True),
@@ -203,16 +209,16 @@ STATEMENTS = [
         "more than B by a fifth or more.", "all work of C over that of B; > 1.2", "BC",
         _against("B", "C", 1.2), True),
     Statement("within", "observed", "Stick zones break up within one unloading more than from cycle to "
-        "cycle.", "range of the pieces' number, within first less between; > 0", "ABC", _within),
+        "cycle.", "range of the pieces' number, within first less between; > 0", "ABC", _later(_within)),
     Statement("after", "observed", "From the second cycle on P is still after the peak.",
-        "part of unloading after the peak; > 0", "ABC", _plateau(1)),
+        "part of unloading after the peak; > 0", "ABC", _later(_plateau(1))),
     Statement("A_unlinear", "observed", "Even the isotropic force-slip curve is not quasi-linear (last "
         "cycle).", "non-linearity of loading; > 0.05", "A",
-        _bounded(loading_nonlinearity, last, above=True)),
+        _later(_bounded(loading_nonlinearity, last, above=True))),
     Statement("spread1", "observed", "The cases dissipate alike within 30 % or so (first cycle).",
         "largest over smallest work; <= 1.35", "ABC", _spread(first), True),
     Statement("spreadN", "observed", "The cases dissipate alike within 30 % or so (last cycle).",
-        "the same", "ABC", _spread(last), True),
+        "the same", "ABC", _later(_spread(last)), True),
     Statement("local", "observed", "Locally the cases differ tenfold.", "share of the area where "
         "the work differs tenfold; > 0.05", "ABC", _local, True),
 ]  # fmt: skip

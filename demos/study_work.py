@@ -176,15 +176,17 @@ def convergence(figures: Figures, rows: list[dict], runs) -> bool:
         figure = Figure(figsize=(11, 4.6), layout="constrained")
         for ax, (label, shown) in zip(figure.subplots(1, 2, sharey=True), panels):
             for case in figures.runs:
-                sizes = [size for size, _ in sorted(shown)]
+                mine = sorted((size, name) for size, name in shown if (name, case) in of)
+                sizes = [size for size, _ in mine]
                 style = dict(color=COLOURS[case], marker="osD"["ABC".index(case)])
                 for key, dash, rule in (
                     ("first_cycle_Nmm", "-", "trapezoidal"),
                     ("end_of_step_rule_Nmm", ":", "end of step"),
                 ):
-                    work = [of[name, case][key] for _, name in sorted(shown)]
+                    work = [of[name, case][key] for _, name in mine]
                     ax.semilogx(sizes, work, dash, label=f"{case}, {rule}", **style)
-            ax.set_xticks(sizes, [str(size) for size in sizes])
+            ticks = sorted({size for size, _ in shown})
+            ax.set_xticks(ticks, [str(size) for size in ticks])
             ax.minorticks_off()
             ax.set(xlabel=label)
             ax.grid(alpha=0.3)
