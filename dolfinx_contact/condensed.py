@@ -12,14 +12,14 @@ from petsc4py import PETSc
 
 from dolfinx_contact import _kernel
 from dolfinx_contact._errors import raised_together
-from dolfinx_contact.condensed_newton import CondensedNotConverged
+from dolfinx_contact.condensed_newton import CondensedNotConverged, principal_axes
 from dolfinx_contact.friction import Friction
 
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
 
 
 class CondensedBody:
-    """``w = q + W r`` of all contacts of a body, gathered from all ranks, in local frames.
+    """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
 
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
     sparse right-hand sides; it is held by rank 0 alone.  A degree of freedom fixed by a boundary
@@ -38,11 +38,13 @@ class CondensedBody:
         self.dim = self._contacts[0].frame.shape[0]
         # One row per local direction of a node: its global components, none at fixed dofs.
         dofs, components = [np.zeros((0, self.dim), int)], [np.zeros((0, self.dim, self.dim))]
+        turns = [np.zeros((0, self.dim, self.dim))]
         for contact in self._contacts:
             free = ~np.isin(contact._dofs, body.fixed)
             dofs.append(contact._dofs)
-            components.append(contact.frame[None] * free[:, None, :])
-        self._dofs, self._frames = np.concatenate(dofs), np.concatenate(components)
+            turns.append(principal_axes(contact.friction, len(free), self.dim))
+            components.append(turns[-1] @ contact.frame * free[:, None, :])
+        self._dofs, self._frames, self._turns = map(np.concatenate, (dofs, components, turns))
         self._counts = self.comm.allgather(len(self._dofs))
         self.nodes = sum(self._counts)
         _check_memory(self.comm, memory(self.nodes, self.dim))
@@ -67,7 +69,7 @@ class CondensedBody:
         for contact in self._contacts:
             contact.move(displacement)
             rows.append(np.column_stack((contact.slip_increment, contact.gap)))
-        return self.gather(np.concatenate(rows))
+        return self.gather(np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)))
 
     def forces(self, reaction: np.ndarray) -> np.ndarray:
         """Nodal forces of the reactions of all nodes, owned degrees of freedom, global frame."""
@@ -126,7 +128,7 @@ class CondensedBody:
         if first.mu.ndim == 1 and all(
             np.array_equal(f.mu, first.mu) and np.array_equal(f.p, first.p) for f in laws
         ):
-            return first
+            return Friction(first.mu, np.where(first.mu > 0, first.p, 1.0))
         sizes = [len(contact.nodes) for contact in self._contacts]
         mu, p = (
             self.gather(

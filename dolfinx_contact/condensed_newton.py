@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class CondensedNewton:
         self,
         *,
         slip_tol: float | None = None,
-        max_iterations: int = 10_000,
+        max_iterations: int = 50_000,
         newton_iterations: int = 60,
         max_seconds: float = math.inf,
         fallbacks: bool = True,
@@ -228,9 +228,35 @@ def solve_condensed(
     tol = positive("tol", tol)
     if tol < 1e-13:
         raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
-    return solver.solve_condensed(
-        _kernel.CondensedOperator(W, dim), friction, q, tol, () if r0 is None else [r0]
-    )
+    turns = principal_axes(friction, len(q), dim)
+    starts = () if r0 is None else [np.einsum("nij,nj->ni", turns, r0.reshape(q.shape))]
+    if friction.axes is not None:
+        blocks = W.reshape(len(q), dim, len(q), dim)
+        W = np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
+        q = np.einsum("nij,nj->ni", turns, q)
+    operator = _kernel.CondensedOperator(W, dim)
+    try:
+        return _turned_back(solver.solve_condensed(operator, friction, q, tol, starts), turns)
+    except CondensedNotConverged as failure:
+        raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
+
+
+def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
+    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
+    turns = np.tile(np.eye(dim), (nodes, 1, 1))
+    if friction.axes is not None:
+        cos, sin = friction.axes.T
+        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
+        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
+    return turns
+
+
+def _turned_back(result: CondensedResult, turns: np.ndarray) -> CondensedResult:
+    back = {
+        name: np.einsum("nji,nj->ni", turns, getattr(result, name))
+        for name in ("reaction", "displacement")
+    }
+    return replace(result, **back)
 
 
 def finite(name: str, value) -> np.ndarray:

@@ -270,3 +270,24 @@ def test_options_are_positive(name):
     for value in (0, -1, np.nan, "many"):
         with pytest.raises(ValueError, match=name):
             CondensedNewton(**{name: value})
+
+
+def test_axes_per_contact():
+    """Turning the principal directions is turning the tangential part of W and q."""
+    scene = random_problem(11, contacts=6, rank=18, mu_range=(0.1, 0.5), ratio=3)
+    angle = np.random.default_rng(1).uniform(0, 2 * np.pi, size=6)
+    turn = np.zeros((18, 18))
+    for i, a in enumerate(angle):
+        turn[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = [
+            [np.cos(a), np.sin(a), 0],
+            [-np.sin(a), np.cos(a), 0],
+            [0, 0, 1],
+        ]
+    axes = np.column_stack((np.cos(angle), np.sin(angle)))
+    mu, p = np.tile(scene.mu, (6, 1)), np.tile(scene.p, (6, 1))
+    straight = solve_condensed(scene.W, scene.q, Friction(mu, p))
+    turned = solve_condensed(
+        turn.T @ scene.W @ turn, (scene.q.ravel() @ turn).reshape(-1, 3), Friction(mu, p, axes=axes)
+    )
+    expected = (straight.reaction.ravel() @ turn).reshape(-1, 3)
+    assert turned.reaction == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
