@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from study_figures import COLOURS, NAMES, STYLE, Figures, write_csv
 from study_measures import total
 from study_run import Run
@@ -103,6 +104,9 @@ def cycles(figures: Figures, wear: float) -> list[dict]:
         work.set(title="Work of friction per cycle", ylabel="N mm", ylim=(0, None))
         settled.set(title="Its change to the cycle before", ylabel="relative")
         drift.set(title="Largest drift of a node per cycle", ylabel="µm")
+        drift.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        drift.yaxis.set_major_formatter("{x:g}")
+        drift.yaxis.set_minor_formatter(NullFormatter())
         for ax in (work, settled, drift):
             ax.set(xlabel="cycle", xticks=range(1, figures.cycles + 1))
             ax.grid(alpha=0.3)
