@@ -31,18 +31,21 @@ from study_run import EnergyBalance, Run, compute
 from study_work import TERMS
 
 COMM = MPI.COMM_WORLD
+ALONE = COMM.size == 1
 DEMOS = Path(__file__).parents[1] / "demos"
 COARSE = ["--divisions", "2", "--layers", "1", "--cycles", "2"]
 FIGURES = "fig3 fig4 fig5 fig6 fig7 fig4_node1 fig7_node1 unloading1 unloading_last".split()
-FIGURES += "dissipation wear cycles energy convergence".split()
+FIGURES += "dissipation wear cycles energy".split() + ["convergence"] * ALONE
 
 
 @pytest.fixture(scope="module")
 def study():
-    """Directory of a coarse study with all variants, shared by all ranks."""
+    """Directory of a coarse study, shared by all ranks; on one rank with all variants."""
     made = tempfile.mkdtemp() if COMM.rank == 0 else None
     directory = Path(COMM.bcast(made))
-    options = "--explore --explore-cycles 2 --explore-unload-to 0 --point 4 4 --point 9 1".split()
+    options = "--point 4 4 --point 9 1".split()
+    if ALONE:
+        options += "--explore --explore-cycles 2 --explore-unload-to 0".split()
     study_punch.main([*COARSE, *options, "--output", str(directory)])
     COMM.barrier()
     yield directory
@@ -99,7 +102,7 @@ def closes(table, needed):
         assert (terms[name] >= -1e-9 * largest).all(), name
 
 
-@pytest.mark.parametrize("variant", ["base", "unload_to_0_mm", "top_free"])
+@pytest.mark.parametrize("variant", ["base"] + ["unload_to_0_mm", "top_free"] * ALONE)
 def test_energy_balance_closes(study, variant):
     """Work of the platen = change of elastic energy + dissipation + what the scheme adds."""
     for case in "ABC":
@@ -127,7 +130,8 @@ def test_every_statement_is_decided_by_the_data(study):
     assert len(verdicts) == len({row["statement"] for row in answers}) > 15
     asked = {row["variant"] for row in answers}
     assert asked == {row["variant"] for row in rows(study / "figures" / "variants.csv")}
-    assert {"base", "top free", "unload to 0 mm", "mesh refined 1x"} <= asked
+    if ALONE:
+        assert {"base", "top free", "unload to 0 mm", "mesh refined 1x"} <= asked
     for verdict in verdicts:
         parts = re.findall(r"(\d+)/(\d+)", verdict["runs in which it holds"])
         held, of = (sum(int(part[k]) for part in parts) for k in (0, 1))
@@ -209,7 +213,7 @@ def test_other_settings_begin_anew(study):
         COMM.barrier()
 
 
-@pytest.mark.skipif(COMM.size > 1, reason="starts processes of its own")
+@pytest.mark.skipif(not ALONE, reason="starts processes of its own")
 def test_killed_study_continues_to_the_same_bits(tmp_path):
     """Killed at any moment, twice, and started again, it ends with the numbers of one never killed."""
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
