@@ -4,8 +4,11 @@ After each test the ranks meet. A rank that the others do not join within JOIN_S
 aborts the run; one that hangs alone is found in the same way by the others.
 """
 
+import atexit
 import os
+import shutil
 import sys
+import tempfile
 import time
 
 import hypothesis
@@ -19,6 +22,12 @@ failures = []  # what this rank would print at the end
 # The same examples on every rank and in every run.
 hypothesis.settings.register_profile("mpi", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("mpi")
+
+if comm.size > 1:
+    # pytest cleans up what it finds in its temporary directory, also what another rank needs there.
+    temporary = tempfile.mkdtemp(prefix=f"pytest-rank{comm.rank}-")
+    os.environ["PYTEST_DEBUG_TEMPROOT"] = temporary
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
 
 
 def meet(where):
