@@ -55,7 +55,8 @@ class LinearSolver:
                 vectors[-1].array_w[:] = mode
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.ksp.setOperators(A)
-        database = PETSc.Options(prefix)  # deletes what it sets: PETSc 3.18 has room for 512 options
+        # What is set is deleted again below: PETSc 3.18 has room for 512 options.
+        database = PETSc.Options(prefix)
         for key, value in options.items():
             database[key] = value
         self.ksp.setFromOptions()
