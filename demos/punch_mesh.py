@@ -22,7 +22,8 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
 
     Args:
         comm: MPI communicator; gmsh runs on its rank 0.
-        refine: Each level doubles ``divisions`` and ``layers``; 0 is the paper's mesh.
+        refine: Each level doubles ``divisions`` and ``layers``, a negative one halves them; 0 is the
+            paper's mesh.
         radius, height: Of the punch, length units.
         divisions: Quadrilaterals along each side of each of the five blocks; even, so that the
             axis of the punch is a line of nodes.
@@ -32,13 +33,16 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
 
     Raises:
-        ValueError: a negative ``refine``, an odd number of divisions, no layers, a size <= 0.
+        ValueError: a ``refine`` that is no whole number, or with it an odd number of divisions or no
+            whole number of layers; a size <= 0.
     """
-    if refine < 0 or refine != int(refine):
-        raise ValueError(f"refine must be a whole number >= 0, got {refine!r}.")
-    if divisions < 2 or divisions % 2 or layers < 1:
+    if refine != int(refine):
+        raise ValueError(f"refine must be a whole number, got {refine!r}.")
+    divisions, layers = divisions * 2.0**refine, layers * 2.0**refine
+    if divisions < 2 or divisions % 2 or layers < 1 or layers % 1:
         raise ValueError(
-            f"divisions must be even and >= 2, layers >= 1; got {divisions!r} and {layers!r}."
+            "divisions must be even and >= 2, layers whole and >= 1; with refine "
+            f"{refine!r} they are {divisions:g} and {layers:g}."
         )
     if not (0 < radius < math.inf and 0 < height < math.inf):
         raise ValueError(f"radius and height must be positive, got {radius!r} and {height!r}.")
@@ -47,7 +51,7 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         if comm.rank == 0:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.model.add("punch")
-            _build(height / radius, divisions * 2**refine, layers * 2**refine)
+            _build(height / radius, int(divisions), int(layers))
         punch = model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()

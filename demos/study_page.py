@@ -56,7 +56,7 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
         runs: By variant and case; ``base`` is the paper's programme.
         output: Directory of the study.
         wear: Worn volume per work of friction, mm^3/(N mm).
-        failures: What did not converge, as text.
+        failures: The variants that did not converge.
     """
     base = runs["base"]
     figures = Figures(base, output / "figures")
@@ -72,15 +72,16 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
     study_work.maps(figures, wear)
     study_work.cycles(figures, wear)
     study_work.energy(figures)
-    compared = study_work.comparison(runs)
-    study_work.convergence(figures, compared, runs)
     here = figures.directory
+    compared = study_work.comparison(runs, failures)
+    write_csv(here / "mesh.csv", study_work.mesh_orders(runs))
+    study_work.convergence(figures, compared, runs)
     write_csv(here / "variants.csv", compared)
-    answers = ask(runs)
+    answers = ask({name: cases for name, cases in runs.items() if name != "mesh coarsened"})
     write_csv(here / "answers.csv", answers)
     write_csv(here / "statements.csv", verdicts(answers))
     write_csv(here / "times.csv", times(base))
-    (output / "study.html").write_text(page(base, here, wear, failures), encoding="utf-8")
+    (output / "study.html").write_text(page(base, here, wear), encoding="utf-8")
 
 
 def verdicts(answers: list[dict]) -> list[dict]:
@@ -132,7 +133,7 @@ def times(base: dict[str, Run]) -> list[dict]:
     ]
 
 
-def page(base: dict[str, Run], directory: Path, wear: float, failures=()) -> str:
+def page(base: dict[str, Run], directory: Path, wear: float) -> str:
     """The page, from the files in ``directory``: its numbers are those of the CSV files."""
     first = next(iter(base.values()))
     cases = ", ".join(base)
@@ -164,7 +165,8 @@ def page(base: dict[str, Run], directory: Path, wear: float, failures=()) -> str
         + f". Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it.</p>",
         "<h2>Variants</h2>",
         table(directory / "variants.csv"),
-        *(f"<p>Not converged: {html.escape(failure)}</p>" for failure in failures),
+        "<p>Against the mesh: order of the last three meshes, and the limit if that order lasted.</p>",
+        table(directory / "mesh.csv"),
         "<h2>Times and errors</h2>",
         table(directory / "times.csv"),
         "<h2>Parameters</h2>",

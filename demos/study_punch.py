@@ -13,26 +13,22 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from mpi4py import MPI
 from punch import CASES, Parameters, programme
 from study_run import Run, compute
 from tqdm import tqdm
 
-import dolfinx_contact as dc
-
-# isort: split
-from mpi4py import MPI
-
 COMM = MPI.COMM_WORLD
 
 
-def variants(base: Parameters, cycles: int, unload_to, refine: int) -> dict[str, Parameters]:
+def variants(base: Parameters, cycles: int, unload_to, levels) -> dict[str, Parameters]:
     """What the paper leaves open, one change at a time.
 
     Args:
         base: What is changed.
         cycles: Of the variants, but for meshes: those run one cycle.
         unload_to: Ends of unloading, mm.
-        refine: How often the mesh is refined, each time one variant.
+        levels: How often the mesh is refined, for each variant; -1 coarsens it.
     """
     few = replace(base, cycles=cycles)
     runs = {f"unload to {low:g} mm": replace(few, unload_to=low) for low in unload_to}
@@ -43,8 +39,9 @@ def variants(base: Parameters, cycles: int, unload_to, refine: int) -> dict[str,
         increments = factor * base.loading, factor * base.unloading
         name = "{}+{} increments".format(*increments)
         runs[name] = replace(few, loading=increments[0], unloading=increments[1])
-    for level in range(1, refine + 1):
-        runs[f"mesh refined {level}x"] = replace(base, cycles=1, refine=base.refine + level)
+    for level in levels:
+        name = f"mesh refined {level}x" if level > 0 else "mesh coarsened"
+        runs[name] = replace(base, cycles=1, refine=base.refine + level)
     return runs
 
 
@@ -64,7 +61,11 @@ def plan(options) -> dict[str, dict[str, Parameters]]:
     runs = {"base": base}
     if options.explore:
         ends = [low for low in options.explore_unload_to if low != base.unload_to]
-        runs.update(variants(base, options.explore_cycles, ends, options.explore_refine))
+        halves = (
+            options.divisions * 2**options.refine % 4 == options.layers * 2**options.refine % 2 == 0
+        )
+        levels = [-1] * halves + list(range(1, options.explore_refine + 1))
+        runs.update(variants(base, options.explore_cycles, ends, levels))
     return {
         name: {case: replace(parameters, case=case) for case in options.cases}
         for name, parameters in runs.items()
@@ -75,7 +76,7 @@ def compute_all(runs, output: Path, points, mesh_options):
     """Compute what is missing, with one progress bar for everything.
 
     Returns:
-        Complete runs by variant and case, read by rank 0; and what did not converge, as text.
+        Complete runs by variant and case, read by rank 0; and those that did not converge.
     """
     failures = []
     total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
@@ -84,17 +85,17 @@ def compute_all(runs, output: Path, points, mesh_options):
             for case, parameters in cases.items():
                 bar.set_description(f"case {case}, {name}")
                 directory = directory_of(output, name, case)
-                try:
-                    compute(parameters, directory, points, bar, **mesh_options)
-                except dc.NotConverged as error:  # a variant less, not a study less
-                    failures.append(f"case {case}, {name}: {error}")
+                reason = compute(parameters, directory, points, bar, **mesh_options)
+                if reason:  # a variant less, not a study less
+                    failures.append({"variant": name, "case": case, "not_converged": reason})
     if COMM.rank != 0:
         return {}, failures
+    failed = [(failure["variant"], failure["case"]) for failure in failures]
     complete = {
         name: {
-            case: run
-            for case, run in ((case, Run(directory_of(output, name, case))) for case in cases)
-            if run.complete
+            case: Run(directory_of(output, name, case))
+            for case in cases
+            if (name, case) not in failed
         }
         for name, cases in runs.items()
     }
@@ -142,13 +143,14 @@ def main(argv=None) -> None:
     mesh_options = dict(divisions=options.divisions, layers=options.layers)
     more_points = [tuple(point) for point in (options.point or [])[1:]]
     runs, failures = compute_all(plan(options), options.output, more_points, mesh_options)
-    if any(", base:" in failure for failure in failures):
-        sys.exit("\n".join(failures) if COMM.rank == 0 else 1)
+    said = ["{variant}, case {case}, {not_converged}".format(**failure) for failure in failures]
+    if any(failure["variant"] == "base" for failure in failures):
+        sys.exit("\n".join(said) if COMM.rank == 0 else 1)
     if options.data_only or COMM.rank != 0:
         return
     from study_page import report  # draws: not needed by the other ranks
 
-    print(*failures, "drawing", sep="\n")
+    print(*said, "drawing", sep="\n")
     report(runs, options.output, options.wear_coefficient, failures)
     print(f"page      {options.output / 'study.html'}\nfigures   {options.output / 'figures'}")
 

@@ -24,6 +24,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+FAILED = "not_converged.txt"
 FIELDS = ("gap", "displacement", "dissipation", "slip_path")  # beside those of a ContactMap
 
 
@@ -101,7 +102,7 @@ def settings(parameters: Parameters, points, mesh_options) -> dict:
     return json.loads(json.dumps(everything))
 
 
-def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **mesh_options):
+def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **mesh_options) -> str:
     """Compute a run, or what is missing of it.  Collective.
 
     Args:
@@ -111,15 +112,19 @@ def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **m
         bar: A tqdm bar that is moved on by one per step; None for none.
         comm: MPI communicator; a run continues on the number of ranks that it was begun on.
         mesh_options: Further arguments of ``punch_mesh``.
+
+    Returns:
+        The step that did not converge and why; empty if all did. Such a run is not tried again, as
+        long as its directory is there.
     """
     directory = Path(directory)
     wanted = settings(parameters, points, mesh_options)
     displacements = programme(parameters)
-    done = comm.bcast(_steps_done(directory, wanted) if comm.rank == 0 else None)
+    done, reason = comm.bcast(_found(directory, wanted) if comm.rank == 0 else None)
     if bar is not None:
         bar.update(done)
-    if done == len(displacements):
-        return
+    if done == len(displacements) or reason:
+        return reason
     punch = Punch(parameters, comm, **mesh_options)
     contact, balance = punch.contact, EnergyBalance(punch)
     positions = [(*xy, 0.0) for xy in (parameters.target, *points)]
@@ -140,7 +145,13 @@ def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **m
     for index, displacement in enumerate(displacements[done:], start=done):
         balance.open()
         punch.approach.value = -displacement
-        step = punch.problem.solve()
+        try:
+            step = punch.problem.solve()
+        except dc.NotConverged as error:
+            reason = f"step {index + 1}: {error}"
+            if comm.rank == 0:
+                (directory / FAILED).write_text(reason)
+            return reason
         cycle = index // per_cycle + 1
         history.record(step, cycle=cycle, displacement=displacement, **balance.close())
         names = (*ContactMap._fields[2:], *FIELDS)
@@ -152,19 +163,24 @@ def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **m
             _checkpoint(directory, index).unlink(missing_ok=True)
         if bar is not None:
             bar.update()
+    return ""
 
 
 def _checkpoint(directory: Path, step: int) -> Path:
     return directory / f"checkpoint_{step:04d}.npz"
 
 
-def _steps_done(directory: Path, wanted: dict) -> int:
+def _found(directory: Path, wanted: dict) -> tuple[int, str]:
+    """Steps that are kept, and what did not converge then; nothing if they have other settings."""
     try:
         found = json.loads((directory / "run.json").read_text())["settings"]
     except (FileNotFoundError, json.JSONDecodeError):
-        return 0
+        found = None
+    if found != wanted:
+        return 0, ""
     steps = [int(file.stem[-4:]) for file in directory.glob("checkpoint_*.npz")]
-    return max(steps, default=0) if found == wanted else 0
+    failed = directory / FAILED
+    return max(steps, default=0), failed.read_text() if failed.exists() else ""
 
 
 def _gathered(punch, values):
@@ -203,11 +219,6 @@ class Run:
         disc = np.load(self.directory / "disc.npz")
         self.x, self.faces, self.area = disc["x"], disc["faces"], disc["area"]
         self.friction = CASES[self.parameters.case]
-
-    @property
-    def complete(self) -> bool:
-        """Whether all steps were computed."""
-        return len(self.table["step"]) == self.unloaded(self.parameters.cycles)
 
     @property
     def case(self) -> str:

@@ -138,8 +138,8 @@ def maps(figures: Figures, wear: float) -> None:
     figures.densities("wear", title, {"depth_nm": depth}, "nm", across=volumes)
 
 
-def comparison(runs: dict[str, dict[str, Run]]) -> list[dict]:
-    """Work of friction in the first cycle, with both rules, for all variants."""
+def comparison(runs: dict[str, dict[str, Run]], failures=()) -> list[dict]:
+    """Work of friction in the first cycle, with both rules, for all variants, the failed ones too."""
     base, rows = runs["base"], []
     for name, cases in runs.items():
         for case, run in cases.items():
@@ -155,7 +155,44 @@ def comparison(runs: dict[str, dict[str, Run]]) -> list[dict]:
                     "last_cycle": last,
                     "last_cycle_Nmm": total(run, last),
                     "contact_nodes": len(run.x),
+                    "iterations_per_step": float(run.table["iterations"].mean()),
                     "seconds_per_step": float(run.table["seconds"].mean()),
+                    "not_converged": "",
+                }
+            )
+    for failure in failures:
+        rows.append(dict.fromkeys(rows[0], np.nan) | failure)
+    return rows
+
+
+def mesh_orders(runs: dict[str, dict[str, Run]]) -> list[dict]:
+    """Work of friction in the first cycle against the mesh, whose width halves from row to row.
+
+    With changes a = D1 - D0 and b = D2 - D1 between three meshes the observed order is log2(a / b) and the
+    limit, if that order lasted, D2 + b^2 / (a - b) [L. F. Richardson 1911]; nan where changes do not fall.
+    """
+    rows = []
+    for case in runs["base"]:
+        meshes = [cases[case] for name, cases in runs.items()
+                  if case in cases and name.startswith(("base", "mesh "))]  # fmt: skip
+        work = {run.parameters.refine: total(run, 1) for run in meshes}
+        for run in sorted(meshes, key=lambda run: run.parameters.refine):
+            level, order, limit = run.parameters.refine, np.nan, np.nan
+            before, change = (
+                work.get(k, np.nan) - work.get(k - 1, np.nan) for k in (level - 1, level)
+            )
+            if before * change > 0 and abs(before) > abs(change):
+                order = float(np.log2(before / change))
+                limit = work[level] + change**2 / (before - change)
+            rows.append(
+                {
+                    "case": case,
+                    "refine": level,
+                    "contact_nodes": len(run.x),
+                    "first_cycle_Nmm": work[level],
+                    "change_relative": change / work.get(level - 1, np.nan),
+                    "observed_order": order,
+                    "limit_at_that_order_Nmm": limit,
                 }
             )
     return rows

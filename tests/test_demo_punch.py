@@ -77,6 +77,7 @@ def run_quietly(punch):
         (dict(), 1280, 1685, 337),
         (COARSE, 20, 50, 25),
         (dict(refine=1, **COARSE), 160, 267, 89),
+        (dict(refine=-1, divisions=4, layers=2), 20, 50, 25),
     ],
 )
 def test_mesh_counts(options, cells, nodes, contact_nodes):
@@ -110,7 +111,7 @@ def test_mesh_geometry(radius, height):
 
 @pytest.mark.parametrize(
     "options",
-    [dict(refine=-1), dict(refine=0.5), dict(divisions=3), dict(layers=0), dict(radius=0)],
+    [dict(refine=-3), dict(refine=0.5), dict(divisions=3), dict(layers=0), dict(radius=0)],
 )
 def test_mesh_refuses(options):
     """A mesh that cannot be built is a ValueError that names the number."""

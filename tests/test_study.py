@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
-import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
+import dolfinx_contact  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
@@ -28,7 +28,7 @@ from punch import Parameters, Punch, programme
 from punch_figure import ContactMap
 from study_measures import hysteresis, plateau, zones
 from study_run import EnergyBalance, Run, compute
-from study_work import TERMS
+from study_work import TERMS, comparison, mesh_orders
 
 COMM = MPI.COMM_WORLD
 ALONE = COMM.size == 1
@@ -137,6 +137,54 @@ def test_every_statement_is_decided_by_the_data(study):
         held, of = (sum(int(part[k]) for part in parts) for k in (0, 1))
         expected = "holds in all" if held == of else "depends" if held else "holds in none"
         assert verdict["verdict"] == expected
+
+
+@pytest.mark.skipif(not ALONE, reason="one rank says it all")
+def test_variant_that_fails_is_in_the_table(tmp_path, monkeypatch):
+    """A step that does not converge ends its run, not the study, is named, and is not tried again."""
+    solve, tried = dolfinx_contact.ContactProblem.solve, []
+
+    def hobbled(problem):
+        if problem.tol == 1e-11:
+            tried.append(problem)
+            problem.solver = dolfinx_contact.FixedPoint(max_iterations=1)
+        return solve(problem)
+
+    monkeypatch.setattr(dolfinx_contact.ContactProblem, "solve", hobbled)
+    short, mesh = dict(case="A", loading=1, unloading=1), dict(divisions=2, layers=1)
+    runs = {
+        "base": {"A": Parameters(**short)},
+        "too exact": {"A": Parameters(**short, tol=1e-11)},
+    }
+    for _ in range(2):
+        complete, failures = study_punch.compute_all(runs, tmp_path, [], mesh)
+        assert [failure["variant"] for failure in failures] == ["too exact"]
+        assert list(complete) == ["base"] and len(tried) == 1
+        table = comparison(complete, failures)
+        assert [bool(row["not_converged"]) for row in table] == [False, True]
+        assert table[1]["not_converged"].startswith("step 1: not converged: error")
+        assert np.isnan(table[1]["first_cycle_Nmm"])
+
+
+def run_with_work(work, refine):
+    """A run of one cycle with this work of friction on this mesh."""
+    of_node = dict(x=np.zeros((1, 2)), dissipation=lambda cycle: np.array([cycle * work]))
+    return SimpleNamespace(parameters=SimpleNamespace(refine=refine), **of_node)
+
+
+def test_observed_order_of_known_sequences():
+    """Errors c h^p give order p and the limit to rounding; changes that do not fall give neither."""
+    for order, limit in ((1.0, 300.0), (2.0, -5.0), (0.5, 1.0)):
+        runs = {
+            name: {"A": run_with_work(limit + 7.0 * 2.0 ** (-order * level), level)}
+            for level, name in enumerate(("base", "mesh refined 1x", "mesh refined 2x"))
+        }
+        *first, last = mesh_orders(runs)
+        assert np.isnan([row["observed_order"] for row in first]).all()
+        assert last["observed_order"] == pytest.approx(order, rel=1e-9)
+        assert last["limit_at_that_order_Nmm"] == pytest.approx(limit, rel=1e-9)
+    runs["mesh refined 2x"]["A"] = run_with_work(-50.0, 2)
+    assert np.isnan(mesh_orders(runs)[-1]["limit_at_that_order_Nmm"])
 
 
 def strip(status, slip=None):
