@@ -39,6 +39,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 # isort: split
 import numpy as np
 from demo_partial_slip import COMM, A, R, cylinder
+from picture import picture
 from rounded_body import along_face
 
 YOUNG, POISSON = 1000.0, 0.3
@@ -104,8 +105,8 @@ def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
 
 
 # %%
-def main() -> None:
-    """Fret without and with wear; print and assert what is claimed above."""
+def main() -> list[dict]:
+    """Fret without and with wear; print and assert what is claimed above; the profiles with wear."""
     steps = 4 * QUARTER
     history, _, _ = fret(3, None)
     force, position = history.column("contact0_force_x"), history.column("position")
@@ -139,7 +140,25 @@ def main() -> None:
         print(f"{change[0]:+.1%} in the middle, {change[1]:+.1%} where it is deepest;", end=" ")
         print(f"{touching[0]} nodes touch at first, {touching[1]} at last")
     assert change[0] > 0.05 and change[1] < -0.3 and touching[1] > touching[0]
+    return profiles
+
+
+# %% [markdown]
+# In a notebook the picture is below; `python demos/demo_fretting.py picture.png` writes it to a file.
+
+
+# %%
+def draw(figure, profiles) -> None:
+    """Pressure and worn depth along the face, before and after each cycle."""
+    above, below = figure.subplots(2, 1, sharex=True)
+    for cycle, now in enumerate(profiles):
+        style = dict(color=str(0.8 - 0.2 * cycle), label=f"after {cycle} cycles")
+        above.plot(now["x"], now["pressure"], ".-", **style)
+        below.plot(now["x"], now["depth"], ".-", **style)
+    above.set(ylabel="pressure [MPa]")
+    below.set(xlabel="x [mm]", ylabel="worn depth [mm]")
+    above.legend()
 
 
 if __name__ == "__main__":
-    main()
+    picture(draw, main())

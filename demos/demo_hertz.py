@@ -68,6 +68,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
+from picture import picture
 from rounded_body import along_face, rounded_body
 
 COMM = MPI.COMM_WORLD
@@ -97,7 +98,7 @@ def far_field(x, point_force: float):
     return np.array([b_r, b * (2 * (1 - NU) + z**2 / rho**2) - DELTA])
 
 
-def press(cells: int, size: float, point_force: float) -> dict[str, float]:
+def press(cells: int, size: float, point_force: float) -> dict:
     """Press the ball on the plane; errors relative to the closed form."""
     domain, face, far = rounded_body(COMM, R, A, size, cells, half=True)
     V = functionspace(domain, ("Lagrange", 1, (2,)))
@@ -137,8 +138,11 @@ def press(cells: int, size: float, point_force: float) -> dict[str, float]:
 
 
 # %%
-def compare(contact: dc.Contact, r) -> dict[str, float]:
-    """Errors of force, pressure and radius; ``h`` is the width of a cell at the edge of contact."""
+def compare(contact: dc.Contact, r) -> dict:
+    """Errors of force, pressure and radius; ``h`` is the width of a cell at the edge of contact.
+
+    With them the pressure itself, over that in the middle, against r over a.
+    """
     rings = fem.Function(contact.V)
     assemble_into(rings.x, fem.form(2 * np.pi * r * ufl.TestFunction(contact.V)[1] * ufl.ds))
     rings = rings.x.array.reshape(-1, 2)[contact.nodes, 1]
@@ -151,6 +155,7 @@ def compare(contact: dc.Contact, r) -> dict[str, float]:
         "pressure": np.sqrt(area @ (pressure - expected) ** 2 / (area @ expected**2)),
         "moment": np.sqrt(2.5 * (force @ x**2) / force.sum()) / A - 1,
         "edge": x[force > 0].max() / A - 1,
+        "profile": (x / A, pressure / P0),
     }
 
 
@@ -182,8 +187,8 @@ def finiteness(size: float) -> tuple[float, float]:
     return tuple(bounds)
 
 
-def main() -> None:
-    """Solve, print and assert what is claimed above."""
+def main() -> list[dict]:
+    """Solve, print and assert what is claimed above; the errors on the meshes."""
     meshes = [press(cells, 16 * A, FORCE) for cells in (16, 32, 64)]
     order = {
         name: [np.log2(abs(c[name] / f[name])) for c, f in zip(meshes, meshes[1:])]
@@ -207,7 +212,23 @@ def main() -> None:
             )
             print(f"estimated {100 * low:.1f} to {100 * high:.1f} %")
         assert low < excess < high
+    return meshes
+
+
+# %% [markdown]
+# In a notebook the picture is below; `python demos/demo_hertz.py picture.png` writes it to a file.
+
+
+# %%
+def draw(figure, meshes) -> None:
+    """Pressure of the nodes on the three meshes, and of the closed form."""
+    axes, r = figure.subplots(), np.linspace(0, 1, 400)
+    axes.plot(r, np.sqrt(1 - r**2), color="black", label="closed form")
+    for found, marker in zip(meshes, "os."):
+        axes.plot(*found["profile"], marker, label=f"cells of {found['h']:.3f} a at the edge")
+    axes.set(xlabel="r / a", ylabel="pressure / p0", xlim=(0, 1.3))
+    axes.legend()
 
 
 if __name__ == "__main__":
-    main()
+    picture(draw, main())

@@ -1,8 +1,34 @@
-"""The punch of [dSFMH07, Section 3]: numbers, a picture and ParaView files of its cycles.
+# %% [markdown]
+# # The paper's punch
+#
+# A steel cylinder stands on a plane with grooves; its top face goes down and up again. Poisson's
+# effect drives the contact nodes outwards against a friction that differs along and across the
+# grooves. Stick zones, slip outwards and, when unloading, reverse slip are what [dSFMH07, Section
+# 3] shows. This demo writes numbers, a picture and ParaView files; the scene itself is in
+# `punch.py`. As a command it has options: try `--help`. Any number of MPI ranks.
+#
+# ## Notation
+#
+# $u$ displacement, $\sigma$ stress, $E$, $\nu$ elastic constants; $r = (r_t, r_n)$ reaction of the
+# plane on the body, $x_n$ gap, $\Delta u_t$ slip increment of a step; $M = \mathrm{diag}(\mu_x,
+# \mu_y)$, $P = \mathrm{diag}(p_x, p_y)$. Units: mm, N, MPa.
+#
+# ## Strong form
+#
+# $$ -\operatorname{div} \sigma(u) = 0, \qquad u = (0, 0, -\delta) \text{ on the top face}, $$
+#
+# and on the bottom face $x_n \ge 0$, $r_n \ge 0$, $x_n r_n = 0$, $|M^{-1} r_t| \le r_n$, and where
+# there is slip [dSFMH07, Section 1]
+#
+# $$ |M^{-1} r_t| = r_n, \qquad -\Delta u_t = \lambda\, P^{-2} r_t, \quad \lambda \ge 0. $$
+#
+# ## Weak form
+#
+# $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v, $$
+#
+# hexahedra of first order, one load step after another.
 
-The scene itself is in punch.py. Try ``--help``; runs on any number of MPI ranks.
-"""
-
+# %%
 from __future__ import annotations
 
 import argparse
@@ -19,7 +45,11 @@ from tqdm import tqdm
 
 import dolfinx_contact as dc
 
+# %% [markdown]
+# ## Code
 
+
+# %%
 def run(punch: Punch) -> Iterator[dict]:
     """Compute the whole programme with a progress bar; yields the record of each step."""
     displacements = programme(punch.parameters)
@@ -45,10 +75,21 @@ def table(records: list[dict]) -> str:
     return "\n".join(lines)
 
 
+# %% [markdown]
+# ## Result
+#
+# The table of all steps. Above in the picture: where $f = |M^{-1} r_t| - r_n$ is negative the node
+# sticks; below: pressure and friction. While loading, the centre sticks and the rest slips
+# outwards; on unloading the rim sticks, then slips inwards.
+
+
+# %%
 def arguments(argv=None) -> argparse.Namespace:
     default = Parameters()
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
+        description="The punch of [dSFMH07, Section 3]; the scene itself is in punch.py. Runs on any "
+        "number of MPI ranks.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
     add("--case", choices=CASES, default=default.case, help="friction, Table 1 of the paper")
@@ -66,6 +107,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 
 def main(argv=None) -> None:
+    """Compute, print the table, write numbers, picture and ParaView files."""
     logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
     options = vars(arguments(argv))
     output = options.pop("output")
@@ -106,4 +148,9 @@ def main(argv=None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    inside = "ipykernel" in sys.modules  # there the command line is the notebook's
+    main([] if inside else None)
+    if inside:
+        from IPython.display import Image, display
+
+        display(Image("results/punch/punch.png"))

@@ -39,6 +39,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
+from picture import picture
 
 COMM = MPI.COMM_WORLD
 RADIUS, HEIGHT, E, NU = 10.0, 10.0, 210e3, 0.3
@@ -124,8 +125,8 @@ def run(quarter: bool) -> list[dict]:
 
 
 # %%
-def main() -> None:
-    """Solve both and compare."""
+def main() -> tuple[dict, dict]:
+    """Solve both and compare; the last states."""
     for whole, part, depth in zip(run(False), run(True), DEPTHS):
         assert np.abs(whole["x"] - part["x"]).max() < 1e-9 * RADIUS
         largest = np.abs(whole["r"]).max()
@@ -139,7 +140,25 @@ def main() -> None:
             )
             print(f"4 quarters {4 * part['totals'][0]:.1f} N, nodes differ by {difference:.0e}")
         assert difference < 1e-8 and totals < 1e-8
+    return whole, part
+
+
+# %% [markdown]
+# In a notebook the picture is below; `python demos/demo_quarter_punch.py picture.png` writes it to a file.
+
+
+# %%
+def draw(figure, whole, part) -> None:
+    """Friction forces at the last step, of the whole and of the quarter, on each other."""
+    axes = figure.subplots()
+    for found, width, colour, name in (
+        (whole, 9e-3, "#e69f00", "whole"),
+        (part, 3e-3, "black", "quarter"),
+    ):
+        axes.quiver(*found["x"].T[:2], *found["r"].T[:2], width=width, color=colour, label=name)
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.legend()
 
 
 if __name__ == "__main__":
-    main()
+    picture(draw, *main())

@@ -53,6 +53,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
+from picture import picture
 
 COMM = MPI.COMM_WORLD
 MU, P = np.array([0.30, 0.15]), np.array([0.05, 0.20])  # case C of [dSFMH07, Table 1]
@@ -151,15 +152,17 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
 
 
 # %%
-def main() -> None:
-    """Drag the block and assert what is claimed above."""
+def main() -> dict[str, np.ndarray]:
+    """Drag the block and assert what is claimed above; tangential over normal force by title."""
     angles, turn = path(), slice(STRAIGHT, -STRAIGHT)
-    lags = []
+    lags, traces = [], {}
     for p, depths in ((P, (0.02, 0.01, 0.005)), (MU, (0.01,))):
         for depth in depths:
             found = drag(depth, p)
             tangential, normal = found["force"][:, :2], found["force"][:, 2]
             cone = np.linalg.norm(tangential / MU, axis=1) / normal
+            rule = "non-associated" if p is P else "associated"
+            traces[f"{rule}, pressed by {depth} mm"] = tangential / normal[:, None]
             for end in (STRAIGHT - 1, -1):
                 assert found["total"][end] < 1e-9 and found["worst"][end] < 1e-9
                 assert abs(cone[end] - 1) < 1e-12
@@ -181,7 +184,28 @@ def main() -> None:
             "largest lag on the turn:", *(f"{lag:.4f}" for lag in lags), "ratios", ratios.round(3)
         )
     assert (np.abs(ratios - 2) < 0.25).all() and ratios[1] < ratios[0]  # towards two
+    return traces
+
+
+# %% [markdown]
+# In a notebook the picture is below; `python demos/demo_turning_path.py picture.png` writes it to a file.
+
+
+# %%
+def draw(figure, traces) -> None:
+    """The friction force on the ellipse, step by step, and where the closed form has it."""
+    for axes, names in zip(figure.subplots(1, 2), (list(traces)[1:3], list(traces)[3:])):
+        circle = np.linspace(0, 2 * np.pi, 200)
+        axes.plot(MU[0] * np.cos(circle), MU[1] * np.sin(circle), color="#bbbbbb")
+        p = P if "non" in names[0] else MU
+        axes.plot(*np.transpose([closed_form(a, p) for a in path()]), "kx", label="closed form")
+        for name in names:
+            axes.plot(*traces[name].T, ".-", label=name)
+        axes.set(
+            xlabel="force along x / normal", ylabel="along y", aspect="equal", ylim=(-0.2, 0.32)
+        )
+        axes.legend(fontsize=8, loc="upper center")
 
 
 if __name__ == "__main__":
-    main()
+    picture(draw, main())

@@ -20,7 +20,7 @@ ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
     SLIP: Patch(facecolor="#f0a33a", edgecolor="#f0a33a", label="slip, $f=0$"),
     OPEN: Patch(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
 }
-INWARD = Patch(facecolor="#a04a00", edgecolor="#a04a00", label="reverse slip, inwards, $f=0$")
+INWARD = Patch(facecolor="#c25700", edgecolor="#c25700", label="reverse slip, inwards, $f=0$")
 
 
 class ContactMap(NamedTuple):

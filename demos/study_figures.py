@@ -95,13 +95,15 @@ class Figures:
     def lines(self, name, title, draw, rows, height=4.2) -> None:
         """One panel a case with common axes."""
         with rc_context(STYLE):
-            figure = Figure(figsize=(4.8 * len(self.runs), height), layout="constrained")
+            figure = Figure(figsize=(4.8 * len(self.runs) + 1.2, height), layout="constrained")
             axes = figure.subplots(1, len(self.runs), sharex=True, sharey=True, squeeze=False)[0]
             for ax, (case, run) in zip(axes, self.runs.items()):
                 draw(ax, run)
                 ax.set_title(NAMES[case])
                 ax.grid(alpha=0.3)
                 ax.label_outer()
+            handles = axes[0].get_legend_handles_labels()
+            figure.legend(*handles, loc="outside right center", frameon=False)
             figure.suptitle(title)
             self.save(figure, name)
         write_csv(
@@ -150,7 +152,6 @@ class Figures:
         def trajectory(ax, run):
             by_cycle(ax, run, *u(run))
             ax.set(xlabel="$u_x$ [µm]", ylabel="$u_y$ [µm]")
-            ax.legend(fontsize=9)
 
         def against_programme(quantity, ylabel, names):
             def draw(ax, run):
@@ -160,7 +161,6 @@ class Figures:
                 stick = np.r_[False, run.table[f"node{node}_status"] == STICK]
                 self._shade_steps(ax, programme(run), stick)
                 ax.set(xlabel="cycles", ylabel=ylabel)
-                ax.legend(fontsize=10)
 
             return draw
 
@@ -170,7 +170,6 @@ class Figures:
         def curve(ax, run):
             by_cycle(ax, run, 1e3 * slip_of_point(run, node), 1e-3 * force(run))
             ax.set(xlabel="$|u_t|$ [µm]", ylabel="applied force [kN]")
-            ax.legend(fontsize=9)
 
         dashes = "; full: loading, dashed: unloading"
         self.lines("fig4" + suffix, f"Trajectory of {label}{dashes}", trajectory,

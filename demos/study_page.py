@@ -18,7 +18,7 @@ STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 1500px; margin: 2em auto; padding: 0 1em; }
 img { max-width: 100%; } table { border-collapse: collapse; margin: 1em 0; }
 td, th { border: 1px solid #bbb; padding: 0.2em 0.6em; text-align: right; vertical-align: top; }
-td.text, th.text { text-align: left; } figure { margin: 2em 0; } code { white-space: pre-wrap; }
+td.text, th.text { text-align: left; } figure { margin: 2em 0; }
 """
 
 CAPTIONS = {  # in the order of the page; what to see in each figure stands in docs/study.md
@@ -171,11 +171,25 @@ def page(base: dict[str, Run], directory: Path, wear: float) -> str:
         table(directory / "times.csv"),
         "<h2>Parameters</h2>",
         "<p>Nodes of the maps, with the density of work of each: figures/dissipation.csv.</p>",
-        f"<code>{html.escape(json.dumps({c: run.head for c, run in base.items()}, indent=1))}</code>",
+        parameters(base),
     ]
     head = f'<meta charset="utf-8"><title>Cyclic punch, {first.parameters.cycles} cycles</title>'
     body = "\n".join(parts)
     return f'<!doctype html><html lang="en"><head>{head}<style>{STYLE}</style></head><body>{body}</body></html>\n'
+
+
+def parameters(base: dict[str, Run]) -> str:
+    """What was computed and by what, one column a case."""
+    heads = {}
+    for case, run in base.items():
+        heads[case] = {}
+        for key, value in run.head.items():
+            heads[case].update(value if isinstance(value, dict) else {key: value})
+    lines = [f"<tr><th></th>{''.join(f'<th>{case}</th>' for case in heads)}</tr>"]
+    for key in next(iter(heads.values())):
+        cells = "".join(f"<td>{html.escape(json.dumps(head[key]))}</td>" for head in heads.values())
+        lines.append(f'<tr><td class="text">{html.escape(key.replace("_", " "))}</td>{cells}</tr>')
+    return "<table>" + "\n".join(lines) + "</table>"
 
 
 def picture(file: Path, caption: str) -> str:

@@ -44,14 +44,16 @@ def energy(figures: Figures) -> None:
             middle.set(ylabel="the small terms [N mm]")
             below.semilogy(at[1:], np.maximum(relative_residual(run), 1e-17), ".", color="black")
             below.axhline(run.parameters.tol, color="#d55e00", linewidth=1)
-            below.text(0, 1.3 * run.parameters.tol, "tolerance of a step", color="#d55e00")
+            below.text(0, 6 * run.parameters.tol, "tolerance of a step", color="#d55e00")
             below.set(xlabel="cycles", ylabel="|open balance| / largest term", ylim=(1e-17, 1e-7))
             for ax in (above, middle, below):
                 ax.grid(alpha=0.3)
                 ax.label_outer()
         handles = axes[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
-        figure.suptitle("Energy balance: black = blue + red + green + violet")
+        figure.suptitle(
+            "Energy balance: the work of the platen is the sum of the first four terms below it"
+        )
         figures.save(figure, "energy")
     names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual",
              "platen_work_mean", "closing_mean", "residual_mean")  # fmt: skip

@@ -35,7 +35,7 @@ def test_demo(name, capsys):
     assert bool(printed) == (MPI.COMM_WORLD.rank == 0)
 
 
-@pytest.mark.parametrize("name", NOTEBOOKS)
+@pytest.mark.parametrize("name", [*NOTEBOOKS, *sorted(TESTED_ELSEWHERE)])
 def test_demo_reads_as_one(name):
     """Notation, strong form, weak form, code, result, in this order, between cells of percent format."""
     text = (DEMOS / f"{name}.py").read_text()

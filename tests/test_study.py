@@ -69,7 +69,7 @@ def test_study_writes_everything(study):
     page = (study / "study.html").read_text()
     assert page.count("data:image/svg+xml;base64,") == len(list((study / "figures").glob("*.svg")))
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
-    assert "&quot;unload_to&quot;: 0.02" in page
+    assert '<td class="text">unload to</td><td>0.02</td>' in page
 
 
 def test_numbers_of_the_page_are_those_of_the_files(study):
