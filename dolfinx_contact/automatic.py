@@ -38,11 +38,13 @@ class Automatic:
             why = f"{nodes} contact nodes, at most {CROSSOVER}"
         if not fits:
             solvers = solvers[:1]
+        if isinstance(solvers[0], FixedPoint):
+            x = equations.guess()
         iterations, best, chosen = 0, (np.inf, x), ""
         for solver in solvers:
             x, count = solver.solve(equations, best[1], tol)
             iterations += count
-            error = equations.residual(x)[1]
+            error = equations.measure(x)
             chosen = f"{chosen}{type(solver).__name__} ({why})"
             if error < best[0]:
                 best = (error, x)

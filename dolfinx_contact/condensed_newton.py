@@ -138,7 +138,7 @@ class CondensedNewton:
 
         Args:
             equations: Offers ``condensed()``, the condensed body, ``trial``, the displacement without
-                reactions, and ``residual(x) -> (residual, error)``.
+                reactions, and ``measure(x)``, the error of a displacement.
             x: Not used: reactions of earlier steps are better starts.
 
         Returns:
@@ -152,7 +152,7 @@ class CondensedNewton:
             iterations += result.iterations
             equations.tried = result.tried
             x, previous = body.displacement(equations.trial, result.reaction), error
-            error = equations.residual(x)[1]
+            error = equations.measure(x)
             if error <= tol or not error < previous:
                 break
             starts = [result.reaction]

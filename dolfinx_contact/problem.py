@@ -16,6 +16,7 @@ from dolfinx_contact._errors import raised_together
 from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
 from dolfinx_contact.condensed import CondensedBody
+from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
 
@@ -123,6 +124,7 @@ class ContactProblem:
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
         self._states = [np.zeros(self.body.size)] * 2
+        self.body.known = None
         self._past = deque(maxlen=64)  # condensed steps to start from: more than a cycle has
         for contact in self.contacts:
             contact.reset()
@@ -173,6 +175,8 @@ class ContactProblem:
         mine = {"u": self._states[0], "before": self._states[1]}
         if self._past:
             mine["past"] = np.array(self._past)
+        if self.body.known:
+            mine |= {f"known{k}": part for k, part in enumerate(self.body.known)}
         for k, contact in enumerate(self.contacts):
             mine.update((f"contact{k}_{name}", array) for name, array in contact.save().items())
         everything = comm.gather(mine, root=0)
@@ -210,6 +214,9 @@ class ContactProblem:
                 contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
             self._states = [mine["u"], mine["before"]]
             self._past = deque(map(tuple, mine.get("past", ())), maxlen=self._past.maxlen)
+            self.body.known = (
+                tuple(mine[f"known{k}"] for k in range(3)) if "known0" in mine else None
+            )
         self._restore()
 
     def _solve(self) -> tuple[np.ndarray, _ContactEquations, int]:
@@ -223,20 +230,18 @@ class ContactProblem:
                 contact.set_metric(body.K)
             self._stiffness = [contact.rho for contact in self.contacts]
         b, external = body.load()
-        trial = body.solve(b)
-        trial[body.fixed] = b[body.fixed]
+        trial = body.free_state(b)
         equations = _ContactEquations(self, b, trial, *self._load(trial, external))
         if not self._touches:
             equations.errors = equations.errors_if_open(trial)
             return trial, equations, 0
-        last, before = self._states
-        guesses = [self.u.x.array[: body.size].copy(), 2 * last - before]
-        for guess in guesses:
-            guess[body.fixed] = b[body.fixed]
-        x = min(guesses, key=lambda guess: equations.residual(guess)[1])
         equations.chosen = type(self.solver).__name__
-        x, iterations = self.solver.solve(equations, x, self.tol)
-        equations.residual(x)
+        # The condensed problem starts from reactions: a guess would cost two residuals.
+        start = (
+            trial if isinstance(self.solver, (Automatic, CondensedNewton)) else equations.guess()
+        )
+        x, iterations = self.solver.solve(equations, start, self.tol)
+        equations.measure(x)
         return x, equations, iterations
 
     def _load(self, trial: np.ndarray, external: np.ndarray) -> tuple[float, float]:
@@ -316,10 +321,19 @@ class _ContactEquations:
         self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
         self._metric = ("bipotential", 1.0)
+        self._measured = None  # displacement whose errors were measured with F
+
+    def guess(self) -> np.ndarray:
+        """The user's ``u`` or the extrapolated last steps, whichever leaves the smaller error."""
+        body, (last, before) = self.body, self.problem._states
+        guesses = [self.problem.u.x.array[: body.size].copy(), 2 * last - before]
+        for guess in guesses:
+            guess[body.fixed] = self.b[body.fixed]
+        return min(guesses, key=lambda guess: self.residual(guess)[1])
 
     def condensed(self) -> CondensedBody:
         """The body condensed to its contact nodes, kept while its matrix stands."""
-        problem = self.problem
+        problem, self._measured = self.problem, None  # contacts will move
         if problem._condensed is None:
             problem._condensed = CondensedBody(self.body, problem.contacts)
         problem._condensed.past = problem._past
@@ -353,7 +367,21 @@ class _ContactEquations:
         The reactions that enter the predictor are those the body asks for, ``K x - f``.  Once the
         error falls below the tolerance it is measured again with F itself, assembled by DOLFINx.
         """
-        forces = self.b - self.body.multiply(x)
+        residual = self._update(x, self.b - self.body.multiply(x))
+        self._measured = None
+        if self.errors.largest <= self.problem.tol:
+            self.errors = self._errors(self._balance(self._assembled(x)))
+            self._measured = x.copy()
+        return residual, self.errors.largest
+
+    def measure(self, x: np.ndarray) -> float:
+        """The error of a displacement by F itself; also takes its reactions, gaps and slips."""
+        if self._measured is None or not self.body.same(x, self._measured):
+            self._update(x, self._assembled(x))
+            self._measured = x.copy()
+        return self.errors.largest
+
+    def _update(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         map, factor = self._metric
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
             contact.rho = factor * stiffness
@@ -361,9 +389,7 @@ class _ContactEquations:
             contact.update(x, map)
         residual = self._balance(forces)
         self.errors = self._errors(residual)
-        if self.errors.largest <= self.problem.tol:
-            self.errors = self._errors(self._balance(self._assembled(x)))
-        return residual, self.errors.largest
+        return residual
 
     def errors_if_open(self, x: np.ndarray) -> Errors:
         """Errors of a state in which no node touches, to rounding, and all reactions are zero."""
@@ -377,7 +403,9 @@ class _ContactEquations:
     def _assembled(self, x: np.ndarray) -> np.ndarray:
         values = self.problem.u.x.array.copy()
         values[: self.body.size] = x
-        return -self.body.internal_force(values)
+        forces = -self.body.internal_force(values)
+        forces[self.body.fixed] = 0.0  # what supports carry
+        return forces
 
     def _balance(self, forces: np.ndarray) -> np.ndarray:
         forces = forces.copy()
