@@ -19,7 +19,8 @@ template <class Scalar> struct View {
     std::ptrdiff_t row = 0, column = 0;
 
     View from_node(std::size_t node) const {
-        return {data ? data + static_cast<std::ptrdiff_t>(node) * row : data, row, column};
+        return {data == nullptr ? data : data + static_cast<std::ptrdiff_t>(node) * row, row,
+                column};
     }
 };
 
@@ -53,7 +54,7 @@ using Column = double[block_size];
 
 template <class Scalar, class To>
 void gather(const View<const Scalar> &view, int component, int count, To &to) {
-    if (!view.data)
+    if (view.data == nullptr)
         return;
     const Scalar *from = view.data + component * view.column;
     if (view.row == 1)
@@ -65,7 +66,7 @@ void gather(const View<const Scalar> &view, int component, int count, To &to) {
 
 template <class Scalar>
 void scatter(const Column &from, int count, const View<Scalar> &view, int component) {
-    if (!view.data)
+    if (view.data == nullptr)
         return;
     Scalar *to = view.data + component * view.column;
     if (view.row == 1)
@@ -95,7 +96,7 @@ template <int T> struct Block {
         gather(in.rho_t.from_node(first), 0, count, rho_t);
         gather(in.branch.from_node(first), 0, count, branch_in);
         if constexpr (T == 2)
-            if (in.axes.data) {
+            if (in.axes.data != nullptr) {
                 gather(in.axes.from_node(first), 0, count, cos);
                 gather(in.axes.from_node(first), 1, count, sin);
                 rotate(r[0], r[1], 1.0, count);
@@ -150,11 +151,12 @@ template <int T> struct Block {
         }
     }
 
-    void rotate_matrix_back(Column *J, int count) const {
+    /// J <- R^T J R, row by row: of every column, then of every row, the two tangential entries.
+    void rotate_matrix_back(Column (&J)[D * D], int count) const {
         for (int k = 0; k < D; ++k)
             rotate(J[k], J[D + k], -1.0, count);
-        for (int k = 0; k < D; ++k)
-            rotate(J[k * D], J[k * D + 1], -1.0, count);
+        for (int k = 0; k < D * D; k += D)
+            rotate(J[k], J[k + 1], -1.0, count);
     }
 
     template <class Result> void rotate_back(int count) {
@@ -237,7 +239,7 @@ void for_each_node(const Source &source, std::size_t count, const Inputs &in, co
             block.keep(f(source(first + static_cast<std::size_t>(i)), block.state(i)), i);
         if constexpr (T > 0 && std::is_same_v<Result, Start<T>>)
             detail::finish(source, f, first, size, block);
-        if (in.axes.data)
+        if (in.axes.data != nullptr)
             block.template rotate_back<Result>(size);
         block.template store<Result>(out, in.tangents, first, size);
     }

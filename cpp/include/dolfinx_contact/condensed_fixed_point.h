@@ -16,8 +16,8 @@ class Anderson {
     /// The iterate after x, whose correction is g.
     VectorXd step(const VectorXd &x, const VectorXd &g) {
         if (last_x_.size() > 0) {
-            dx_.push_back(x - last_x_);
-            dg_.push_back(g - last_g_);
+            dx_.emplace_back(x - last_x_);
+            dg_.emplace_back(g - last_g_);
             if (dx_.size() > depth_) {
                 dx_.pop_front();
                 dg_.pop_front();

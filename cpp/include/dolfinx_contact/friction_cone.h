@@ -151,11 +151,11 @@ Reaction<T> project(const Law &law, const Local<T> &tau, Jacobian<T> *derivative
     if constexpr (T > 0)
         if (start.branch == unfinished) {
             const SecularRoot<T> root = root_for(law, boundary_equation(law, start.p));
-            if (derivative)
+            if (derivative != nullptr)
                 *derivative = boundary_derivative(law, start.p[T], root);
             return {euclidean_point(law, start.p, start.scale, root), Branch::slip};
         }
-    if (derivative)
+    if (derivative != nullptr)
         *derivative = derivative_off_boundary<T>(start.branch);
     return {start.r, branch_of(start.branch)};
 }

@@ -86,11 +86,11 @@ Reaction<T> return_map(const Law &law, const Local<T> &r, double gap, const Tang
         if (start.branch == unfinished) {
             const SecularEquation<T> equation = return_equation(law, start.p);
             const SecularRoot<T> root = root_for(law, equation);
-            if (derivative)
+            if (derivative != nullptr)
                 *derivative = return_derivative(law, equation, root);
             return {return_point(law, start.scale, root), Branch::slip};
         }
-    if (derivative)
+    if (derivative != nullptr)
         *derivative = derivative_off_boundary<T>(start.branch);
     return {start.r, branch_of(start.branch)};
 }

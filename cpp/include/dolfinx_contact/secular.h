@@ -31,7 +31,8 @@ template <int T> struct SecularRoot {
 /// has full relative precision at every s.
 template <int T, int L> class SecularEquations {
   public:
-    /// Bound on the Newton steps, more than twice the largest number seen (docs/kernel.md).
+    /// Bound on the Newton steps. The slowest case is phi = 1 + k / s^2, one term being 1 from the
+    /// start: a step takes phi - 1 to 4/9 of it, from 1 to rounding in ln(2^53) / ln(9/4) = 46.
     static constexpr int max_steps = 60;
 
     void set(int l, const SecularEquation<T> &equation) {
