@@ -135,6 +135,27 @@ def test_gap_of_an_inadmissible_pair_is_infinite():
     assert np.array_equal(found, [np.inf, np.inf, np.inf, 0])
 
 
+@given(st.integers(0, 10**6), st.sampled_from(sorted(LAWS)))
+def test_scaled_map_in_its_own_metric(seed, name):
+    """Where nothing moves the scaled map is a projection of (M^-1 r_t, r_n): repeated without effect,
+    decomposing after Moreau, non-expansive."""
+    friction = Friction(*LAWS[name])
+    x, y = np.random.default_rng(seed).normal(size=(2, 20, 3))
+    M, zero = np.append(friction.mu, 1.0), np.zeros(20)
+
+    def project(x):
+        return friction.law(3).scaled_map(M * x, zero, np.zeros((20, 2)), zero + 1)[0] / M
+
+    tol = 16 * EPS * (np.linalg.norm(x, axis=1) + np.linalg.norm(y, axis=1))
+    at, z = project(x), x - project(x)
+    assert np.all(np.linalg.norm(at[:, :2], axis=1) <= at[:, 2] * (1 + 8 * EPS))
+    assert np.all(np.linalg.norm(z[:, :2], axis=1) + z[:, 2] <= tol)
+    assert np.all(np.abs(np.sum(at * z, axis=1)) <= tol * np.linalg.norm(x, axis=1))
+    assert np.all(np.linalg.norm(project(at) - at, axis=1) <= tol)
+    change = np.linalg.norm(at - project(y), axis=1)
+    assert np.all(change <= np.linalg.norm(x - y, axis=1) + tol)
+
+
 @given(st.integers(0, 10**6), st.sampled_from(sorted(LAWS)), st.integers(-9, 9))
 def test_scale_of_p_and_of_units(seed, name, exponent):
     """Multiplying p by a power of ten, or forces, lengths and the metric by powers of two, changes

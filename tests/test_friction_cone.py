@@ -88,9 +88,9 @@ def test_projection_to_four_units_of_rounding(ratio, magnitude):
     apex, on the axes, on both boundaries and near them, at any ratio and magnitude."""
     mp.mp.dps = 75
     rng = np.random.default_rng(7)
-    for base in (1.0, 0.3, 1e-4):
+    for base in (1.0, 0.3, 1e-4, 1e8):
         for mu in ([base, base / ratio], [base / ratio, base]):
-            tau = magnitude * nasty_points(rng, 30, np.array(mu))
+            tau = magnitude * nasty_points(rng, 24, np.array(mu))
             for point, r in zip(tau, project_cone(tau, mu)):
                 exact = exact_projection(point, mu)
                 error = mp.sqrt(sum((mp.mpf(a) - b) ** 2 for a, b in zip(r.tolist(), exact)))
@@ -176,23 +176,6 @@ def test_infinite_points():
                 tau[1, component] = bad
                 r = project_cone(tau, mu)
                 assert np.isnan(r[1]).all() and np.isfinite(r[[0, 2]]).all()
-
-
-@pytest.mark.parametrize("layout", ["C", "F", "strided", "reversed", "float32", "integers"])
-def test_layouts(layout):
-    """Any strides and any type that fits into float64 give the same as a plain array."""
-    rng = np.random.default_rng(10)
-    tau = np.round(8 * rng.normal(size=(70, 3)))
-    expected = project_cone(tau.copy(), (0.3, 0.15))
-    given = {
-        "C": tau,
-        "F": np.asfortranarray(tau),
-        "strided": np.repeat(np.repeat(tau, 2, axis=0), 3, axis=1)[::2, ::3],
-        "reversed": tau[::-1].copy()[::-1],
-        "float32": tau.astype(np.float32),
-        "integers": tau.astype(int),
-    }[layout]
-    assert np.array_equal(project_cone(given, (0.3, 0.15)), expected)
 
 
 def test_principal_axes_per_node():
