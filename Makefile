@@ -9,7 +9,7 @@
 
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
-	$(wildcard cpp/*.cpp cpp/include/dolfinx_contact/*.h)
+	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
 punch: .venv/ready
 	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
