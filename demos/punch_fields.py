@@ -23,8 +23,9 @@ class FieldWriter:
     """Writes a collection ``punch.pvd`` into a directory, to be opened in ParaView.
 
     - per node: displacement [mm]; and of the contact nodes reaction [N] and slip increment [mm] in
-      global components, gap [mm], load function f [N], status (0 open, 1 stick, 2 slip). Nodes
-      that are no contact nodes have zeros, and status -1;
+      global components, gap [mm], load function f [N], status (0 open, 1 stick, 2 slip), pressure
+      [MPa], nodal area [mm^2], work of friction so far [N mm]. Nodes that are no contact nodes have
+      zeros, and status -1;
     - per cell: von Mises stress and the components of the stress [MPa], as scalars because
       DOLFINx 0.5 refuses tensors here.
 
@@ -36,9 +37,6 @@ class FieldWriter:
     def __init__(self, punch, directory):
         self.contact, self.u, V = punch.contact, punch.u, punch.V
         self.slip = fem.Function(V, name="slip_increment")
-        self.scalars, parent = V.sub(0).collapse()
-        node = np.ravel(parent) // 3  # of each degree of freedom of the scalar space
-        self.scalar_dofs = np.argsort(node)[self.contact.nodes]
 
         six = functionspace(punch.mesh, ("DG", 0, (6,)))
         sigma = punch.stress(self.u)
@@ -68,20 +66,15 @@ class FieldWriter:
             function.x.array[:] = values
         fields = [self.u, contact.reaction_function(), self.slip]
         fields += [
-            self.nodal("gap", contact.gap),
-            self.nodal("load_function", contact.load_function),
-            self.nodal("status", contact.status, elsewhere=-1),
+            contact.function(contact.gap, "gap"),
+            contact.function(contact.load_function, "load_function"),
+            contact.function(contact.status, "status", elsewhere=-1),
+            contact.function(contact.pressure, "pressure"),
+            contact.function(contact.area, "area"),
+            contact.function(contact.dissipation, "dissipation"),
         ]
         fields += self.cellwise.values()
         self._file.write_function(fields, step)
-
-    def nodal(self, name, values, elsewhere=0.0):
-        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function."""
-        function = fem.Function(self.scalars, name=name)
-        function.x.array[:] = elsewhere
-        function.x.array[self.scalar_dofs] = values
-        function.x.scatter_forward()
-        return function
 
     def __enter__(self):
         return self

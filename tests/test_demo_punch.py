@@ -243,7 +243,7 @@ def test_command_line(directory, capsys):
     collection = (directory / "punch.pvd").read_text()
     assert collection.count("<DataSet") == 3
     parts = "".join(file.read_text() for file in sorted(directory.glob("*.vtu")))
-    for field in "displacement reaction slip_increment gap load_function status von_Mises".split():
+    for field in "displacement reaction slip_increment gap load_function status pressure area dissipation von_Mises".split():
         assert f'Name="{field}"' in parts
     assert (directory / "punch.png").stat().st_size > 50_000
     printed = capsys.readouterr().out
@@ -259,7 +259,7 @@ def test_fields_sit_at_their_nodes(directory):
     punch = Punch(Parameters(), divisions=4, layers=2)
     punch.press(0.1)
     with FieldWriter(punch, directory) as writer:
-        field = writer.nodal("x", punch.contact.x[:, 0])
+        field = punch.contact.function(punch.contact.x[:, 0])
         writer.write(1)
     x, R = ufl.SpatialCoordinate(punch.mesh), 10.0
     ds = ufl.Measure("ds", domain=punch.mesh, subdomain_data=punch.facet_tags)

@@ -103,6 +103,26 @@ def test_worn_depth_opens_the_gap_and_conserves_volume(coefficient):
     assert c.gap == pytest.approx(gap0 + depth + c.displacement[:, 2], abs=1e-15)
 
 
+def test_worn_volume_is_coefficient_times_work_per_direction():
+    """The sum of depth times area is the sum over both directions, whatever the areas."""
+    rng = np.random.default_rng(7)
+    work, area = rng.random((20, 2)), 0.1 + rng.random(20)
+    volume = dc.Wear((2e-4, 1e-5)).depth(work, area) @ area
+    assert volume == pytest.approx(2e-4 * work[:, 0].sum() + 1e-5 * work[:, 1].sum(), rel=1e-12)
+
+
+def test_without_wear_nothing_is_computed_for_it(monkeypatch):
+    """Without wear a step assembles no nodal areas, and no depth is worn."""
+
+    def area(contact):
+        raise AssertionError("areas are needed for wear only")
+
+    monkeypatch.setattr(dc.Contact, "area", property(area))
+    scene = scenes.block(mu=0.3, p=None)
+    drag(scene, [0.5])
+    assert not scene.contact.wear_depth.any()
+
+
 def test_wear_of_a_dragged_block_follows_archard():
     """With Archard's K and hardness H: volume = K N s / H for a normal force N and a sliding path s."""
     K, H, mu = 1e-6, 1e3, 0.3
