@@ -3,9 +3,11 @@
 #               EXPLORE=1 also computes what the paper leaves open
 # make test     all tests: the C++ ones, and the Python ones on 1, 2 and 3 MPI ranks
 # make stress   every solver on some 480 scenes, each answer judged by the NumPy twin; resumable
+# make report   error against run time: every solver, the peers beside it, the price of every ingredient;
+#               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress test test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress report test test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -16,6 +18,9 @@ punch: .venv/ready
 
 stress: .venv/ready
 	.venv/bin/python benchmarks/stress.py --output results/stress $(ARGS)
+
+report: .venv/ready
+	.venv/bin/python benchmarks/report.py --size $(if $(QUICK),quick,full) $(ARGS)
 
 study: .venv/ready
 	.venv/bin/python demos/study_punch.py --output results/study $(if $(EXPLORE),--explore) $(ARGS)

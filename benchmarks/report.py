@@ -1,0 +1,120 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Error against run time: every solver, the peers beside it, the price of every ingredient.
+
+    make report              # half an hour and more; docs/report.html, docs/report/
+    make report QUICK=1      # minutes; results/report-quick/
+
+Every measurement has a process of its own, one thread, and is kept under results/; a run that is stopped
+continues, and what was measured with other settings or another version is measured anew.  All times are
+processor seconds, so that other programs on the machine disturb them least.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from time import monotonic
+
+sys.path.insert(1, str(Path(__file__).resolve().parent.parent / "demos"))
+sys.path.insert(1, str(Path(__file__).resolve().parent.parent / "tests"))
+import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
+
+# isort: split
+import report_algebraic
+import report_growth
+import report_ladder
+import report_meshes
+import report_page
+import report_peers
+import report_stability
+from report_claims import claims, fill
+from report_run import compute, machine, measure, now, stored
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parent.parent
+SECTIONS = {
+    "algebraic": report_algebraic,
+    "meshes": report_meshes,
+    "peers": report_peers,
+    "growth": report_growth,
+    "ladder": report_ladder,
+    "stability": report_stability,
+}
+
+
+def arguments(argv=None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
+    add = parser.add_argument
+    sizes = ("full", "quick", "smallest")
+    add("--size", choices=sizes, default="full", help="smallest: minutes less, for the tests")
+    add("--sections", nargs="+", choices=SECTIONS, default=list(SECTIONS))
+    add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
+    add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
+    add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
+    add("--measure", nargs=3, help=argparse.SUPPRESS)  # function, settings, file
+    return parser.parse_args(argv)
+
+
+def run(plans: dict, directory: Path, minutes: float) -> dict:
+    """Records by section and measurement; None for what there was no time for."""
+    end = monotonic() + 60 * minutes
+    records = {section: {} for section in plans}
+    todo = [(section, measurement) for section, plan in plans.items() for measurement in plan]
+    with tqdm(total=len(todo), unit="measurement", smoothing=0.1) as bar:
+        for section, measurement in sorted(todo, key=lambda pair: pair[1].late):
+            bar.set_description(measurement.name)
+            record = stored(measurement, directory)
+            if record is None and monotonic() < end:
+                record = compute(measurement, directory)
+            records[section][measurement.name] = record
+            bar.update()
+    return records
+
+
+def evaluated(records: dict) -> dict:
+    """What the page shows of each section, with what failed and what was not run."""
+    data = {}
+    for section, of in records.items():
+        results = {name: r["result"] for name, r in of.items() if r and "result" in r}
+        data[section] = dict(
+            title=SECTIONS[section].TITLE,
+            data=SECTIONS[section].evaluate(results) if results else None,
+            failed={name: r["failed"] for name, r in of.items() if r and "failed" in r},
+            not_run=[name for name, r in of.items() if r is None],
+            measured=sorted({f"{r['date'][:10]}, {r['commit']}" for r in of.values() if r}),
+            seconds=sum(r["seconds"] for r in of.values() if r),
+            load=[max((max(r["load"]) for r in of.values() if r), default=None)],
+        )
+    return data
+
+
+def main(argv=None) -> Path:
+    options = arguments(argv)
+    if options.measure:
+        return measure(*options.measure)
+    quick = ROOT / "results" / "report-quick"
+    directory = options.measurements or (
+        ROOT / "results" / "report" if options.size == "full" else quick / "measurements"
+    )
+    output = options.output or (ROOT / "docs" if options.size == "full" else quick)
+    plans = {name: SECTIONS[name].plan(options.size) for name in options.sections}
+    records = run(plans, directory, options.minutes)
+    report = dict(date=now(), size=options.size, machine=machine(), sections=evaluated(records))
+    report["claims"] = claims(report["sections"])
+    figures = output / "report"
+    figures.mkdir(parents=True, exist_ok=True)
+    page = report_page.write(report, output / "report.html", figures)
+    report["figures"] = page
+    (figures / "report.json").write_text(json.dumps(report, indent=1, sort_keys=True) + "\n")
+    if output == ROOT / "docs":
+        for file in fill(ROOT, report["claims"]):
+            print(f"filled    {file}")
+    print(f"page      {output / 'report.html'}\nfigures   {figures}")
+    return output / "report.html"
+
+
+if __name__ == "__main__":
+    main()

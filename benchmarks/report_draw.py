@@ -1,0 +1,246 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Figures and tables of solvers: work and precision, the economy ladder, stability.
+
+Each figure comes with its name and the sentence that its numbers make.
+"""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator
+
+COLOURS = {  # Okabe and Ito: for all eyes
+    "condensed Newton": "#0072b2",
+    "fixed point, return": "#d55e00",
+    "fixed point, bipotential": "#009e73",
+    "elastic solve": "#555555",
+}
+MARKERS = dict(zip(COLOURS, "os^D"))
+REACHED = 1e-8
+
+
+def style(solver: str) -> dict:
+    return dict(color=COLOURS[solver], marker=MARKERS[solver], ms=4, lw=1.4, label=solver)
+
+
+def panels(count: int, columns: int = 3, size=(4.4, 3.7)):
+    """A figure with ``count`` panels and room for one legend above."""
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows + 0.7), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax in axes[count:]:
+        ax.set_axis_off()
+    return figure, axes[:count]
+
+
+def legend(figure, ax, **options) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False, **options)  # fmt: skip
+
+
+def algebraic(data):
+    rows = data["rows"]
+    figure, axes = panels(len(rows))
+    for ax, row in zip(axes, rows):
+        for solver, curve in row["curves"].items():
+            seconds = np.array(curve["seconds"])
+            lower, upper = seconds - curve["least"], np.array(curve["largest"]) - seconds
+            ax.errorbar(1e3 * seconds, np.maximum(curve["error"], 1e-16), xerr=1e3 * np.abs([lower, upper]),
+                elinewidth=0.4, **style(solver))  # fmt: skip
+        ax.axhline(REACHED, color="0.6", lw=1)
+        ax.set(xscale="log", yscale="log", xlabel="processor time of the step [ms]", ylabel="error")
+        ax.yaxis.set_major_locator(LogLocator(numticks=8))
+        ax.set_title(
+            f"{row['scene']}: step {row['watched']}, {row['unknowns']} unknowns", fontsize=11
+        )
+    legend(figure, axes[0])
+    wins = {}
+    for row in rows:
+        wins.setdefault(row["best"], []).append(row["scene"])
+    parts = [f"{solver} in {', '.join(scenes)}" for solver, scenes in wins.items() if solver]
+    never = [
+        f"{solver} in {row['scene']}"
+        for row in rows for solver in row["curves"] if row[solver]["seconds_to_1e_8"] is None
+    ]  # fmt: skip
+    yield "precision", figure, (
+        f"First at an error of {REACHED:g}: " + "; ".join(parts) + "."
+        + (f" Never there: {', '.join(never)}." if never else " Every solver gets there in every scene.")
+    )  # fmt: skip
+
+    figure, axes = panels(len(rows))
+    refused = []
+    for ax, row in zip(axes, rows):
+        for solver, run in row["runs"].items():
+            ax.plot(
+                np.arange(1, len(run["seconds"]) + 1), np.cumsum(run["seconds"]), **style(solver)
+            )
+            if run["said"]:
+                ax.plot(len(run["seconds"]), sum(run["seconds"]), "x", color="black", ms=12, mew=2)
+                refused.append(f"{solver} in {row['scene']} (step {len(run['seconds'])})")
+        ax.set(yscale="log", xlabel="steps", ylabel="processor seconds so far")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_title(row["scene"], fontsize=11)
+    legend(figure, axes[0])
+    pays = [
+        f"{row['scene']} after {row['pays_after']:.0f}"
+        for row in rows
+        if row["pays_after"] is not None
+    ]
+    never = [row["scene"] for row in rows if row["pays_after"] is None]
+    yield "setup", figure, (
+        "The dearer set-up of the condensed Newton pays against the return map, in steps: "
+        + (", ".join(pays) or "nowhere") + (f"; never in {', '.join(never)}" if never else "") + "."
+        + (f" Refused (cross): {'; '.join(refused)}." if refused else "")
+    )  # fmt: skip
+
+
+def algebraic_tables(data):
+    table = []
+    for row in data["rows"]:
+        for solver in row["curves"]:
+            of = row[solver]
+            table.append({
+                "scene": row["scene"], "solver": solver, "to 1e-8 [ms]": _ms(of["seconds_to_1e_8"]),
+                "over the best": of["ratio"], "set-up [ms]": _ms(of["setup"]),
+                "median step [ms]": _ms(of["step"] and of["step"]["median"]),
+                "fastest": _ms(of["step"] and of["step"]["least"]),
+                "slowest": _ms(of["step"] and of["step"]["largest"]),
+                "programme [s]": of["all"], "iterations": of["iterations"], "worst error": of["error"],
+                "refused": of["refused"][:60],
+            })  # fmt: skip
+    yield table
+
+
+def _ms(seconds):
+    return None if seconds is None else 1e3 * seconds
+
+
+def ladder(data):
+    rows = data["rows"]
+    names = [row["rung"] for row in rows][::-1]
+    figure = Figure(figsize=(13, 0.42 * len(rows) + 1.6), layout="constrained")
+    axes = figure.subplots(1, 3, sharey=True)
+    for ax, key, title, scale in zip(
+        axes, ("step", "set_up", "bytes"),
+        ("one step [ms]", "first step with set-up [ms]", "memory beyond mesh and forms [MB]"),
+        (1e3, 1e3, 1e-6),
+    ):  # fmt: skip
+        values = np.array([row[key] if key == "bytes" else row[key]["median"] for row in rows])[
+            ::-1
+        ]
+        values = np.maximum(values, 1e-3 / scale)
+        ax.barh(names, scale * values, color="#0072b2", height=0.65)
+        ends = values
+        if key != "bytes":
+            low, high = (
+                np.array([row[key][end] for row in rows])[::-1] for end in ("least", "largest")
+            )
+            ends = high
+            ax.errorbar(scale * values, names, xerr=scale * np.array([values - low, high - values]),
+                fmt="none", ecolor="black", elinewidth=1)  # fmt: skip
+        for name, end, value in zip(names, ends, values):
+            ax.text(1.1 * scale * end, name, f"{scale * value:.3g}", va="center", fontsize=10)
+        ax.set(xscale="log", xlabel=title)
+        ax.set_xlim(0.4 * scale * values.min(), 4 * scale * ends.max())
+        ax.grid(axis="y", visible=False)
+    compared = [row for row in rows if row.get("compared_with") and "saves" in row]
+    nothing = [f"{row['rung']} (time {row['step_ratio']:.2f} of {row['compared_with']})"
+               for row in compared if not row["saves"]]  # fmt: skip
+    saved = [
+        f"{row['rung']} {row['step_ratio']:.2g} of {row['compared_with']}"
+        for row in compared if "step" in row["saves"]
+    ]  # fmt: skip
+    yield "ladder", figure, (
+        f"Time of a step: {'; '.join(saved) or 'no rung saves any'}. "
+        + (f"Neither time, set-up nor memory is saved by more than 5 % by: {', '.join(nothing)}." if nothing
+           else "Every rung saves time, set-up or memory.")
+    )  # fmt: skip
+    if data["imports"]:
+        yield _imports(data["imports"])
+
+
+def _imports(data):
+    found = data["rows"]
+    figure = Figure(figsize=(8, 2.6), layout="constrained")
+    ax = figure.subplots()
+    names = [f"import {name}" for name in found][::-1]
+    values = [of["median"] for of in found.values()][::-1]
+    ends = np.abs([[of[end] - of["median"] for of in found.values()][::-1] for end in ("least", "largest")])  # fmt: skip
+    ax.barh(names, values, xerr=ends, color="#0072b2", height=0.6)
+    ax.set(xlabel="processor seconds")
+    ax.grid(axis="y", visible=False)
+    ours, least, most = (found[n] for n in ("dolfinx_contact", *list(found)[:2]))
+    beyond = ", ".join(name for name in data["beyond_dolfinx"] if not name.startswith("_"))
+    return "imports", figure, (
+        f"import dolfinx_contact takes {ours['median']:.2f} s, {ours['median'] / least['median']:.2f} times "
+        f"import dolfinx and {ours['median'] / most['median']:.2f} times that with what every script of DOLFINx imports; "
+        f"its own modules are {data['own_modules_ms']:.0f} ms of it; beyond dolfinx it brings {beyond}."
+    )  # fmt: skip
+
+
+def ladder_tables(data):
+    yield [
+        {
+            "rung": row["rung"], "compared with": row["compared_with"], "step, ratio": row.get("step_ratio"),
+            "set-up, ratio": row.get("set_up_ratio"), "memory, ratio": row.get("bytes_ratio"),
+            "unknowns": row["unknowns"], "condensed": row["condensed"], "iterations a step": row["iterations"],
+            **{f"{key} a step": value for key, value in row["counts"].items()},
+        }
+        for row in data["rows"]
+    ]  # fmt: skip
+
+
+def stability(data):
+    records = data["records"]
+    solvers = list(dict.fromkeys(record["solver"] for record in records))
+    groups = list(dict.fromkeys(record["group"] for record in records))
+    most = max(sum(r["group"] == g and r["solver"] == s for r in records) for g in groups for s in solvers)  # fmt: skip
+    figure = Figure(figsize=(15, 0.36 * len(groups) * len(solvers) ** 0.7 + 2.2), layout="constrained")  # fmt: skip
+    axes = figure.subplots(1, len(solvers), sharey=True, squeeze=False)[0]
+    colours = matplotlib.colormaps["viridis_r"]
+    norm = LogNorm(1e-16, 1e-7)
+    columns = max(1, -(-most // 3)) if most > 24 else most
+    for ax, solver in zip(axes, solvers):
+        for k, group in enumerate(groups):
+            of = [r for r in records if r["group"] == group and r["solver"] == solver]
+            lines = max(1, -(-len(of) // columns))
+            for i, record in enumerate(of):
+                x, y = i % columns, k + (i // columns + 0.5) / lines - 0.5
+                if record["outcome"] == "refused":
+                    ax.plot(x, y, "x", color="#d00000", ms=6, mew=1.8)
+                elif record["outcome"] == "WRONG":
+                    ax.plot(x, y, "o", color="#d00000", ms=9)
+                else:
+                    ax.plot(x, y, "s", color=colours(norm(max(record["error"], 1e-16))), ms=5)
+        ax.set_title(solver)
+        ax.set(yticks=range(len(groups)), yticklabels=groups, xticks=[], xlim=(-1, columns))
+        ax.set_ylim(len(groups) - 0.4, -0.6)
+        ax.grid(visible=False)
+    figure.colorbar(matplotlib.cm.ScalarMappable(norm, colours), ax=axes, label="largest error found by the judge",
+        shrink=0.8, aspect=25)  # fmt: skip
+    count = data["by_solver"]
+    counted = "; ".join(f"{s} {c['solved']} of {c['scenes']}" for s, c in count.items())
+    third = data["third_state"]
+    part = (
+        ""
+        if data["whole"]
+        else f" This is a part of the {data['all_scenes']} scenes; make stress runs all."
+    )
+    yield "stability", figure, (
+        f"Solved: {counted}; the others refused with an exception (cross). "
+        + ("There is no third state: no answer is wrong" if third == 0 else f"{third} answers are WRONG or not refused (disc)")
+        + f". Largest error of an answer {data['worst']:.1e}. Singular stiffness refused: "
+        f"{data['singular_refused']} of {data['singular']}.{part}"
+    )  # fmt: skip
+
+
+def stability_tables(data):
+    yield [
+        {key: record[key] for key in ("group", "name", "solver", "outcome", "error", "said")}
+        for record in data["not_solved"]
+    ]

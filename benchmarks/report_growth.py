@@ -1,0 +1,157 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Growth: seconds, iterations and memory of a step of the punch against unknowns, solver by solver."""
+
+from __future__ import annotations
+
+from time import process_time
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+from punch import Parameters, Punch, programme
+from report_run import Measurement, Memory
+
+from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
+
+TITLE = "Growth"
+SOLVERS = {
+    "condensed Newton": dc.CondensedNewton,
+    "fixed point, return": lambda: dc.FixedPoint(map="return"),
+    "fixed point, bipotential": lambda: dc.FixedPoint(map="bipotential"),
+    "solver=None": lambda: None,
+}
+# Divisions and layers of the mesh, and up to which size each solver is measured: beyond, it only costs time.
+SIZES = [(2, 2), (4, 2), (8, 4), (12, 6), (16, 8), (24, 12), (32, 16)]
+LAST = {"condensed Newton": 4, "fixed point, bipotential": 4, "solver=None": 5}
+FREE = 1.1  # the choice of solver=None is right if no other solver is faster by more than this
+
+
+def plan(size: str) -> list[Measurement]:
+    sizes = dict(full=SIZES[1:], quick=SIZES[1:4], smallest=SIZES[:2])[size]
+    names = ["fixed point, return"] if size == "smallest" else SOLVERS
+    return [
+        Measurement(
+            f"growth/{name}_{divisions}".replace(" ", "_"), "report_growth:steps",
+            dict(name=name, divisions=divisions, layers=layers), late=divisions > 16,
+        )
+        for divisions, layers in sizes for name in names
+        if SIZES.index((divisions, layers)) < LAST.get(name, len(SIZES))
+    ]  # fmt: skip
+
+
+def steps(name: str, divisions: int, layers: int) -> dict:
+    """Case C: pressed in one step, raised in two, so that two of three steps reverse the slip; tol 1e-8.
+
+    Beside them, in the same process, one linear elastic solve of the same body: conjugate gradients with the
+    library's multigrid, from zero to 1e-10.
+    """
+    parameters = Parameters(case="C", loading=1, unloading=2, tol=1e-8)
+    punch = Punch(parameters, divisions=divisions, layers=layers)
+    problem, displacements = punch.problem, programme(parameters)
+    solver = SOLVERS[name]()
+    if solver is not None:
+        problem.solver = solver
+    elastic = [elastic_solve(punch)]
+    problem.body.K = problem.body._digest = None  # the first step assembles for itself
+    memory = Memory()
+    seconds, iterations, said, chosen = [], [], "", ""
+    for displacement in displacements:
+        punch.approach.value = -displacement
+        start = process_time()
+        try:
+            step = problem.solve()
+        except (dc.NotConverged, MemoryError) as failure:
+            said = f"{type(failure).__name__}: {str(failure)[:150]}"
+            break
+        seconds.append(process_time() - start)
+        iterations.append(step.iterations)
+        chosen = step.solver
+    added = memory.added()
+    elastic.append(elastic_solve(punch))
+    again = float("nan")
+    if not said:  # the first step once more, to know its set-up
+        problem.reset()
+        punch.approach.value = -displacements[0]
+        start = process_time()
+        problem.solve()
+        again = process_time() - start
+    return dict(
+        unknowns=problem.body.size, nodes=len(punch.contact.nodes), seconds=seconds, first_again=again,
+        iterations=iterations, bytes=added, elastic=elastic, said=said, chosen=chosen,
+    )  # fmt: skip
+
+
+def elastic_solve(punch) -> float:
+    """Processor seconds of K u = b by conjugate gradients with multigrid, set-up left out."""
+    body = punch.problem.body
+    punch.approach.value = -punch.parameters.depth
+    body.refresh()
+    b, _ = body.load()
+    options = {**MULTIGRID, "ksp_rtol": 1e-10}
+    for of_guess in [key for key in options if "guess" in key]:
+        del options[of_guess]
+    solver = LinearSolver(body.K, options, "elastic_", body._rigid_modes)
+    start = process_time()
+    solver.solve(b)
+    return process_time() - start
+
+
+def evaluate(results: dict) -> dict:
+    """Rows by solver and size, exponents, and whether ``solver=None`` takes the best at each size."""
+    rows, refused, elastic = [], [], {}
+    for name, result in results.items():
+        solver = next(s for s in SOLVERS if f"/{s}_".replace(" ", "_") in name)
+        elastic.setdefault(result["unknowns"], []).extend(result["elastic"])
+        if result["said"]:
+            refused.append(f"{solver} at {result['unknowns']} unknowns ({result['said'][:90]})")
+            continue
+        warm = [result["first_again"], *result["seconds"][1:]]
+        rows.append(dict(
+            solver=solver, unknowns=result["unknowns"], nodes=result["nodes"], step=float(np.mean(warm)),
+            setup=max(result["seconds"][0] - result["first_again"], 0.0), bytes=result["bytes"],
+            iterations=float(np.mean(result["iterations"])), chosen=result["chosen"],
+        ))  # fmt: skip
+    for unknowns, seconds in elastic.items():
+        rows.append(dict(solver="elastic solve", unknowns=unknowns, nodes=0, step=float(np.median(seconds)),
+            setup=0.0, bytes=0, iterations=0.0, chosen=""))  # fmt: skip
+    rows.sort(key=lambda row: (row["solver"], row["unknowns"]))
+    for row in rows:
+        row["over_elastic"] = row["step"] / float(np.median(elastic[row["unknowns"]]))
+    return dict(rows=rows, refused=refused, fits=fits(rows), choices=choices(rows))
+
+
+def fits(rows: list[dict]) -> dict:
+    """Exponents of the growth with the unknowns, least squares of logarithms, from 1e3 unknowns on."""
+    found = {}
+    for solver in (*SOLVERS, "elastic solve"):
+        of = [row for row in rows if row["solver"] == solver and row["unknowns"] > 500]
+        if solver == "solver=None" or not of:
+            continue
+        found[solver] = {
+            key: float(np.polyfit(np.log([r["unknowns"] for r in of]), np.log([r[key] for r in of]), 1)[0])
+            if len(of) > 1 and all(r[key] > 0 for r in of) else None
+            for key in ("step", "iterations", "bytes")
+        }  # fmt: skip
+    return found
+
+
+def choices(rows: list[dict]) -> list[dict]:
+    """At each size: the best solver for many steps, what ``solver=None`` took, and what that costs."""
+    found = []
+    for auto in (row for row in rows if row["solver"] == "solver=None"):
+        others = [
+            row for row in rows
+            if row["unknowns"] == auto["unknowns"] and row["solver"] in list(SOLVERS)[:3]
+        ]  # fmt: skip
+        if not others:
+            continue
+        best = min(others, key=lambda row: row["step"])
+        taken = auto["chosen"].split()[0]
+        same = [row for row in others if taken == "CondensedNewton" and row["solver"] == "condensed Newton"
+                or taken == "FixedPoint" and row["solver"] == "fixed point, return"]  # fmt: skip
+        loss = same[0]["step"] / best["step"] if same else auto["step"] / best["step"]
+        found.append(dict(unknowns=auto["unknowns"], auto=taken, best=best["solver"], loss=loss,
+            right=loss <= FREE))  # fmt: skip
+    return found

@@ -1,0 +1,117 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The report's page: one HTML file, every figure in it as SVG, under each the sentence that its numbers make."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from pathlib import Path
+
+import report_draw
+import report_draw_sizes
+import study_page
+from matplotlib import rc_context
+
+DRAW, TABLES = {}, {}
+for module in (report_draw, report_draw_sizes):
+    for name in ("algebraic", "meshes", "peers", "growth", "ladder", "stability"):
+        if hasattr(module, name):
+            DRAW[name], TABLES[name] = getattr(module, name), getattr(module, f"{name}_tables")
+
+STYLE = study_page.STYLE + "\nsvg { max-width: 100%; height: auto; } .bad { color: #b00020; }"
+DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
+
+
+def write(report: dict, file: Path, figures: Path) -> dict[str, str]:
+    """Draw all sections and write the page.
+
+    Returns:
+        The sentence of each figure by its name.
+    """
+    for old in figures.glob("*.svg"):
+        old.unlink()
+    body, sentences = [head(report)], {}
+    for number, (name, section) in enumerate(report["sections"].items(), start=1):
+        body.append(f"<h2>{number}. {html.escape(section['title'])}</h2>")
+        if section["data"]:
+            with rc_context(DRAWING):
+                for figure, drawing, sentence in DRAW[name](section["data"]):
+                    drawing.savefig(figures / f"{figure}.svg", metadata={"Date": None})
+                    sentences[figure] = sentence
+                    body.append(picture(figures / f"{figure}.svg", sentence))
+            body += [table(rows) for rows in TABLES[name](section["data"])]
+        body += remarks(section)
+    body.append(f"<h2>Machine</h2><code>{html.escape(json.dumps(report['machine'], indent=1))}</code>")  # fmt: skip
+    title = '<meta charset="utf-8"><title>dolfinx_contact: error against run time</title>'
+    file.write_text(
+        f'<!doctype html><html lang="en"><head>{title}<style>{STYLE}</style></head><body>'
+        + "\n".join(body) + "</body></html>\n"
+    )  # fmt: skip
+    return sentences
+
+
+def head(report: dict) -> str:
+    machine, size = report["machine"], report["size"]
+    loads = [s["load"][0] for s in report["sections"].values() if s["load"][0] is not None]
+    short = (
+        "" if size == "full" else f"<p class='bad'>This is the {size} report: less is measured.</p>"
+    )
+    return (
+        f"<h1>dolfinx_contact: error against run time</h1>{short}<p>{report['date']}; "
+        f"{html.escape(machine['processor'])}, {machine['cores']} cores, {machine['memory_gb']} GB; "
+        f"{html.escape(machine['compiler'])}; DOLFINx {machine['dolfinx']}, PETSc {machine['petsc']}, "
+        f"dolfinx_contact {machine['dolfinx_contact']} ({machine['commit']}). Times are processor seconds of one "
+        "thread, medians of repeated runs in the same hour on the same machine, which other programs shared "
+        f"(load average up to {max(loads, default=0):.1f}): ratios mean more than times. Raw numbers: "
+        "report/report.json.</p>"
+    )  # fmt: skip
+
+
+def remarks(section: dict) -> list[str]:
+    """What failed, what was not run, when it was measured."""
+    lines = [
+        f"<p class='bad'>Failed: {html.escape(name)}: {html.escape(said[-300:])}</p>"
+        for name, said in section["failed"].items()
+    ]
+    if section["not_run"]:
+        lines.append(
+            f"<p class='bad'>Not run, there was no time: {html.escape(', '.join(section['not_run']))}.</p>"
+        )
+    lines.append(
+        f"<p>Measured {html.escape('; '.join(section['measured']))}, in {section['seconds']:.0f} s.</p>"
+    )
+    return lines
+
+
+def picture(file: Path, sentence: str) -> str:
+    """The SVG itself, without what only a file of its own needs."""
+    svg = file.read_text()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    # Identifiers of two figures in one page must not meet.
+    svg = re.sub(r'\bid="', f'id="{file.stem}-', svg)
+    svg = re.sub(r"url\(#", f"url(#{file.stem}-", svg)
+    svg = re.sub(r'xlink:href="#', f'xlink:href="#{file.stem}-', svg)
+    return f"<figure>{svg}<figcaption><b>{html.escape(sentence)}</b></figcaption></figure>"
+
+
+def table(rows: list[dict]) -> str:
+    """Dictionaries as rows; numbers to three digits."""
+    if not rows:
+        return ""
+    lines = ["<tr>" + "".join(f"<th>{html.escape(key)}</th>" for key in rows[0]) + "</tr>"]
+    for row in rows:
+        lines.append("<tr>" + "".join(cell(row.get(key)) for key in rows[0]) + "</tr>")
+    return "<table>" + "\n".join(lines) + "</table>"
+
+
+def cell(value) -> str:
+    if value is None:
+        return "<td>–</td>"
+    if isinstance(value, float):
+        return f"<td>{value:.3g}</td>"
+    if isinstance(value, int):
+        return f"<td>{value}</td>"
+    return f'<td class="text">{html.escape(str(value))}</td>'
