@@ -42,7 +42,9 @@ class Figures:
 
     def save(self, figure: Figure, name: str) -> None:
         for suffix in ("svg", "png"):
-            figure.savefig(self.directory / f"{name}.{suffix}", dpi=110)
+            # undated: the same figure has the same bytes
+            metadata = {"Date": None} if suffix == "svg" else None
+            figure.savefig(self.directory / f"{name}.{suffix}", dpi=110, metadata=metadata)
 
     def _maps(self, columns, name, title) -> None:
         """Load function at steps, one row a case; ``columns`` are titles and functions of a run."""

@@ -52,7 +52,7 @@ def energy(figures: Figures) -> None:
         handles = axes[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
         figure.suptitle(
-            "Energy balance: the work of the platen is the sum of the first four terms below it"
+            "Energy balance: the work of the platen is the sum of the next four terms of the legend"
         )
         figures.save(figure, "energy")
     names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual",
