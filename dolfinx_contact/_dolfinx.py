@@ -16,7 +16,7 @@ except ImportError:
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem, graph, la
 from petsc4py import PETSc
 
 if np.issubdtype(PETSc.ScalarType, np.complexfloating):
@@ -62,6 +62,25 @@ def model_to_mesh(model, comm, rank, gdim=3):
     return SimpleNamespace(mesh=found[0], cell_tags=found[1], facet_tags=found[2])
 
 
+def partitioner(ranks, nodes_per_cell):
+    """A ``partitioner`` for ``create_box`` and others, from a function of this rank's number of cells.
+
+    ``ranks(cells, size)`` gives the rank of each of the ``cells`` that this rank hands in.
+    """
+
+    def partition(comm, size, *cells):
+        # an adjacency list before 0.10 (0.5 gives a ghost mode after it), a list of flat arrays since
+        cells = next(c for c in reversed(cells) if isinstance(c, list) or hasattr(c, "num_nodes"))
+        count = cells[0].size // nodes_per_cell if isinstance(cells, list) else cells.num_nodes
+        destinations = np.asarray(ranks(count, size), dtype=np.int32)
+        if not hasattr(graph, "adjacencylist"):
+            return dolfinx.cpp.graph.AdjacencyList_int32(destinations)
+        destinations = graph.adjacencylist(destinations)
+        return getattr(destinations, "_cpp_object", destinations)
+
+    return partition
+
+
 def is_function_space(V) -> bool:
     return isinstance(V, fem.FunctionSpace if hasattr(fem, "FunctionSpace") else ())
 
@@ -79,7 +98,7 @@ def cell_nodes(V):
     """Local node indices of each cell, ``shape=(cells, nodes)``: an adjacency list before 0.8."""
     nodes = V.dofmap.list
     if hasattr(nodes, "array"):
-        nodes = nodes.array.reshape(nodes.num_nodes, -1)
+        nodes = nodes.array.reshape(nodes.num_nodes, V.dofmap.dof_layout.num_dofs)
     return nodes
 
 
@@ -102,6 +121,11 @@ def assemble_into(x, form) -> None:
     """Assemble a linear form into the distributed vector ``x`` and add what ghosts hold to owners."""
     x.array[:] = 0.0
     fem.assemble_vector(x.array, form)
+    add_to_owners(x)
+
+
+def add_to_owners(x) -> None:
+    """Add what this rank's ghosts hold in the distributed vector ``x`` to their owners."""
     x.scatter_reverse(_ADD)
 
 

@@ -53,7 +53,7 @@ class ElasticBody:
         fixed = [_dolfinx.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
         self._options = None if petsc_options is None else dict(petsc_options)
-        self._prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
+        self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
         self._assemblies = 0
         self.K, self._external = None, None
@@ -201,7 +201,7 @@ class ElasticBody:
 
     def solver(self, A) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
-        return LinearSolver(A, self._options, self._prefix, self._rigid_modes)
+        return LinearSolver(A, self._options, self.prefix, self._rigid_modes)
 
     def _rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""

@@ -218,6 +218,22 @@ class Contact:
         else:
             self.reaction, self.status = self.law.return_map(*state, self.rho)
 
+    def update_with_derivatives(self, u, map: str = "bipotential") -> tuple[np.ndarray, np.ndarray]:
+        """As ``update``, and the (Clarke) derivatives of the new reactions on the branches taken.
+
+        Returns:
+            Derivatives by the reaction before, dimensionless, and by slip and gap, force per length;
+            ``shape=(n, gdim, gdim)`` each, local frame.
+        """
+        self.move(u)
+        state = (self.reaction, self.gap, self.slip_increment, self.rho)
+        if map == "bipotential":
+            result = self.law.bipotential_jacobian(*state)
+        else:
+            result = self.law.return_jacobian(*state, self.rho)
+        self.reaction, self.status = result[:2]
+        return result[2:]
+
     def take_reaction(self, forces: np.ndarray) -> None:
         """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
         self.reaction = forces[self._dofs] @ self.frame.T

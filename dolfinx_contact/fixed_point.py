@@ -10,6 +10,10 @@ from dolfinx_contact.anderson import Anderson
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
 METRICS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
+# The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
+# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early.
+EVERY, GROWTH = 20, 100.0
+
 
 class FixedPoint:
     """Predictor and corrector in every iteration, without a condensed operator.
@@ -18,7 +22,9 @@ class FixedPoint:
     does the predictor and the projection on the friction cone [dSFMH07, Section 2], puts the new
     reactions into the residual, and corrects the displacement by one back-solve with the
     stiffness plus springs at the contact nodes, see ``Contact.springs``.  The zero of the residual
-    does not depend on the metric rho.  Anderson's method accelerates the sequence.
+    does not depend on the metric rho.  Anderson's method accelerates the sequence.  Every twenty iterations
+    the contact is linearised, and the layers next to the plane are then corrected with that
+    tangent before the back-solve, see ``SurfaceLayer``.
 
     Args:
         map: "bipotential", the paper's predictor and Euclidean projection, or "return", see
@@ -46,7 +52,8 @@ class FixedPoint:
 
         Args:
             system: Offers ``residual(x) -> (residual, error)``, ``correction(residual)``,
-                ``use_metric(map, factor)`` and ``total(array)``; nothing else is known of it.
+                ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()`` and
+                ``total(array)``; nothing else is known of it.
             x: Start, this rank's unknowns.
 
         Returns:
@@ -57,13 +64,22 @@ class FixedPoint:
         for factor in METRICS[self.map] if self.rho is None else (self.rho,):
             system.use_metric(self.map, factor)
             anderson = Anderson(x.size, self.depth, system.total)
-            x, smallest = best[1], np.inf
-            for _ in range(self.max_iterations):
+            x, smallest, due, bound = best[1], np.inf, EVERY, np.inf
+            for iteration in range(self.max_iterations):
                 residual, error = system.residual(x)
                 if error < best[0]:
                     best = (error, x)
                 if error <= tol or not np.isfinite(error):
                     break
+                if error > bound:  # the tangent misleads: without it, again from the best
+                    system.forget_tangent()
+                    anderson.restart()
+                    x, bound, smallest, due = best[1], np.inf, np.inf, iteration + EVERY
+                    continue
+                if iteration >= due:
+                    system.linearise(x)
+                    anderson.restart()
+                    bound, smallest, due = GROWTH * error, np.inf, iteration + EVERY
                 following, norm = anderson.step(x, system.correction(residual))
                 iterations += 1
                 if norm > 1e3 * smallest:  # the differences mislead: start again from the best

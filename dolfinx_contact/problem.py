@@ -19,6 +19,7 @@ from dolfinx_contact.condensed import CondensedBody
 from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
+from dolfinx_contact.surface_layer import SurfaceLayer
 
 
 class Counts(NamedTuple):
@@ -117,7 +118,7 @@ class ContactProblem:
             for contact in self.contacts:
                 contact.held = _held_directions(contact, self.body.fixed)
         self._stiffened = {}
-        self._condensed = None
+        self._condensed = self._layer = None
         self._assembled = 0
         self.reset()
 
@@ -225,7 +226,7 @@ class ContactProblem:
         if assembled != self._assembled:
             self._assembled = assembled
             self._stiffened.clear()
-            self._condensed = None
+            self._condensed = self._layer = None
             for contact in self.contacts:
                 contact.set_metric(body.K)
             self._stiffness = [contact.rho for contact in self.contacts]
@@ -321,6 +322,7 @@ class _ContactEquations:
         self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
         self._metric = ("bipotential", 1.0)
+        self._tangent = None  # SurfaceLayer, once linearised
         self._measured = None  # displacement whose errors were measured with F
 
     def guess(self) -> np.ndarray:
@@ -342,6 +344,7 @@ class _ContactEquations:
     def use_metric(self, map: str, factor: float) -> None:
         """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
         self._metric = metric = (map, factor)
+        self._tangent = None
         stiffened = self.problem._stiffened
         if metric in stiffened:
             return
@@ -352,12 +355,39 @@ class _ContactEquations:
         stiffened.clear()  # one factorisation at a time: memory counts more than a second try
         stiffened[metric] = self.body.solver(A)
 
+    def linearise(self, x: np.ndarray) -> None:
+        """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
+        problem, self._measured = self.problem, None  # contacts will move
+        if problem._layer is None:
+            prefix = f"{self.body.prefix}layer_"
+            problem._layer = SurfaceLayer(self.body, problem.contacts, prefix)
+        map, factor = self._metric
+        forces = self.body.multiply(x) - self.b
+        derivatives = []
+        for contact, stiffness in zip(problem.contacts, problem._stiffness):
+            contact.rho = factor * stiffness
+            contact.take_reaction(forces)
+            derivatives.append(contact.update_with_derivatives(x, map))
+        problem._layer.linearise(derivatives)
+        self._tangent = problem._layer
+
+    def forget_tangent(self) -> None:
+        """Corrections as before ``linearise``."""
+        self._tangent = None
+
     def correction(self, residual: np.ndarray) -> np.ndarray:
         """Displacement that removes the residual while the springs hold the contact nodes.
 
         One application of the preconditioner: exact with a factorisation, one cycle of multigrid.
+        After ``linearise`` the layers next to the plane are corrected first.
         """
-        correction = self.problem._stiffened[self._metric].apply(residual)
+        residual = residual.copy()
+        residual[self.body.fixed] = 0.0
+        near = 0.0
+        if self._tangent is not None:
+            near = self._tangent.solve(residual)
+            residual -= self._tangent.multiply(near)
+        correction = near + self.problem._stiffened[self._metric].apply(residual)
         correction[self.body.fixed] = 0.0
         return correction
 

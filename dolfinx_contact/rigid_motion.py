@@ -66,7 +66,7 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
     for k, (i, j) in enumerate(pairs, start=gdim):
         modes[:, i, k], modes[:, j, k] = -x[:, j], x[:, i]
     modes[~here] = 0.0
-    return modes.reshape(gdim * n, -1)
+    return modes.reshape(gdim * n, modes.shape[2])
 
 
 def _connected_parts(V, comm) -> tuple[np.ndarray, int]:

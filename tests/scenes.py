@@ -40,6 +40,7 @@ def block(
     turn=None,
     tol=1e-10,
     wear=None,
+    partitioner=None,
     **options,
 ):
     """A block whose top is held and moved and whose bottom meets the plane through the origin.
@@ -49,9 +50,10 @@ def block(
     gdim = len(cells)
     turn = np.eye(3) if turn is None else turn
     low, high = [-0.5] * (gdim - 1) + [0.0], [0.5] * (gdim - 1) + [0.6]
+    distribution = {} if partitioner is None else {"partitioner": partitioner}
     if gdim == 3:
         domain = mesh.create_box(
-            comm, [np.array(low), np.array(high)], cells, mesh.CellType.hexahedron
+            comm, [np.array(low), np.array(high)], cells, mesh.CellType.hexahedron, **distribution
         )
     else:
         domain = mesh.create_rectangle(

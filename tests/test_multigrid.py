@@ -1,0 +1,53 @@
+"""The fixed point with one multigrid cycle per iteration: the same on any number of ranks, however they share."""
+
+import numpy as np
+import pytest
+import scenes
+from mpi4py import MPI
+
+import dolfinx_contact as dc
+from dolfinx_contact._dolfinx import partitioner
+from dolfinx_contact.linear_solver import MULTIGRID
+
+PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
+# Cells of the block, and who owns them: flat elements are shared out like tiles, tall stacks by height.
+SHARES = {
+    "contact on all ranks": ((3, 12, 3), None),
+    "contact on one rank": ((2, 2, 24), None),
+    "all cells on one rank": ((6, 6, 4), partitioner(lambda cells, size: np.zeros(cells), 8)),
+}
+
+
+def run(comm, cells, owners=None):
+    """Reactions and iterations after every step, the scene, and its ranks with cells and contact nodes."""
+    scene = scenes.block(
+        comm, cells, solver=dc.FixedPoint(map="return"), petsc_options=MULTIGRID,
+        partitioner=owners,
+    )  # fmt: skip
+    reactions, iterations = [], []
+    for displacement in PRESS:
+        scene.move_top(*displacement)
+        step = scene.problem.solve()
+        assert max(step.error, step.slip_error) <= scene.problem.tol
+        reactions.append(scenes.gathered(scene.contact)[1])
+        iterations.append(step.iterations)
+    cells = comm.allgather(scene.mesh.topology.index_map(3).size_local)
+    nodes = comm.allgather(len(scene.contact.nodes))
+    return np.array(reactions), np.array(iterations), np.count_nonzero([cells, nodes], axis=1)
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_ranks_change_neither_the_answer_nor_the_iterations(share):
+    """Reactions are those of one rank alone to 1e-8, iterations within a quarter, whoever owns what."""
+    cells, owners = SHARES[share]
+    together, counts, having = run(scenes.COMM, cells, owners)
+    alone, counts_alone, _ = run(MPI.COMM_SELF, cells)
+    size = scenes.COMM.size
+    expected = {
+        "contact on all ranks": [size, size],
+        "contact on one rank": [size, 1],
+        "all cells on one rank": [1, 1],
+    }
+    assert having.tolist() == expected[share]  # ranks with cells, with contact nodes
+    assert np.abs(together - alone).max() <= 1e-8 * np.abs(alone).max()
+    assert (np.abs(counts - counts_alone) <= np.maximum(0.25 * counts_alone, 1)).all()

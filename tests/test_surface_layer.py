@@ -1,0 +1,81 @@
+"""The linearised contact near the plane: its Jacobian, its block, and what it is for."""
+
+import numpy as np
+import pytest
+import scenes
+
+import dolfinx_contact as dc
+from dolfinx_contact.linear_solver import MULTIGRID
+from dolfinx_contact.problem import _ContactEquations
+
+LAWS = [(0.0, None), (0.2, None), ((0.3, 0.15), None), ((0.3, 0.15), (0.05, 0.2))]
+
+
+def linearised(map, turn=None, **options):
+    """Equations of a step of a pressed and sheared block, linearised at a state with all statuses."""
+    scene = scenes.block(cells=(6, 6, 3), turn=turn, **options)
+    scene.move_top(0.001, 0.0005, -0.005)
+    scene.problem.solve()
+    scene.move_top(0.002, 0.0, -0.003)
+    problem = scene.problem
+    b, external = problem.body.load()
+    trial = problem.body.solve(b)
+    equations = _ContactEquations(problem, b, trial, *problem._load(trial, external))
+    equations.use_metric(map, 1.0)
+    x = problem._states[0] + 0.3 * (trial - problem._states[0])
+    x[problem.body.fixed] = b[problem.body.fixed]
+    return equations, x
+
+
+@pytest.mark.parametrize("map", ["return", "bipotential"])
+@pytest.mark.parametrize("mu, p", LAWS)
+def test_tangent_is_the_derivative_of_the_residual(map, mu, p):
+    """J x is the difference quotient of the fixed point's residual, in any direction, in a turned frame."""
+    equations, x = linearised(map, turn=scenes.rotation(), mu=mu, p=p)
+    body = equations.body
+    equations.linearise(x)
+    rng = np.random.default_rng(scenes.COMM.rank)
+    before, _ = equations.residual(x)
+    for _ in range(3):
+        direction = rng.normal(size=x.size) * np.abs(body.norm(x)) / np.sqrt(x.size)
+        direction[body.fixed] = 0.0
+        step = 1e-7
+        after, _ = equations.residual(x + step * direction)
+        quotient = -(after - before) / step
+        quotient[body.fixed] = 0.0
+        product = equations.problem._layer.multiply(direction)
+        assert body.norm(quotient - product) <= 1e-5 * body.norm(product)
+
+
+@pytest.mark.parametrize("mu, p", LAWS)
+def test_block_is_solved_exactly(mu, p):
+    """The correction of the layers leaves no residual there, on any number of ranks."""
+    equations, x = linearised("return", mu=mu, p=p)
+    body = equations.body
+    equations.linearise(x)
+    layer = equations.problem._layer
+    residual = np.random.default_rng(scenes.COMM.rank).normal(size=x.size)
+    residual[body.fixed] = 0.0
+    left = residual - layer.multiply(layer.solve(residual))
+    near = body.total(np.array([layer._dofs.size]))[0]
+    planes = 7 * 7 * 3  # nodes of one horizontal plane
+    assert near == 2 * planes or scenes.COMM.size > 1 and near <= 2 * planes
+    assert body.norm(left[layer._dofs]) <= 1e-10 * body.norm(residual)
+
+
+def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch):
+    """Loading and unloading under a strongly non-associated rule take fewer iterations with the tangent."""
+
+    def iterations(every):
+        monkeypatch.setattr("dolfinx_contact.fixed_point.EVERY", every)
+        scene = scenes.block(
+            cells=(14, 14, 5), mu=(0.3, 0.15), p=(0.02, 0.3), petsc_options=MULTIGRID,
+            solver=dc.FixedPoint(map="return"),
+        )  # fmt: skip
+        count = 0
+        for depth in (0.01, 0.0092, 0.0085):
+            scene.move_top(0, 0, -depth)
+            count += scene.problem.solve().iterations
+        return count
+
+    assert iterations(20) < 0.85 * iterations(10**6)
