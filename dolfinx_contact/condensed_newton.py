@@ -89,7 +89,7 @@ class CondensedNewton:
         self,
         *,
         slip_tol: float | None = None,
-        max_iterations: int = 50_000,
+        max_iterations: int = 200_000,
         newton_iterations: int = 60,
         max_seconds: float = math.inf,
         fallbacks: bool = True,

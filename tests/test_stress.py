@@ -12,16 +12,17 @@ import stress
 from stress_scenes import scenes
 
 LONG = ("six cycles", "1000 tiny steps")
-# Rank-deficient W with strongly crossed slip rules, see docs/solvers.md.
-UNSOLVED = {"seed 33", "seed 143"}
+# Four solutions are known, and rounding decides whether a start leads to one, see docs/solvers.md.
+CHAOTIC = {"seed 143"}
 TENTH = [scene for scene in scenes()[::10] if scene.programme not in LONG]
 
 
 @pytest.mark.parametrize("scene", TENTH, ids=lambda scene: f"{scene.group}: {scene.name}")
 def test_default_solves_or_says_so(scene):
-    """No wrong answer and no silent failure; the default choice solves all that are not known."""
+    """No wrong answer and no silent failure; the default choice solves all but one, which it may refuse."""
     record = stress.run(scene, None)
-    assert record["outcome"] == ("refused" if scene.name in UNSOLVED else "solved"), record
+    allowed = {"solved", "refused"} if scene.name in CHAOTIC else {"solved"}
+    assert record["outcome"] in allowed, record
 
 
 def test_there_are_enough_scenes():

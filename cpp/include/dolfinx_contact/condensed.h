@@ -7,8 +7,8 @@
 
 #include "condensed_fixed_point.h"
 #include "condensed_operator.h"
+#include "condensed_starts.h"
 #include <functional>
-#include <random>
 
 namespace dolfinx_contact::condensed {
 /// What a caller may choose.
@@ -16,8 +16,8 @@ struct Options {
     double tol = 1e-8;      ///< largest error of a solution
     double slip_tol = 1e-8; ///< largest slip error of a solution
     double max_seconds = std::numeric_limits<double>::infinity();
-    int max_iterations = 5000;  ///< Newton and fixed-point iterations of all attempts
-    int newton_iterations = 60; ///< Newton iterations of one attempt
+    int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
+    int newton_iterations = 60;   ///< Newton iterations of one attempt
     bool fallbacks = true;
 };
 
@@ -62,7 +62,7 @@ template <int T, int P> class Cascade {
         if (!given.isZero(0.0) && attempt("newton from zero", newton(zero, 10.0, 1.0)))
             return;
         for (const auto &[normal, tangential] :
-             {std::pair{1.0, 1.0}, {100.0, 10.0}, {1.0, 0.1}, {10.0, 10.0}, {0.1, 0.1}})
+             {std::pair{1.0, 0.1}, {1.0, 1.0}, {100.0, 10.0}, {10.0, 10.0}, {0.1, 0.1}})
             if (attempt("newton, other metric", newton(given, normal, tangential)))
                 return;
         const auto path = [this](auto change) {
@@ -92,30 +92,25 @@ template <int T, int P> class Cascade {
         if (T > 0 &&
             attempt("continuation in mu", path([](Path &at, double s) { at.friction = s; })))
             return;
-        // Small problems with large friction may have solutions that no path from zero leads to.
-        std::minstd_rand random(1);
-        const Index starts_tried = std::min<Index>(300, 10000 / (D * op_.nodes()));
-        for (Index k = 0; k < starts_tried; ++k)
-            if (attempt("random starts", newton(random_start(random), k % 3 == 1 ? 1.0 : 10.0,
-                                                k % 3 == 2 ? 0.1 : 1.0)))
-                return;
+        attempt("random starts", [this, &newton] {
+            // Solutions that no path leads to: from anywhere, and from near the best state so far.
+            std::minstd_rand random(1);
+            const double size = static_cast<double>(D * op_.nodes());
+            const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
+            for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
+                newton(k % 2 == 0 ? start_near(random, scaled(best_.reaction))
+                                  : random_start<T>(random, op_.nodes()),
+                       k % 3 == 1 ? 1.0 : 10.0, k % 3 == 2 ? 0.1 : 1.0)();
+        });
     }
 
-    /// Reactions in the cone, of any size about one; the same in every run and on every machine.
-    VectorXd random_start(std::minstd_rand &random) const {
-        const auto uniform = [&random] {
-            return static_cast<double>(random() - std::minstd_rand::min()) /
-                   static_cast<double>(std::minstd_rand::max() - std::minstd_rand::min());
-        };
+    /// Physical reactions of P + 1 components in scaled variables.
+    VectorXd scaled(const VectorXd &reaction) const {
         VectorXd r(D * op_.nodes());
-        const double size = std::pow(10.0, 2.0 * uniform() - 1.0);
-        for (Index i = 0; i < op_.nodes(); ++i) {
-            const double normal = uniform() < 0.3 ? 0.0 : size * uniform();
-            r[D * i + T] = normal;
-            for (int c = 0; c < T; ++c)
-                r[D * i + c] = normal * (1.4 * uniform() - 0.7);
-        }
-        return r;
+        for (Index i = 0; i < op_.nodes(); ++i)
+            r.template segment<D>(D * i) =
+                reaction.template segment<P + 1>((P + 1) * i).template tail<D>();
+        return r.cwiseQuotient(make().right);
     }
 
     /// A problem on the way to the one that is asked for, all ones.
@@ -173,10 +168,7 @@ template <int T, int P> class Cascade {
         state.evaluate(system, best, system.displacement(best));
         double smallest = state.merit;
         for (const VectorXd &start : starts) {
-            VectorXd r(D * op_.nodes());
-            for (Index i = 0; i < op_.nodes(); ++i)
-                r.template segment<D>(D * i) = start.segment<P + 1>((P + 1) * i).template tail<D>();
-            r = r.cwiseQuotient(system.right).eval();
+            const VectorXd r = scaled(start);
             state.evaluate(system, r, system.displacement(r));
             if (state.merit < smallest) {
                 smallest = state.merit;

@@ -10,7 +10,7 @@
 
 namespace dolfinx_contact::condensed {
 /// Why an attempt ended.
-enum class End { converged, line_search, iterations, seconds, not_finite };
+enum class End { converged, line_search, stalled, iterations, seconds, not_finite };
 
 /// Iterations and seconds that all attempts share.
 struct Budget {
@@ -79,7 +79,8 @@ template <int T> class Newton {
         state_.evaluate(system_, r, w);
         std::deque<double> memory{state_.merit};
         double smallest = state_.merit;
-        for (int iteration = 0;; ++iteration) {
+        constexpr int patience = 12; // iterations without progress: it goes around in a circle
+        for (int iteration = 0, in_vain = 0;; ++iteration, ++in_vain) {
             if (!std::isfinite(state_.merit)) {
                 r = best;
                 return End::not_finite;
@@ -92,6 +93,10 @@ template <int T> class Newton {
                 return iteration == max_iterations || budget.seconds() < budget.max_seconds
                            ? End::iterations
                            : End::seconds;
+            }
+            if (in_vain > patience) {
+                r = best;
+                return End::stalled;
             }
             ++budget.iterations;
             const VectorXd dr = direction(r, w);
@@ -106,6 +111,7 @@ template <int T> class Newton {
             if (state_.merit < smallest) {
                 smallest = state_.merit;
                 best = r;
+                in_vain = 0;
             }
         }
     }

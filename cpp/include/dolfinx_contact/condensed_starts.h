@@ -1,0 +1,38 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_starts.h
+/// Random reactions to start from, the same in every run and on every machine.
+#pragma once
+
+#include "condensed_system.h"
+#include <random>
+
+namespace dolfinx_contact::condensed {
+inline double uniform(std::minstd_rand &random) {
+    return static_cast<double>(random() - std::minstd_rand::min()) /
+           static_cast<double>(std::minstd_rand::max() - std::minstd_rand::min());
+}
+
+/// Scaled reactions in the cone, of any size about one.
+template <int T> VectorXd random_start(std::minstd_rand &random, Index nodes) {
+    constexpr int D = T + 1;
+    VectorXd r(D * nodes);
+    const double size = std::pow(10.0, 2.0 * uniform(random) - 1.0);
+    for (Index i = 0; i < nodes; ++i) {
+        const double normal = uniform(random) < 0.3 ? 0.0 : size * uniform(random);
+        r[D * i + T] = normal;
+        for (int c = 0; c < T; ++c)
+            r[D * i + c] = normal * (1.4 * uniform(random) - 0.7);
+    }
+    return r;
+}
+
+/// Reactions r, every component moved by up to 1e-3 to 1 of the largest.
+inline VectorXd start_near(std::minstd_rand &random, VectorXd r) {
+    const double size =
+        std::pow(10.0, -3.0 * uniform(random)) * r.template lpNorm<Eigen::Infinity>();
+    for (double &component : r)
+        component += size * (2.0 * uniform(random) - 1.0);
+    return r;
+}
+} // namespace dolfinx_contact::condensed
