@@ -58,14 +58,17 @@ class Step:
 
 
 class NotConverged(RuntimeError):
-    """A step did not reach its tolerance; ``step`` is its record.
+    """A step did not reach its tolerance; the problem is back in its last converged state.
 
-    Displacement, reactions and history are those of the last converged step.
+    Attributes:
+        step: Record of the step, with what was tried.
+        displacement: The best one found, owned degrees of freedom; not a solution.
+        reactions: Of each contact in that state, local frame.
     """
 
-    def __init__(self, message: str, step: Step):
+    def __init__(self, message: str, step: Step, displacement, reactions):
         super().__init__(message)
-        self.step = step
+        self.step, self.displacement, self.reactions = step, displacement, reactions
 
 
 class ContactProblem:
@@ -138,7 +141,7 @@ class ContactProblem:
             The record of the step.
 
         Raises:
-            NotConverged: the error stayed above ``tol``; carries the record.
+            NotConverged: the error stayed above ``tol``; carries the record and the best state.
             ValueError: loads, boundary values, planes or ``u`` that are not finite, or a body that
                 nothing holds.  After any exception the last converged state is in place.
         """
@@ -154,6 +157,8 @@ class ContactProblem:
                     f"{self.tol:.1e}, after {iterations} iterations ({step.counts.open} open, {step.counts.stick} sticking, "
                     f"{step.counts.slip} slipping nodes). Smaller load steps help most often.",
                     step,
+                    x,
+                    [contact.reaction for contact in self.contacts],
                 )
         except BaseException:
             self._restore()

@@ -121,15 +121,22 @@ def test_iterative_linear_solver():
     assert np.abs(found - reference).max() <= 1e-7 * np.abs(reference).max()
 
 
-def test_failure_carries_what_was_tried():
-    """A step that fails says what was tried; the problem can be used on."""
-    scene = scenes.block(solver=dc.CondensedNewton(max_iterations=1))
+@pytest.mark.parametrize("cap", [dict(max_iterations=1), dict(max_seconds=1e-9)])
+def test_caps_on_iterations_and_seconds(cap):
+    """A step that ends at a cap carries its best state and what was tried; the problem can be used on."""
+    scene = scenes.block(solver=dc.CondensedNewton(**cap))
     scene.move_top(0, 0, -0.005)
     with pytest.raises(dc.NotConverged) as caught:
         scene.problem.solve()
-    assert caught.value.step.tried and not caught.value.step.tried[-1].converged
+    failure = caught.value
+    assert failure.step.error > scene.problem.tol and failure.step.seconds < 5
+    assert [attempt.branch for attempt in failure.step.tried] == ["newton"] * (
+        "max_iterations" in cap
+    )
+    assert failure.displacement.shape == (scene.problem.body.size,)
+    assert [r.shape for r in failure.reactions] == [scene.contact.reaction.shape]
     assert not scene.contact.reaction.any()
-    scene.problem.solver = dc.CondensedNewton()
+    scene.problem.solver = dc.CondensedNewton(max_seconds=60)
     assert scene.problem.solve().error <= scene.problem.tol
 
 
