@@ -95,7 +95,7 @@ template <int T, int P> class Cascade {
         attempt("random starts", [this, &newton] {
             // Solutions that no path leads to: from anywhere, and from near the best state so far.
             std::minstd_rand random(1);
-            const double size = static_cast<double>(D * op_.nodes());
+            const auto size = static_cast<double>(D * op_.nodes());
             const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
             for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
                 newton(k % 2 == 0 ? start_near(random, scaled(best_.reaction))
