@@ -50,10 +50,24 @@ import dolfinx_contact as dc
 
 
 # %%
+SOLVERS = {
+    "auto": lambda: None,
+    "fixed-point": lambda: dc.FixedPoint(map="return"),
+    "paper": dc.FixedPoint,
+    "condensed": dc.CondensedNewton,
+}
+
+
 def run(punch: Punch) -> Iterator[dict]:
     """Compute the whole programme with a progress bar; yields the record of each step."""
     displacements = programme(punch.parameters)
     with tqdm(displacements, f"case {punch.parameters.case}", disable=punch.comm.rank != 0) as bar:
+
+        def show(iteration, error, counts):
+            state = f"iteration {iteration}, error {error:.0e}"
+            bar.set_postfix_str(f"{state}, {{}} open, {{}} stick, {{}} slip".format(*counts))
+
+        punch.problem.monitor = show
         for displacement in bar:
             record = punch.press(displacement)
             counts = "{open} open, {stick} stick, {slip} slip".format(**record)
@@ -101,6 +115,7 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--point", type=float, nargs=2, metavar=("X", "Y"), help="P, mm; 3/4 R at 45 degrees")
     add("--tol", type=float, default=default.tol, help="error at which a step ends")
     add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
+    add("--solver", choices=SOLVERS, default="auto", help="paper: fixed point with its own map")
     add("--json", type=Path, metavar="FILE", help="numbers of all steps; DIR/punch.json")
     add("--output", type=Path, metavar="DIR", default=Path("results/punch"), help="what is written")
     return parser.parse_args(argv)
@@ -111,6 +126,7 @@ def main(argv=None) -> None:
     logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
     options = vars(arguments(argv))
     output = options.pop("output")
+    solver = SOLVERS[options.pop("solver")]()
     json_file = options.pop("json") or output / "punch.json"
     point = options.pop("point")
     parameters = Parameters(**options, point=None if point is None else tuple(point))
@@ -118,7 +134,7 @@ def main(argv=None) -> None:
     loaded = last - parameters.unloading
     shown = {loaded: "loaded", (loaded + last) // 2: "unloading", last: "unloaded"}
 
-    punch = Punch(parameters)
+    punch = Punch(parameters, solver=solver)
     output.mkdir(parents=True, exist_ok=True)
     records, maps, failure = [], [], None
     with FieldWriter(punch, output) as fields:

@@ -68,10 +68,11 @@ class Punch:
     Args:
         parameters: What to compute.
         comm: MPI communicator.
+        solver: As in ``dc.ContactProblem``.
         mesh_options: Further arguments of ``punch_mesh``, such as ``divisions``.
     """
 
-    def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, **mesh_options):
+    def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, solver=None, **mesh_options):
         self.parameters, self.comm = parameters, comm
         size = dict(radius=parameters.radius, height=parameters.height)
         punch = punch_mesh(comm, parameters.refine, **size, **mesh_options)
@@ -90,7 +91,7 @@ class Punch:
         friction = dc.Friction(**CASES[parameters.case])
         self.contact = dc.Contact(self.V, punch.facet_tags.find(CONTACT), plane, friction)
         self.problem = dc.ContactProblem(
-            self.F, self.u, [self.contact], bcs=self.bcs, tol=parameters.tol
+            self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol
         )
         self.tracked = self._nearest_node(parameters.target)
 

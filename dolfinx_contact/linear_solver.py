@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -25,6 +27,17 @@ MULTIGRID = {
 
 # Unknowns beyond which a multigrid cycle is cheaper than a back-solve with a factorisation.
 LARGE = 50_000
+
+
+@contextmanager
+def stage(name: str):
+    """A stage of PETSc's ``-log_view``."""
+    log = PETSc.Log.Stage(name)
+    log.push()
+    try:
+        yield
+    finally:
+        log.pop()
 
 
 class LinearSolverError(RuntimeError):
@@ -56,12 +69,14 @@ class LinearSolver:
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.ksp.setOperators(A)
         # What is set is deleted again below: PETSc 3.18 has room for 512 options.
+        # What stands there already (PETSC_OPTIONS, the command line) goes before ours.
         database = PETSc.Options(prefix)
-        for key, value in options.items():
+        ours = {key: value for key, value in options.items() if not database.hasName(key)}
+        for key, value in ours.items():
             database[key] = value
         self.ksp.setFromOptions()
         self.ksp.setUp()  # reads the options of the levels, which must still be there
-        for key in options:
+        for key in ours:
             del database[key]
         self._right, self._left = A.createVecs()
 

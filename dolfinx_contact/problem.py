@@ -19,6 +19,7 @@ from dolfinx_contact.condensed import CondensedBody
 from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
+from dolfinx_contact.linear_solver import stage
 from dolfinx_contact.surface_layer import SurfaceLayer
 
 
@@ -87,6 +88,10 @@ class ContactProblem:
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
         petsc_options_prefix: Their prefix.
 
+    Attributes:
+        monitor: None, or a function ``f(iteration, error, counts)`` that is called on all ranks whenever a
+            solver evaluates the residual of the whole body, with the largest error and ``Counts``.
+
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
         NotImplementedError: ``F`` is not linear, or a tangential direction of a contact node is held
@@ -115,7 +120,7 @@ class ContactProblem:
                     f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
                 )
             self.tol = _checked_tolerance(tol)
-        self.u = u
+        self.u, self.monitor = u, None
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
         with raised_together(self.body.comm):
             for contact in self.contacts:
@@ -236,7 +241,8 @@ class ContactProblem:
                 contact.set_metric(body.K)
             self._stiffness = [contact.rho for contact in self.contacts]
         b, external = body.load()
-        trial = body.free_state(b)
+        with stage("contact: elastic solve"):
+            trial = body.free_state(b)
         equations = _ContactEquations(self, b, trial, *self._load(trial, external))
         if not self._touches:
             equations.errors = equations.errors_if_open(trial)
@@ -246,7 +252,8 @@ class ContactProblem:
         start = (
             trial if isinstance(self.solver, (Automatic, CondensedNewton)) else equations.guess()
         )
-        x, iterations = self.solver.solve(equations, start, self.tol)
+        with stage("contact: iterations"):
+            x, iterations = self.solver.solve(equations, start, self.tol)
         equations.measure(x)
         return x, equations, iterations
 
@@ -288,24 +295,25 @@ class ContactProblem:
                 raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
 
     def _record(self, equations: _ContactEquations, iterations: int, seconds: float) -> Step:
-        sums = np.zeros(4)
-        penetration = 0.0
+        gap, penetration = 0.0, 0.0
         for contact in self.contacts:
-            sums[:3] += np.bincount(contact.status, minlength=3)
-            sums[3] += contact.bipotential_gap.sum()
+            gap += contact.bipotential_gap.sum()
             penetration = max(penetration, -contact.gap.min(initial=0.0))
-        *counts, gap = self.body.total(sums)
         return Step(
             error=equations.errors.error,
             slip_error=equations.errors.slip_error,
-            bipotential_gap=float(gap),
+            bipotential_gap=float(self.body.total(gap)),
             penetration=self.body.largest(np.array([penetration])),
             iterations=iterations,
             seconds=self.body.largest(np.array([seconds])),
-            counts=Counts(*(int(count) for count in counts)),
+            counts=self._counts(),
             solver=equations.chosen,
             tried=equations.tried,
         )
+
+    def _counts(self) -> Counts:
+        counts = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
+        return Counts(*(int(count) for count in self.body.total(counts + np.zeros(3))))
 
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x
@@ -328,6 +336,7 @@ class _ContactEquations:
         self.total = problem.body.total
         self._metric = ("bipotential", 1.0)
         self._tangent = None  # SurfaceLayer, once linearised
+        self._evaluations = 0
         self._measured = None  # displacement whose errors were measured with F
 
     def guess(self) -> np.ndarray:
@@ -358,7 +367,8 @@ class _ContactEquations:
             contact.rho = factor * stiffness
             contact.add_springs(A, contact.springs(map))
         stiffened.clear()  # one factorisation at a time: memory counts more than a second try
-        stiffened[metric] = self.body.solver(A)
+        with stage("contact: set-up of springs"):
+            stiffened[metric] = self.body.solver(A)
 
     def linearise(self, x: np.ndarray) -> None:
         """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
@@ -373,7 +383,8 @@ class _ContactEquations:
             contact.rho = factor * stiffness
             contact.take_reaction(forces)
             derivatives.append(contact.update_with_derivatives(x, map))
-        problem._layer.linearise(derivatives)
+        with stage("contact: surface layer"):
+            problem._layer.linearise(derivatives)
         self._tangent = problem._layer
 
     def forget_tangent(self) -> None:
@@ -407,6 +418,10 @@ class _ContactEquations:
         if self.errors.largest <= self.problem.tol:
             self.errors = self._errors(self._balance(self._assembled(x)))
             self._measured = x.copy()
+        if self.problem.monitor is not None:
+            counts = self.problem._counts()
+            self.problem.monitor(self._evaluations, self.errors.largest, counts)
+        self._evaluations += 1
         return residual, self.errors.largest
 
     def measure(self, x: np.ndarray) -> float:

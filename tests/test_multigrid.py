@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scenes
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import dolfinx_contact as dc
 from dolfinx_contact._dolfinx import partitioner
@@ -51,3 +52,29 @@ def test_ranks_change_neither_the_answer_nor_the_iterations(share):
     assert having.tolist() == expected[share]  # ranks with cells, with contact nodes
     assert np.abs(together - alone).max() <= 1e-8 * np.abs(alone).max()
     assert (np.abs(counts - counts_alone) <= np.maximum(0.25 * counts_alone, 1)).all()
+
+
+def test_monitor_follows_error_and_statuses():
+    """The monitor sees every residual, on all ranks alike; its last line is what the step says."""
+    scene = scenes.block(solver=dc.FixedPoint(map="return"), petsc_options=MULTIGRID)
+    seen = []
+    scene.problem.monitor = lambda *line: seen.append(line)
+    scene.move_top(0, 0, -0.005)
+    step = scene.problem.solve()
+    assert [line[0] for line in seen] == list(range(len(seen)))
+    assert len(seen) > step.iterations
+    assert seen[-1][1] == max(step.error, step.slip_error) and seen[-1][2] == step.counts
+    assert len(set(map(str, scenes.COMM.allgather(seen)))) == 1
+
+
+def test_options_of_the_command_line_go_before_ours():
+    """What a user puts into PETSc's database under the prefix is not overwritten, and stays there."""
+    database = PETSc.Options("mine_")
+    database["ksp_rtol"] = 1e-3
+    try:
+        scene = scenes.block(petsc_options=MULTIGRID, petsc_options_prefix="mine_")
+        scene.problem.body.refresh()
+        assert scene.problem.body.ksp.getTolerances()[0] == 1e-3
+        assert database.hasName("ksp_rtol") and not database.hasName("pc_type")
+    finally:
+        del database["ksp_rtol"]
