@@ -40,7 +40,8 @@ def panels(count: int, columns: int = 3, size=(4.4, 3.7)):
 
 def legend(figure, ax, **options) -> None:
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False, **options)  # fmt: skip
+    options = dict(ncols=len(labels)) | options
+    figure.legend(handles, labels, loc="outside upper center", frameon=False, **options)  # fmt: skip
 
 
 def algebraic(data):
@@ -51,7 +52,8 @@ def algebraic(data):
             seconds = np.array(curve["seconds"])
             lower, upper = seconds - curve["least"], np.array(curve["largest"]) - seconds
             ax.errorbar(1e3 * seconds, np.maximum(curve["error"], 1e-16), xerr=1e3 * np.abs([lower, upper]),
-                elinewidth=0.4, **style(solver))  # fmt: skip
+                elinewidth=0.4, errorevery=max(1, len(seconds) // 12), markevery=max(1, len(seconds) // 25),
+                **style(solver))  # fmt: skip
         ax.axhline(REACHED, color="0.6", lw=1)
         ax.set(xscale="log", yscale="log", xlabel="processor time of the step [ms]", ylabel="error")
         ax.yaxis.set_major_locator(LogLocator(numticks=8))
@@ -148,6 +150,9 @@ def ladder(data):
         ax.set(xscale="log", xlabel=title)
         ax.set_xlim(0.4 * scale * values.min(), 4 * scale * ends.max())
         ax.grid(axis="y", visible=False)
+        for k, row in enumerate(rows):  # a line above each scene that begins anew
+            if k and row["compared_with"] is None:
+                ax.axhline(len(rows) - k - 0.5, color="0.5", lw=0.8)
     compared = [row for row in rows if row.get("compared_with") and "saves" in row]
     nothing = [f"{row['rung']} (time {row['step_ratio']:.2f} of {row['compared_with']})"
                for row in compared if not row["saves"]]  # fmt: skip
@@ -156,7 +161,12 @@ def ladder(data):
         for row in compared if "step" in row["saves"]
     ]  # fmt: skip
     yield "ladder", figure, (
-        f"Time of a step: {'; '.join(saved) or 'no rung saves any'}. "
+        f"Time of a step: {'; '.join(saved) or 'no rung saves any'}. Memory is saved by: "
+        f"{', '.join(row['rung'] for row in compared if 'bytes' in row['saves']) or 'nothing'}. "
+        + "".join(
+            f"{row['compared_with']} takes {1 / row['bytes_ratio']:.1f} times the memory of {row['rung']}. "
+            for row in compared if row["rung"] == "matrix constant" and "bytes" in row["saves"]
+        )
         + (f"Neither time, set-up nor memory is saved by more than 5 % by: {', '.join(nothing)}." if nothing
            else "Every rung saves time, set-up or memory.")
     )  # fmt: skip

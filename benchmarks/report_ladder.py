@@ -119,7 +119,7 @@ def imports(repeat: int) -> dict:
         "print(len(set(sys.modules) - before), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, "
         "*sorted({{m.split('.')[0] for m in set(sys.modules) - before}} - sys.stdlib_module_names))"
     )
-    packages = ("dolfinx", "dolfinx, dolfinx.fem.petsc, ufl, scipy.sparse", "dolfinx_contact")
+    packages = ("dolfinx", "dolfinx, dolfinx.fem.petsc, ufl", "dolfinx_contact")
     found = {package: dict(seconds=[]) for package in packages}
     for k in range(repeat + 1):
         for package in packages:

@@ -14,6 +14,7 @@ import demo_partial_slip
 import numpy as np
 from punch import Parameters, Punch, programme
 from report_run import Measurement
+from scipy.optimize import brentq
 
 TITLE = "Work and precision, discretisation"
 MESHES = [(4, 2), (8, 4), (12, 6), (16, 8)]  # divisions and layers; the second is the paper's
@@ -116,25 +117,29 @@ def evaluate(results: dict) -> dict:
 
 
 def richardson(points: list) -> tuple[float | None, float | None]:
-    """Limit and observed order of values on meshes halved twice, the last of them the finest.
+    """Limit and order p of the last three values, ``value = limit + c width^p``, the widths in any ratios.
 
-    Where the differences do not shrink in one direction there is no such order: the limit is the finest value.
+    Where they do not go one way, or no p between 0.3 and 5 fits, there is no order and the finest is the limit.
     """
     if len(points) < 3:
         return (points[-1][1] if points else None), None
-    finest = points[-1][0]
-    halved = [value for factor in (4, 2, 1) for x, value in points
-              if np.isclose(max(x, finest) / min(x, finest), factor)]  # fmt: skip
-    if len(halved) < 3 or (halved[1] - halved[0]) * (halved[2] - halved[1]) <= 0:
-        return points[-1][1], None
-    order = float(np.log2((halved[1] - halved[0]) / (halved[2] - halved[1])))
-    if order < 0.3:
-        return points[-1][1], None
-    return halved[2] + (halved[2] - halved[1]) / (2**order - 1), order
+    (h1, a), (h2, b), (h3, c) = (
+        (x if points[0][0] > points[-1][0] else 1 / x, v) for x, v in points[-3:]
+    )
+    if (b - a) * (c - b) <= 0:
+        return c, None
+
+    def defect(p):
+        return (b - a) / (c - b) - (h2**p - h1**p) / (h3**p - h2**p)
+
+    if defect(0.3) * defect(5.0) > 0:
+        return c, None
+    order = float(brentq(defect, 0.3, 5.0))
+    return c + (c - b) * h3**order / (h2**order - h3**order), order
 
 
 def closed_forms(results: dict) -> dict:
-    """By demo: cells, errors and the order on the last two meshes."""
+    """By demo: cells, errors and, where they fall from mesh to mesh, the order on the last two."""
     found = {}
     for kind in ("hertz", "partial slip"):
         of = sorted(
@@ -142,7 +147,10 @@ def closed_forms(results: dict) -> dict:
         )
         if len(of) > 1:
             errors = {name: [r["errors"][name] for r in of] for name in of[0]["errors"]}
-            orders = {n: float(np.log2(abs(e[-2] / e[-1]))) for n, e in errors.items()}
+            orders = {
+                n: float(np.log2(abs(e[-2] / e[-1]))) if np.all(np.diff(np.abs(e)) < 0) else None
+                for n, e in errors.items()
+            }
             found[kind] = dict(cells=[r["cells"] for r in of], errors=errors, orders=orders,
                 seconds=[r["seconds"] for r in of])  # fmt: skip
     return found

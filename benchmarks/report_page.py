@@ -63,8 +63,10 @@ def head(report: dict) -> str:
         f"{html.escape(machine['processor'])}, {machine['cores']} cores, {machine['memory_gb']} GB; "
         f"{html.escape(machine['compiler'])}; DOLFINx {machine['dolfinx']}, PETSc {machine['petsc']}, "
         f"dolfinx_contact {machine['dolfinx_contact']} ({machine['commit']}). Times are processor seconds of one "
-        "thread, medians of repeated runs in the same hour on the same machine, which other programs shared "
-        f"(load average up to {max(loads, default=0):.1f}): ratios mean more than times. Raw numbers: "
+        "thread on a machine that other programs shared: ratios mean more than times. Work and precision, the ladder and "
+        "imports are medians of repeated, interleaved runs, with the least and the largest; a step of peers and growth is "
+        "the mean of a programme that ran once, meshes ran once "
+        f"(load average up to {max(loads, default=0):.1f}). Raw numbers: "
         "report/report.json.</p>"
     )  # fmt: skip
 

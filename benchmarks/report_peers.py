@@ -203,12 +203,12 @@ def _siconos_rows(found: list) -> list[dict]:
     """``[case, name, seconds, converged, difference]`` of both, as rows."""
     ours = {case: seconds for case, name, seconds, *_ in found if not name.startswith("Siconos")}
     rows = []
-    for case, name, seconds, converged, difference in found:
+    for case, name, seconds, converged, *difference in found:
         if name.startswith("Siconos"):
             per, mine = float(np.median(seconds)), float(np.median(ours[case]))
             rows.append(dict(
                 key=f"siconos-{case}", peer=name, case=case, setting="scaled W, q; start: the step before; tol 1e-10",
                 unknowns=None, seconds=per, ours=mine, ours_tight=mine, ratio=per / mine,
-                done=f"{converged:.0f} of {len(seconds)}", said="", error=None, errors=[], force_error=difference,
+                done=f"{converged:.0f} of {len(seconds)}", said="", error=None, errors=[], force_error=difference[0],
             ))  # fmt: skip
     return rows

@@ -101,9 +101,14 @@ def package() -> str:
 
 @functools.cache
 def commit() -> str:
-    """Of this checkout; a + marks changes that are not committed."""
-    asked = ["git", "-C", HERE, "describe", "--always", "--dirty=+", "--exclude=*"]
-    return subprocess.run(asked, capture_output=True, text=True).stdout.strip() or "unknown"
+    """The last commit that changed the library, which is what is measured; a + marks changes beyond it."""
+    library = ["--", "dolfinx_contact", "cpp"]
+
+    def git(*asked):
+        return subprocess.run(["git", *asked, *library], cwd=HERE.parent, capture_output=True, text=True).stdout  # fmt: skip
+
+    found = git("log", "-1", "--format=%h").strip()
+    return found + "+" * bool(git("status", "--porcelain").strip()) if found else "unknown"
 
 
 def now() -> str:
