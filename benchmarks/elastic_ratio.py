@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """What a contact step costs relative to one linear elastic solve of the same mesh.
 
-The punch with ``FixedPoint(map="return")``: every iteration is one residual, one return map and one
-multigrid cycle.  The yardstick is conjugate gradients with the same preconditioner on the same body, from
+The punch with ``FixedPoint()``: every iteration is one residual, one return map and one multigrid
+cycle, and from the twentieth on one solve of the layers next to the plane.  The yardstick is conjugate gradients with the same preconditioner on the same body, from
 zero to 1e-10, in the same run; it is solved before and after the steps.  Runs under mpirun.
 """
 
@@ -50,11 +50,11 @@ def peak_memory(comm) -> int:
     return comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
-def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int) -> dict:
+def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int, **mesh) -> dict:
     comm = MPI.COMM_WORLD
     before = peak_memory(comm)
-    punch = Punch(Parameters(case=case, cycles=cycles, refine=refine))
-    punch.problem.solver = dc.FixedPoint(map="return")
+    punch = Punch(Parameters(case=case, cycles=cycles, refine=refine), **mesh)
+    punch.problem.solver = dc.FixedPoint()
     body = punch.problem.body
     body._options = MULTIGRID
     displacements = programme(punch.parameters)[:steps]
@@ -97,6 +97,30 @@ def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int)
     )  # fmt: skip
 
 
+HEAD = (
+    "| unknowns | case | ranks | elastic solve: its | s | cycles: first step | reversal | worst | mean | "
+    "seconds: first step and set-up | reversal | worst other | mean other | bytes per unknown |\n"
+    + "|---" * 14
+    + "|"
+)
+
+
+def row(result: dict) -> str:
+    """Ratios to the elastic solve; the mean is over all steps of the programme."""
+    seconds = float(np.median([t for y in result["elastic"] for t in y["seconds"]]))
+    iterations = result["elastic"][0]["iterations"]
+    cycles = np.array([step["iterations"] for step in result["steps"]]) / iterations
+    times = np.array([step["seconds"] for step in result["steps"]]) / seconds
+    reversal = Parameters().loading
+    failed = " not converged" * ("failed" in result["steps"][-1])
+    return (
+        f"| {result['unknowns']:,} | {result['case']} | {result['ranks']} | {iterations} | {seconds:.3g} | "
+        f"{cycles[0]:.2f} | {cycles[reversal]:.2f} | {cycles.max():.2f}{failed} | {cycles.mean():.2f} | "
+        f"{times[0]:.1f} | {times[reversal]:.2f} | {times[1:].max():.2f} | {times[1:].mean():.2f} | "
+        f"{result['bytes_per_unknown']:.0f} |"
+    )
+
+
 def main(argv=None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", default="A,B,C,frictionless")
@@ -105,13 +129,21 @@ def main(argv=None) -> None:
     parser.add_argument("--cycles", type=int, default=1)
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--json", type=Path)
+    parser.add_argument(
+        "--divisions", type=int, default=8, help="of a block's side; half as many layers"
+    )
     options = parser.parse_args(argv)
+    mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
     results = []
     for refine in options.refine:
         for case in options.cases.split(","):
-            results.append(measure(case, refine, options.steps, options.cycles, options.repeat))
+            results.append(
+                measure(case, refine, options.steps, options.cycles, options.repeat, **mesh)
+            )
             if options.json and MPI.COMM_WORLD.rank == 0:
                 options.json.write_text(json.dumps(results, indent=1) + "\n")
+    if MPI.COMM_WORLD.rank == 0:
+        print(HEAD, *map(row, results), sep="\n")
 
 
 if __name__ == "__main__":

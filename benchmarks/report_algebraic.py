@@ -19,7 +19,7 @@ from stress_scenes import PROGRAMMES, C, build
 TITLE = "Work and precision, algebraic"
 SOLVERS = {
     "condensed Newton": dc.CondensedNewton,
-    "fixed point, return": lambda: dc.FixedPoint(map="return"),
+    "fixed point, return": dc.FixedPoint,
     "fixed point, bipotential": lambda: dc.FixedPoint(map="bipotential"),
 }
 # Scenes of the stress matrix that are far from the punch: what they are, and which step is looked at.

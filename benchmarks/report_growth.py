@@ -18,7 +18,7 @@ from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
 TITLE = "Growth"
 SOLVERS = {
     "condensed Newton": dc.CondensedNewton,
-    "fixed point, return": lambda: dc.FixedPoint(map="return"),
+    "fixed point, return": dc.FixedPoint,
     "fixed point, bipotential": lambda: dc.FixedPoint(map="bipotential"),
     "solver=None": lambda: None,
 }

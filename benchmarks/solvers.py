@@ -23,7 +23,7 @@ from punch import Parameters, Punch, programme
 
 from dolfinx_contact.condensed import CondensedBody
 
-SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": lambda: dc.FixedPoint(map="return")}
+SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint}
 
 
 def seconds(action) -> float:

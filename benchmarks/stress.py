@@ -34,7 +34,7 @@ WRONG = 3 * TOL  # the twin's own rounding, and |du| against |du + |du| d| at th
 SOLVERS = {
     "default": lambda: None,
     "condensed": lambda: dc.CondensedNewton(max_seconds=30),
-    "fixed point": lambda: dc.FixedPoint(map="return"),
+    "fixed point": dc.FixedPoint,
 }
 
 

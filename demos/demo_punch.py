@@ -52,8 +52,8 @@ import dolfinx_contact as dc
 # %%
 SOLVERS = {
     "auto": lambda: None,
-    "fixed-point": lambda: dc.FixedPoint(map="return"),
-    "paper": dc.FixedPoint,
+    "fixed-point": dc.FixedPoint,
+    "paper": lambda: dc.FixedPoint(map="bipotential"),
     "condensed": dc.CondensedNewton,
 }
 

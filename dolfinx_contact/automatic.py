@@ -24,7 +24,7 @@ class Automatic:
         contacts = equations.problem.contacts
         nodes = comm.allreduce(sum(len(contact.nodes) for contact in contacts))
         fits = condensed.fits(comm, nodes, contacts[0].frame.shape[0])
-        solvers = [CondensedNewton(), FixedPoint(map="return")]
+        solvers = [CondensedNewton(), FixedPoint()]
         if nodes > CROSSOVER:
             why = f"{nodes} contact nodes, more than {CROSSOVER}"
             solvers.reverse()

@@ -27,9 +27,9 @@ class FixedPoint:
     tangent before the back-solve, see ``SurfaceLayer``.
 
     Args:
-        map: "bipotential", the paper's predictor and Euclidean projection, or "return", see
+        map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
             ``Contact.update``.  The law is the same; with strongly non-associated friction "return"
-            needs several times fewer iterations.
+            needs fewer iterations (docs/method.md).
         rho: Metric over the nodal normal stiffness; None finds it: the next value of a short list is
             tried where one does not converge, at the cost of a factorisation.
         depth: Number of previous corrections that Anderson's method mixes.
@@ -39,7 +39,7 @@ class FixedPoint:
         ValueError: an unknown map, or a metric, depth or number of iterations that is not positive.
     """
 
-    def __init__(self, map="bipotential", rho=None, depth: int = 12, max_iterations: int = 400):
+    def __init__(self, map="return", rho=None, depth: int = 12, max_iterations: int = 400):
         if map not in METRICS:
             raise ValueError(f"map must be one of {', '.join(METRICS)}, got {map!r}.")
         for name, value in (("rho", rho), ("depth", depth), ("max_iterations", max_iterations)):

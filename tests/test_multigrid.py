@@ -22,7 +22,7 @@ SHARES = {
 def run(comm, cells, owners=None):
     """Reactions and iterations after every step, the scene, and its ranks with cells and contact nodes."""
     scene = scenes.block(
-        comm, cells, solver=dc.FixedPoint(map="return"), petsc_options=MULTIGRID,
+        comm, cells, solver=dc.FixedPoint(), petsc_options=MULTIGRID,
         partitioner=owners,
     )  # fmt: skip
     reactions, iterations = [], []
@@ -56,7 +56,7 @@ def test_ranks_change_neither_the_answer_nor_the_iterations(share):
 
 def test_monitor_follows_error_and_statuses():
     """The monitor sees every residual, on all ranks alike; its last line is what the step says."""
-    scene = scenes.block(solver=dc.FixedPoint(map="return"), petsc_options=MULTIGRID)
+    scene = scenes.block(solver=dc.FixedPoint(), petsc_options=MULTIGRID)
     seen = []
     scene.problem.monitor = lambda *line: seen.append(line)
     scene.move_top(0, 0, -0.005)

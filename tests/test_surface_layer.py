@@ -70,7 +70,7 @@ def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch)
         monkeypatch.setattr("dolfinx_contact.fixed_point.EVERY", every)
         scene = scenes.block(
             cells=(14, 14, 5), mu=(0.3, 0.15), p=(0.02, 0.3), petsc_options=MULTIGRID,
-            solver=dc.FixedPoint(map="return"),
+            solver=dc.FixedPoint(),
         )  # fmt: skip
         count = 0
         for depth in (0.01, 0.0092, 0.0085):
