@@ -56,7 +56,7 @@ class ElasticBody:
         self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
         self._assemblies = 0
-        self.K, self._external = None, None
+        self.K, self._external, self._elastic = None, None, None
         self.known = None  # digest of K, right-hand side and solution of a free state
 
     def refresh(self) -> int:
@@ -89,6 +89,8 @@ class ElasticBody:
                     "the stiffness contains NaN or infinity: check the material parameters in F."
                 )
         self._right, self._left = self.K.createVecs()
+        if self._elastic is not None:
+            self._elastic.destroy()
         self._elastic = None
         refuse_rigid_motion(self)
         self._digest = digest

@@ -55,8 +55,6 @@ def projection_residual(contact, stiffness: np.ndarray) -> np.ndarray:
     return contact.reaction - projected
 
 
-def relative(value: float, load: float) -> float:
-    """``value / load``; a residual without any load is no error if it is zero, an infinite one else."""
-    if load > 0.0:
-        return value / load
-    return 0.0 if value == 0.0 else np.inf
+def relative(values: np.ndarray, load: float) -> np.ndarray:
+    """``values / load``; without any load what is zero is no error, and anything else an infinite one."""
+    return values / load if load > 0.0 else np.where(values == 0.0, 0.0, np.inf)

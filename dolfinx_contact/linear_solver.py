@@ -80,6 +80,10 @@ class LinearSolver:
             del database[key]
         self._right, self._left = A.createVecs()
 
+    def destroy(self) -> None:
+        """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
+        self.ksp.destroy()
+
     def solve(self, b: np.ndarray) -> np.ndarray:
         """A^-1 b to the tolerance of the options; arrays of owned degrees of freedom.
 

@@ -235,8 +235,8 @@ class ContactProblem:
         assembled = body.refresh()
         if assembled != self._assembled:
             self._assembled = assembled
-            self._stiffened.clear()
-            self._condensed = self._layer = None
+            self._free_solvers()
+            self._condensed = None
             for contact in self.contacts:
                 contact.set_metric(body.K)
             self._stiffness = [contact.rho for contact in self.contacts]
@@ -315,6 +315,18 @@ class ContactProblem:
         counts = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
         return Counts(*(int(count) for count in self.body.total(counts + np.zeros(3))))
 
+    def _free_solvers(self) -> None:
+        """Forget what was set up for a matrix that has changed.  Collective."""
+        self._free_springs()
+        if self._layer is not None:
+            self._layer.destroy()
+        self._layer = None
+
+    def _free_springs(self) -> None:
+        for solver in self._stiffened.values():
+            solver.destroy()
+        self._stiffened.clear()
+
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x
         self.u.x.scatter_forward()
@@ -366,9 +378,10 @@ class _ContactEquations:
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
             contact.rho = factor * stiffness
             contact.add_springs(A, contact.springs(map))
-        stiffened.clear()  # one factorisation at a time: memory counts more than a second try
+        self.problem._free_springs()  # one factorisation at a time: memory counts more than time
         with stage("contact: set-up of springs"):
             stiffened[metric] = self.body.solver(A)
+        A.destroy()  # the solver has its own reference
 
     def linearise(self, x: np.ndarray) -> None:
         """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
@@ -470,9 +483,10 @@ class _ContactEquations:
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
             projection.append(projection_residual(contact, stiffness).ravel())
             defect = max(defect, contact.slip_defect.max(initial=0.0))
-        worst = max(self.body.norm(residual), self.body.norm(np.concatenate(projection)))
-        defect = self.body.largest(np.array([defect]))
-        return Errors(relative(worst, self.load), relative(defect, self.load_displacement))
+        parts = (relative(part, self.load) for part in (residual, np.concatenate(projection)))
+        squares = self.body.total([part @ part for part in parts])  # one reduction for both norms
+        defect = self.body.largest(relative(np.array([defect]), self.load_displacement))
+        return Errors(float(np.sqrt(squares.max())), defect)
 
 
 def _read_checkpoint(path, ranks: int) -> list[dict[str, np.ndarray]]:

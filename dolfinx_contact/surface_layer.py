@@ -39,7 +39,13 @@ class SurfaceLayer:
         self._stiffness = sparse.csr_matrix(
             (values, indices, indptr), shape=(self._dofs.size, self._size[1][1])
         )
+        block.destroy()
         self._solver = None
+
+    def destroy(self) -> None:
+        """Free the factorisation.  Collective."""
+        if self._solver is not None:
+            self._solver.destroy()
 
     def linearise(self, derivatives) -> None:
         """Factorise the block at new derivatives of the nodal maps.  Collective.
@@ -69,7 +75,9 @@ class SurfaceLayer:
         block = (mix @ self._stiffness - motion).tocsr()
         csr = (block.indptr.astype(PETSc.IntType), block.indices.astype(PETSc.IntType), block.data)
         A = PETSc.Mat().createAIJ(self._size, csr=csr, comm=self._body.comm)
+        self.destroy()
         self._solver = LinearSolver(A, DIRECT, self._prefix, None)
+        A.destroy()  # the solver has its own reference
 
     def solve(self, residual: np.ndarray) -> np.ndarray:
         """Displacement of the layers that removes the residual there while the body beyond is held."""

@@ -1,5 +1,7 @@
 """The linearised contact near the plane: its Jacobian, its block, and what it is for."""
 
+import resource
+
 import numpy as np
 import pytest
 import scenes
@@ -79,3 +81,27 @@ def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch)
         return count
 
     assert iterations(20) < 0.85 * iterations(10**6)
+
+
+@pytest.mark.skipif(scenes.COMM.size > 1, reason="memory of one process")
+def test_replaced_solvers_give_their_memory_back(monkeypatch):
+    """A stiffness that changes in every step does not leave the factorisations of the last ones behind."""
+
+    def resident():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * resource.getpagesize()
+
+    monkeypatch.setattr("dolfinx_contact.fixed_point.EVERY", 5)  # the layers are factorised too
+    scene = scenes.block(cells=(12, 12, 8), solver=dc.FixedPoint())
+
+    def solve(k):
+        scene.modulus.value = 210e3 * (1 + 0.01 * k)
+        scene.move_top(0, 0, -0.01 * (1 - 0.05 * (k % 3)))
+        scene.problem.solve()
+
+    for k in range(4):
+        solve(k)
+    before, factor = resident(), 13 * 13 * 9 * 3 * 300 * 8  # some hundreds of entries a row: 11 MB
+    for k in range(4, 12):
+        solve(k)
+    assert resident() - before < 2 * factor
