@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from time import perf_counter
+
 import numpy as np
 
 from dolfinx_contact.anderson import Anderson
@@ -34,18 +37,32 @@ class FixedPoint:
             tried where one does not converge, at the cost of a factorisation.
         depth: Number of previous corrections that Anderson's method mixes.
         max_iterations: Iterations with one metric.
+        max_seconds: Wall time after which the search ends, seconds.
 
     Raises:
         ValueError: an unknown map, or a metric, depth or number of iterations that is not positive.
     """
 
-    def __init__(self, map="return", rho=None, depth: int = 12, max_iterations: int = 400):
+    def __init__(
+        self,
+        map="return",
+        rho=None,
+        depth: int = 12,
+        max_iterations: int = 400,
+        max_seconds: float = math.inf,
+    ):
         if map not in METRICS:
             raise ValueError(f"map must be one of {', '.join(METRICS)}, got {map!r}.")
-        for name, value in (("rho", rho), ("depth", depth), ("max_iterations", max_iterations)):
+        for name, value in (
+            ("rho", rho),
+            ("depth", depth),
+            ("max_iterations", max_iterations),
+            ("max_seconds", max_seconds),
+        ):
             if not (value is None and name == "rho" or value > 0):
                 raise ValueError(f"{name} must be positive, got {value!r}.")
         self.map, self.rho, self.depth, self.max_iterations = map, rho, depth, max_iterations
+        self.max_seconds = max_seconds
 
     def solve(self, system, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
         """Iterate until ``system``'s error is at most ``tol``, or every metric has been tried.
@@ -59,7 +76,7 @@ class FixedPoint:
         Returns:
             The iterate of the smallest error, and the number of iterations.
         """
-        iterations = 0
+        iterations, start = 0, perf_counter()
         best = (np.inf, x)
         for factor in METRICS[self.map] if self.rho is None else (self.rho,):
             system.use_metric(self.map, factor)
@@ -71,6 +88,8 @@ class FixedPoint:
                     best = (error, x)
                 if error <= tol or not np.isfinite(error):
                     break
+                if self._late(start, system):
+                    return best[1], iterations
                 if error > bound:  # the tangent misleads: without it, again from the best
                     system.forget_tangent()
                     anderson.restart()
@@ -90,3 +109,9 @@ class FixedPoint:
             if best[0] <= tol:
                 break
         return best[1], iterations
+
+    def _late(self, start: float, system) -> bool:
+        """Whether the time is up on any rank; asks them only if there is a limit."""
+        if self.max_seconds == math.inf:
+            return False
+        return bool(system.total([perf_counter() - start > self.max_seconds])[0] > 0)

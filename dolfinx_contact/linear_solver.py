@@ -9,13 +9,11 @@ from petsc4py import PETSc
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
-# Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. What previous
-# solutions combine to is where the next solve starts: under a proportional load it is the solution.
+# Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
+# from zero, so that a run continued from a checkpoint has the same bits.
 MULTIGRID = {
     "ksp_type": "cg",
     "ksp_rtol": 1e-12,
-    "ksp_guess_type": "fischer",
-    "ksp_guess_fischer_model": "1,3",
     "pc_type": "gamg",
     "pc_gamg_type": "agg",
     "pc_gamg_agg_nsmooths": 1,

@@ -78,3 +78,31 @@ def test_options_of_the_command_line_go_before_ours():
         assert database.hasName("ksp_rtol") and not database.hasName("pc_type")
     finally:
         del database["ksp_rtol"]
+
+
+@pytest.mark.skipif(scenes.COMM.size > 1, reason="ranks add in the order in which messages arrive")
+def test_checkpoint_continues_to_the_same_bits(tmp_path):
+    """Fixed point, multigrid and tangent start every step from checkpointed arrays only."""
+
+    def scene():
+        return scenes.block(
+            cells=(10, 10, 4), mu=(0.3, 0.15), p=(0.01, 0.3), solver=dc.FixedPoint(),
+            petsc_options=MULTIGRID,
+        )  # fmt: skip
+
+    programme = [(0, 0, -0.01), (0, 0, -0.0092), (0.0005, 0.0002, -0.0085), (0, 0, -0.008)]
+    whole, part = scene(), scene()
+    for displacement in programme:
+        whole.move_top(*displacement)
+        whole.problem.solve()
+    for displacement in programme[:2]:
+        part.move_top(*displacement)
+        part.problem.solve()
+    part.problem.save(tmp_path / "checkpoint.npz")
+    resumed = scene()
+    resumed.problem.load(tmp_path / "checkpoint.npz")
+    for displacement in programme[2:]:
+        resumed.move_top(*displacement)
+        assert resumed.problem.solve().iterations > 0
+    assert np.array_equal(whole.u.x.array, resumed.u.x.array)
+    assert np.array_equal(whole.contact.reaction, resumed.contact.reaction)

@@ -205,17 +205,20 @@ def test_matrix_is_rebuilt_only_when_it_changes():
     assert body.refresh() == 2
 
 
-def test_failed_step_leaves_the_last_state_and_its_record():
+@pytest.mark.parametrize(
+    "cap, iterations", [(dict(rho=1.0, max_iterations=3), 3), (dict(max_seconds=1e-9), 0)]
+)
+def test_failed_step_leaves_the_last_state_and_its_record(cap, iterations):
     """A step that does not converge raises with its error and iterations; nothing computed is lost."""
-    scene = scenes.block(solver=dc.FixedPoint(rho=1.0, max_iterations=3))
+    scene = scenes.block(solver=dc.FixedPoint(**cap))
     scene.move_top(0, 0, 0.001)
     scene.problem.solve()
     u = scene.u.x.array.copy()
     scene.move_top(0.001, 0, -0.01)
-    with pytest.raises(dc.NotConverged, match="after 3 iterations") as caught:
+    with pytest.raises(dc.NotConverged, match=f"after {iterations} iterations") as caught:
         scene.problem.solve()
     step = caught.value.step
-    assert step.error > scene.problem.tol and step.iterations == 3
+    assert step.error > scene.problem.tol and step.iterations == iterations
     assert np.array_equal(scene.u.x.array, u)
     assert (scene.contact.reaction == 0).all()
     scene.problem.solver = dc.FixedPoint()
