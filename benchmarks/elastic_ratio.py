@@ -26,22 +26,22 @@ from punch import CASES, Parameters, Punch, programme
 
 from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
 
-CASES.setdefault("frictionless", dict(mu=0.0))
 
-
-def elastic_solve(body, b, repeat: int) -> dict:
-    """Iterations and seconds of K u = b, to 1e-10 from zero."""
+def elastic_solve(body, b, repeat: int, clock=perf_counter) -> dict:
+    """Iterations and seconds of K u = b by conjugate gradients with multigrid, to 1e-10 from zero."""
     options = MULTIGRID | {"ksp_rtol": 1e-10}
-    start = perf_counter()
+    start = clock()
     solver = LinearSolver(body.K, options, "yardstick_", body._rigid_modes)
-    setup = perf_counter() - start
+    setup = clock() - start
     seconds = []
     for _ in range(repeat):
         body.comm.Barrier()
-        start = perf_counter()
+        start = clock()
         solver.solve(b)
-        seconds.append(perf_counter() - start)
-    return dict(iterations=solver.ksp.getIterationNumber(), seconds=seconds, setup=setup)
+        seconds.append(clock() - start)
+    iterations = solver.ksp.getIterationNumber()
+    solver.destroy()
+    return dict(iterations=iterations, seconds=seconds, setup=setup)
 
 
 def peak_memory(comm) -> int:
@@ -132,6 +132,7 @@ def main(argv=None) -> None:
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
     )
     options = parser.parse_args(argv)
+    CASES["frictionless"] = dict(mu=0.0)
     mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
     results = []
     for refine in options.refine:

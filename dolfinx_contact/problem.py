@@ -389,13 +389,8 @@ class _ContactEquations:
         if problem._layer is None:
             prefix = f"{self.body.prefix}layer_"
             problem._layer = SurfaceLayer(self.body, problem.contacts, prefix)
-        map, factor = self._metric
-        forces = self.body.multiply(x) - self.b
-        derivatives = []
-        for contact, stiffness in zip(problem.contacts, problem._stiffness):
-            contact.rho = factor * stiffness
-            contact.take_reaction(forces)
-            derivatives.append(contact.update_with_derivatives(x, map))
+        contacts = self._asked(self.b - self.body.multiply(x))
+        derivatives = [contact.update_with_derivatives(x, self._metric[0]) for contact in contacts]
         with stage("contact: surface layer"):
             problem._layer.linearise(derivatives)
         self._tangent = problem._layer
@@ -444,12 +439,16 @@ class _ContactEquations:
             self._measured = x.copy()
         return self.errors.largest
 
-    def _update(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        map, factor = self._metric
+    def _asked(self, forces: np.ndarray):
+        """The contacts, each with its metric and the reactions that balance the forces at its nodes."""
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = factor * stiffness
+            contact.rho = self._metric[1] * stiffness
             contact.take_reaction(-forces)
-            contact.update(x, map)
+            yield contact
+
+    def _update(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        for contact in self._asked(forces):
+            contact.update(x, self._metric[0])
         residual = self._balance(forces)
         self.errors = self._errors(residual)
         return residual
