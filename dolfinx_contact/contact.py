@@ -209,14 +209,7 @@ class Contact:
         Raises:
             ValueError: ``rho`` has not been set; see ``set_metric``.
         """
-        if self.rho is None:
-            raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
-        self.move(u)
-        state = (self.reaction, self.gap, self.slip_increment, self.rho)
-        if map == "bipotential":
-            self.reaction, self.status = self.law.bipotential_map(*state)
-        else:
-            self.reaction, self.status = self.law.return_map(*state, self.rho)
+        self._correct(u, map, "map")
 
     def update_with_derivatives(self, u, map: str = "bipotential") -> tuple[np.ndarray, np.ndarray]:
         """As ``update``, and the (Clarke) derivatives of the new reactions on the branches taken.
@@ -225,12 +218,17 @@ class Contact:
             Derivatives by the reaction before, dimensionless, and by slip and gap, force per length;
             ``shape=(n, gdim, gdim)`` each, local frame.
         """
+        return self._correct(u, map, "jacobian")
+
+    def _correct(self, u, map: str, kind: str) -> list[np.ndarray]:
+        """Predictor and corrector by the law's ``bipotential_map``, ``return_jacobian`` and so on."""
+        if self.rho is None:
+            raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         self.move(u)
-        state = (self.reaction, self.gap, self.slip_increment, self.rho)
-        if map == "bipotential":
-            result = self.law.bipotential_jacobian(*state)
-        else:
-            result = self.law.return_jacobian(*state, self.rho)
+        metrics = {"bipotential": (self.rho,), "return": (self.rho, self.rho)}[map]
+        result = getattr(self.law, f"{map}_{kind}")(
+            self.reaction, self.gap, self.slip_increment, *metrics
+        )
         self.reaction, self.status = result[:2]
         return result[2:]
 

@@ -68,8 +68,8 @@ class FixedPoint:
         """Iterate until ``system``'s error is at most ``tol``, or every metric has been tried.
 
         Args:
-            system: Offers ``residual(x) -> (residual, error)``, ``correction(residual)``,
-                ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()`` and
+            system: Offers ``balanced(x)``, ``residual(x) -> (residual, error)``,
+                ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()`` and
                 ``total(array)``; nothing else is known of it.
             x: Start, this rank's unknowns.
 
@@ -83,6 +83,7 @@ class FixedPoint:
             anderson = Anderson(x.size, self.depth, system.total)
             x, smallest, due, bound = best[1], np.inf, EVERY, np.inf
             for iteration in range(self.max_iterations):
+                x = system.balanced(x)
                 residual, error = system.residual(x)
                 if error < best[0]:
                     best = (error, x)

@@ -19,7 +19,8 @@ from dolfinx_contact.condensed import CondensedBody
 from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
-from dolfinx_contact.linear_solver import stage
+from dolfinx_contact.linear_solver import LinearSolver, stage
+from dolfinx_contact.rigid_balance import RigidBalance
 from dolfinx_contact.surface_layer import SurfaceLayer
 
 
@@ -125,8 +126,7 @@ class ContactProblem:
         with raised_together(self.body.comm):
             for contact in self.contacts:
                 contact.held = _held_directions(contact, self.body.fixed)
-        self._stiffened = {}
-        self._condensed = self._layer = None
+        self._condensed = self._layer = self._stiffened = None
         self._assembled = 0
         self.reset()
 
@@ -323,9 +323,9 @@ class ContactProblem:
         self._layer = None
 
     def _free_springs(self) -> None:
-        for solver in self._stiffened.values():
-            solver.destroy()
-        self._stiffened.clear()
+        if self._stiffened is not None:
+            self._stiffened.solver.destroy()
+        self._stiffened = None
 
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x
@@ -335,6 +335,14 @@ class ContactProblem:
         self._show(self._states[0])
         for contact in self.contacts:
             contact.restore()
+
+
+class _Stiffened(NamedTuple):
+    """The body with the springs of one metric (map and factor) at its contact nodes."""
+
+    metric: tuple[str, float]
+    solver: LinearSolver
+    rigid: RigidBalance
 
 
 class _ContactEquations:
@@ -370,18 +378,28 @@ class _ContactEquations:
     def use_metric(self, map: str, factor: float) -> None:
         """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
         self._metric = metric = (map, factor)
-        self._tangent = None
-        stiffened = self.problem._stiffened
-        if metric in stiffened:
+        self._tangent, problem = None, self.problem
+        if problem._stiffened is not None and problem._stiffened.metric == metric:
             return
         A = self.body.K.copy()
-        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+        for contact, stiffness in zip(problem.contacts, problem._stiffness):
             contact.rho = factor * stiffness
             contact.add_springs(A, contact.springs(map))
-        self.problem._free_springs()  # one factorisation at a time: memory counts more than time
+        problem._free_springs()  # one factorisation at a time: memory counts more than time
         with stage("contact: set-up of springs"):
-            stiffened[metric] = self.body.solver(A)
+            rigid = RigidBalance(self.body, problem.contacts, A)
+            problem._stiffened = _Stiffened(metric, self.body.solver(A), rigid)
         A.destroy()  # the solver has its own reference
+
+    def balanced(self, x: np.ndarray) -> np.ndarray:
+        """``x``, moved along the rigid motions that only soft springs resist, see ``RigidBalance``."""
+        if len(self.problem._stiffened.rigid) == 0:
+            return x
+        self._measured = None  # contacts will move
+        forces = self.b - self.body.multiply(x)
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            contact.rho = self._metric[1] * stiffness
+        return self.problem._stiffened.rigid.balanced(x, forces, self._metric[0])
 
     def linearise(self, x: np.ndarray) -> None:
         """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
@@ -411,7 +429,7 @@ class _ContactEquations:
         if self._tangent is not None:
             near = self._tangent.solve(residual)
             residual -= self._tangent.multiply(near)
-        correction = near + self.problem._stiffened[self._metric].apply(residual)
+        correction = near + self.problem._stiffened.solver.apply(residual)
         correction[self.body.fixed] = 0.0
         return correction
 
