@@ -6,7 +6,7 @@
     make report QUICK=1      # minutes; results/report-quick/
 
 Every measurement has a process of its own, one thread, and is kept under results/; a run that is stopped
-continues, and what was measured with other settings or another version is measured anew.  All times are
+continues; what was measured with other settings, or with code that has changed since, is measured anew.  All times are
 processor seconds, so that other programs on the machine disturb them least.
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections import Counter
 from pathlib import Path
 from time import monotonic
 
@@ -31,10 +32,9 @@ import report_page
 import report_peers
 import report_stability
 from report_claims import claims, fill
-from report_run import compute, machine, measure, now, stored
+from report_run import ROOT, compute, current, machine, now, stored
 from tqdm import tqdm
 
-ROOT = Path(__file__).resolve().parent.parent
 SECTIONS = {
     "algebraic": report_algebraic,
     "meshes": report_meshes,
@@ -54,12 +54,11 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
     add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
     add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
-    add("--measure", nargs=3, help=argparse.SUPPRESS)  # function, settings, file
     return parser.parse_args(argv)
 
 
 def run(plans: dict, directory: Path, minutes: float) -> dict:
-    """Records by section and measurement; None for what there was no time for."""
+    """Records by section and measurement; None, or one made with older code, for what there was no time for."""
     end = monotonic() + 60 * minutes
     records = {section: {} for section in plans}
     todo = [(section, measurement) for section, plan in plans.items() for measurement in plan]
@@ -67,7 +66,7 @@ def run(plans: dict, directory: Path, minutes: float) -> dict:
         for section, measurement in sorted(todo, key=lambda pair: pair[1].late):
             bar.set_description(measurement.name)
             record = stored(measurement, directory)
-            if record is None and monotonic() < end:
+            if not (record and current(record)) and monotonic() < end:
                 record = compute(measurement, directory)
             records[section][measurement.name] = record
             bar.update()
@@ -84,17 +83,23 @@ def evaluated(records: dict) -> dict:
             data=SECTIONS[section].evaluate(results) if results else None,
             failed={name: r["failed"] for name, r in of.items() if r and "failed" in r},
             not_run=[name for name, r in of.items() if r is None],
-            measured=sorted({f"{r['date'][:10]}, {r['commit']}" for r in of.values() if r}),
+            measured=dict(Counter(when for r in of.values() if r for when in dates(r))),
+            older=[name for name, r in of.items() if r and "made_with" in r and not current(r)],
             seconds=sum(r["seconds"] for r in of.values() if r),
             load=[max((max(r["load"]) for r in of.values() if r), default=None)],
         )
     return data
 
 
+def dates(record: dict) -> list[str]:
+    """Day and commit of a record; those of its parts where it was put together from others."""
+    result = record.get("result")
+    parts = result.get("measured") if isinstance(result, dict) else None
+    return parts or [f"{record['date'][:10]}, {record['commit']}"]
+
+
 def main(argv=None) -> Path:
     options = arguments(argv)
-    if options.measure:
-        return measure(*options.measure)
     quick = ROOT / "results" / "report-quick"
     directory = options.measurements or (
         ROOT / "results" / "report" if options.size == "full" else quick / "measurements"

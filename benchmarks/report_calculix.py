@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import re
+import resource
+import signal
 import subprocess
 from pathlib import Path
 
@@ -95,19 +97,34 @@ def read(file: Path, nodes: int) -> np.ndarray:
     return np.array(numbers[:whole]).reshape(-1, nodes, 4)[:, :, 1:]
 
 
-def solve(
-    directory: Path, given: dict, kind: str, stiff: float, env: dict
-) -> tuple[np.ndarray, list, str]:
-    """Run CalculiX; displacements, iterations of each step, and what it said if it stopped early."""
+def own_errors(said: str) -> list[float]:
+    """What CalculiX itself calls the error of each increment that converged.
+
+    The largest residual force over the average force, or the last correction of the displacements over their increment,
+    whichever is larger.
+    """
+    value, errors = {}, []
+    for line in said.splitlines():
+        if match := re.match(r" (time avg. forc|largest residual force|largest increment of disp|largest correction to disp)=\s*(\S+)", line):  # fmt: skip
+            value[match[1].split()[1]] = float(match[2])
+        elif line.strip() == "convergence" and len(value) == 4:
+            errors.append(max(value["residual"] / value["avg."], value["correction"] / value["increment"]))  # fmt: skip
+    return errors
+
+
+def solve(directory: Path, given: dict, kind: str, stiff: float, env: dict, cap: int) -> tuple[np.ndarray, list, str]:  # fmt: skip
+    """Run CalculiX for at most ``cap`` processor seconds.
+
+    Returns:
+        Displacements, its own errors, and what it said if it stopped early.
+    """
     write(directory / "punch.inp", given, kind, stiff)
-    done = subprocess.run(["ccx", "punch"], cwd=directory, env=env, capture_output=True, text=True)
-    u = read(directory / "punch.dat", len(given["x"]))
-    iterations = [int(line.split()[3]) for line in (directory / "punch.sta").read_text().splitlines()[2:]
-                  if len(line.split()) >= 6]  # fmt: skip
+    done = subprocess.run(["ccx", "punch"], cwd=directory, env=env, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cap, cap)))  # fmt: skip
+    found = directory / "punch.dat"
+    u = read(found, len(given["x"])) if found.exists() else np.zeros((0, len(given["x"]), 3))
     errors = [line for line in (done.stdout + done.stderr).splitlines() if "*ERROR" in line]
-    complete = len(u) == len(given["programme"])
-    return (
-        u,
-        iterations,
-        "" if complete else " ".join(errors[-2:]) or f"ended with {done.returncode}",
-    )
+    said = " ".join(errors[-2:]) or f"ended with {done.returncode}"
+    if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):
+        said = f"stopped after {cap} s"
+    return u, own_errors(done.stdout), "" if len(u) == len(given["programme"]) else said

@@ -93,6 +93,11 @@ def _growth(data):
     for solver, fit in data["fits"].items():
         if fit["step"] is not None:
             yield f"{solver.replace(' ', '-').replace(',', '')}.exponent", f"{fit['step']:.2f}"
+    of = [row for row in data["rows"] if row["solver"] == "fixed point, return"]
+    if of:
+        largest = max(of, key=lambda row: row["unknowns"])
+        yield "largest", f"{largest['unknowns']:,}"
+        yield "largest.over-elastic", ratio(largest["over_elastic"])
 
 
 def _meshes(data):

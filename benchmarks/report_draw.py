@@ -153,23 +153,23 @@ def ladder(data):
         for k, row in enumerate(rows):  # a line above each scene that begins anew
             if k and row["compared_with"] is None:
                 ax.axhline(len(rows) - k - 0.5, color="0.5", lw=0.8)
-    compared = [row for row in rows if row.get("compared_with") and "saves" in row]
-    nothing = [f"{row['rung']} (time {row['step_ratio']:.2f} of {row['compared_with']})"
-               for row in compared if not row["saves"]]  # fmt: skip
-    saved = [
-        f"{row['rung']} {row['step_ratio']:.2g} of {row['compared_with']}"
-        for row in compared if "step" in row["saves"]
-    ]  # fmt: skip
+    compared = [row for row in rows if "saves" in row]
+    said = {what: [] for what in ("saved", "nothing", "free")}
+    for row in compared:
+        text = f"{row['rung']} {row['step_ratio']:.2g} of {row['compared_with']}"
+        # What can be switched off, and saves nothing then, costs nothing: that is as it should be.
+        free = row["rung"].startswith("no ") and not row["saves"]
+        said["saved" if "step" in row["saves"] else "free" if free else "nothing"].append(text)
     yield "ladder", figure, (
-        f"Time of a step: {'; '.join(saved) or 'no rung saves any'}. Memory is saved by: "
+        f"Time of a step: {'; '.join(said['saved']) or 'no rung saves any'}. Memory is saved by: "
         f"{', '.join(row['rung'] for row in compared if 'bytes' in row['saves']) or 'nothing'}. "
         + "".join(
             f"{row['compared_with']} takes {1 / row['bytes_ratio']:.1f} times the memory of {row['rung']}. "
             for row in compared if row["rung"] == "matrix constant" and "bytes" in row["saves"]
         )
-        + (f"Neither time, set-up nor memory is saved by more than 5 % by: {', '.join(nothing)}." if nothing
-           else "Every rung saves time, set-up or memory.")
-    )  # fmt: skip
+        + (f"Saves less than 10 % of the time: {'; '.join(said['nothing'])}. " if said["nothing"] else "Every rung saves time. ")
+        + (f"Costs nothing that could be saved: {'; '.join(said['free'])}." if said["free"] else "")
+    ).strip()  # fmt: skip
     if data["imports"]:
         yield _imports(data["imports"])
 

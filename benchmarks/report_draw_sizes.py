@@ -32,17 +32,16 @@ def peers(data):
         axes[0].text(1.15 * max(row["seconds"], row["ours"]), place, text, va="center", fontsize=10)
     axes[0].set(xscale="log", xlabel="processor seconds a step", yticks=places, yticklabels=names)
     axes[0].set_xlim(right=12 * max(theirs.max(), ours.max()))
-    errors = np.array([row["error"] or row["force_error"] or np.nan for row in rows])[::-1]
-    axes[1].barh(places, np.maximum(errors, 1e-16), height=0.5, color="#d55e00", label="_")
-    for place, row in zip(places, rows[::-1]):
-        if row["error"] is None:
-            axes[1].text(
-                1.3 * row["force_error"], place, "difference of reactions", va="center", fontsize=10
-            )
-    axes[1].set(xscale="log", xlabel="largest error of the peer in our measure", xlim=(1e-14, 10))
+    for key, shift, colour, label in (
+        ("error", 0.2, "#d55e00", "_"), ("own", -0.2, "#999999", "what the peer reports itself")
+    ):  # fmt: skip
+        errors = np.array([row[key] or np.nan for row in rows])[::-1]
+        axes[1].barh(places + shift, np.maximum(errors, 1e-16), height=0.38, color=colour, label=label)  # fmt: skip
+    axes[1].set(xscale="log", xlabel="largest error of the peer, in our measure and in its own", xlim=(1e-16, 10))  # fmt: skip
     for ax in axes:
         ax.grid(axis="y", visible=False)
-    legend(figure, axes[0])
+    handles, labels = zip(*(pair for ax in axes for pair in zip(*ax.get_legend_handles_labels()) if pair[1] != "_"))  # fmt: skip
+    figure.legend(handles, labels, loc="outside upper center", frameon=False, ncols=3)
     done = [row for row in rows if row["ratio"]]
     parts = [
         f"{row['peer']} {row['case']}" + (f" ({row['unknowns']} unknowns)" if row["unknowns"] else "")
@@ -67,7 +66,7 @@ def peers_tables(data):
             "peer": row["peer"], "case": row["case"], "unknowns": row["unknowns"], "configuration": row["setting"],
             "s a step": row["seconds"], "ours at equal error": row["ours"], "ours at 1e-8": row["ours_tight"],
             "ratio": row["ratio"], "steps done": row["done"], "our error": row["error"],
-            "total reactions, or reactions (Siconos), differ by": row["force_error"], "said": row["said"],
+            "its own": row["own"], "ours, judged alike": row.get("our_error"), "total reactions, or reactions (Siconos), differ by": row["force_error"], "said": row["said"],
         }
         for row in data["rows"]
     ]  # fmt: skip
@@ -89,15 +88,24 @@ def growth(data):
             ax.plot([row["unknowns"] for row in of], y, **{**style(solver), "label": label})
         ax.set(xscale="log", yscale="log", xlabel="unknowns", ylabel=title)
     legend(figure, axes[0], ncols=2)
-    fits = "; ".join(f"{solver} {fit['step']:.2f}" for solver, fit in data["fits"].items() if fit["step"] is not None)  # fmt: skip
-    wrong = [choice for choice in data["choices"] if not choice["right"]]
+    fits = "; ".join(
+        f"{solver} {fit['step']:.2f}" + (f" (memory {fit['bytes']:.2f})" if fit["bytes"] else "")
+        for solver, fit in data["fits"].items() if fit["step"] is not None
+    )  # fmt: skip
+    largest = max(rows, key=lambda row: (row["unknowns"], row["bytes"]))
+    chosen = []
+    for what in ("a cycle", "many steps"):
+        of = [choice for choice in data["choices"] if choice["what"] == what]
+        wrong = [
+            f"{c['unknowns']:,} ({c['auto']} takes {c['loss']:.2g} times {c['best']})" for c in of if not c["right"]
+        ]  # fmt: skip
+        chosen.append(f"for {what} at {len(of) - len(wrong)} of {len(of)} sizes" + f", not at {', '.join(wrong)}" * bool(wrong))  # fmt: skip
     yield "growth", figure, (
         (f"Seconds a step grow with the unknowns to the power of: {fits}. " if fits else "")
-        + (f"solver=None takes the fastest at {len(data['choices']) - len(wrong)} of {len(data['choices'])} sizes"
-           if data["choices"] else "What solver=None takes was not measured")
-        + (": not at " + ", ".join(
-            f"{c['unknowns']} ({c['auto']}, {c['loss']:.2g} times {c['best']})" for c in wrong) if wrong else "")
-        + "." + ("".join(f" Refused: {text}." for text in data["refused"]))
+        + f"At {largest['unknowns']:,} unknowns a step that reverses the slip takes {largest['over_elastic']:.1f} elastic solves "
+        f"({largest['solver']}) and {largest['bytes'] / largest['unknowns'] / 1e3:.1f} kB an unknown. "
+        + (f"solver=None takes the fastest {'; '.join(chosen)}." if data["choices"] else "What solver=None takes was not measured.")
+        + "".join(f" Refused: {text}." for text in data["refused"])
     )  # fmt: skip
 
 
@@ -118,37 +126,60 @@ def meshes(data):
 
 
 def _punch(data):
-    names = dict(normal="total reaction", dissipation="dissipation", stick="edge of the stick zone")
+    names = dict(
+        normal="total reaction", dissipation="work of friction", stick="edge of the stick zone"
+    )
     if not data["meshes"]:
         return
-    figure, axes = panels(3, 3)
-    for ax, (family, label) in zip(axes, (("meshes", "width of a cell [mm]"), ("increments", "increments of a cycle"),
-                                          ("tolerances", "tolerance"))):  # fmt: skip
+    families = dict(meshes="width of a cell [mm]", increments="increments of a cycle", tolerances="tolerance")  # fmt: skip
+    figure, axes = panels(4, 2, (5.6, 4.0))
+    for ax, (family, label) in zip(axes, families.items()):
         rows = data[family]
-        if not any(row[f"{key}_error"] for row in rows for key in names):
-            ax.set_title(f"{family}: not measured", fontsize=11)
-            ax.set_axis_off()
-            continue
+        x = [row["x"] for row in rows]
         for (key, name), (colour, marker) in zip(names.items(), (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"))):  # fmt: skip
-            x = np.array([row["x"] for row in rows])
-            y = np.array(
-                [row[f"{key}_error"] if row[f"{key}_error"] is not None else np.nan for row in rows]
-            )
             order = data["orders"].get(family, {}).get(key)
-            y[y < NOISE] = np.nan  # what the tolerance leaves is no error of mesh or increments
-            if np.isnan(y).all():
-                continue
-            ax.plot(x, y, marker=marker, color=colour,
-                label=name + (f", order {order:.1f}" if order is not None else ""))  # fmt: skip
-        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="error over the limit")
-        low, high = np.log10(ax.get_ylim())
-        ax.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+            # what the tolerance leaves is no error of mesh or increments
+            y = [e if (e := row[f"{key}_error"]) is not None and e > NOISE else np.nan for row in rows]  # fmt: skip
+            if np.isfinite(y).any():
+                said = f", order {order:.1f}" if order is not None else ""
+                ax.plot(x, y, marker=marker, color=colour, label=name + said)
+        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="relative error")
         if family != "tolerances":
-            ax.set_xticks([row["x"] for row in rows], [f"{row['x']:.3g}" for row in rows])
+            ax.set_xticks(x, [f"{v:.3g}" for v in x])
             ax.minorticks_off()
+        _labelled(ax)
+    for (family, colour), marker in zip((("meshes", "#0072b2"), ("increments", "#d55e00"), ("tolerances", "#009e73")), "os^"):  # fmt: skip
+        rows = [row for row in data[family] if (row["dissipation_error"] or 0.0) > NOISE]
+        axes[3].plot([row["seconds"]["median"] for row in rows], [row["dissipation_error"] for row in rows],
+            marker=marker, color=colour, label=f"{family} refined")  # fmt: skip
+    axes[3].axhline(0.01, color="0.6", lw=1)
+    axes[3].axhline(0.001, color="0.6", lw=1)
+    axes[3].set(xscale="log", yscale="log", xlabel="processor seconds of a cycle", ylabel="error of the work of friction")  # fmt: skip
+    _labelled(axes[3])
+    paper = next((row for row in data["meshes"] if row["refine"] == 0), data["meshes"][-1])
+    parts = [
+        f"{100 * row['dissipation_error']:.2g} % from {what}"
+        for row, what in (
+            (paper, "the mesh"),
+            (data["increments"][0] if data["increments"] else {}, "the increments"),
+        )
+        if row.get("dissipation_error")
+    ]
+    change = ", ".join(f"{100 * row['change']:+.2f} % on {row['unknowns']:,} unknowns" for row in data["twice"])  # fmt: skip
+    yield "discretisation", figure, (
+        f"Punch, case {data['case']}, one cycle, work of friction. "
+        + (f"On the paper's mesh with its increments it is off by {' and '.join(parts)}. " if parts else "")
+        + (" ".join(answer["text"] for answer in data["answers"]) or "What an accuracy costs was not measured.")
+        + (f" Twice the increments change it by {change}." if change else "")
+    )  # fmt: skip
+
+
+def _labelled(ax):
+    """Whole decades, and the legend."""
+    low, high = np.log10(ax.get_ylim())
+    ax.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+    if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize=9)
-    answered = " ".join(answer["text"] for answer in data["answers"])
-    yield "discretisation", figure, f"Punch, case {data['case']}, one cycle. {answered}"
 
 
 def _closed_forms(data):
@@ -184,8 +215,8 @@ def meshes_tables(data):
     for family in ("meshes", "increments", "tolerances"):
         yield [
             {
-                family: row["label"], "total reaction [N]": row["normal"], "dissipation [N mm]": row["dissipation"],
-                "stick edge [mm]": row["stick"], "s": row["seconds"],
+                family: f"{row['unknowns']:,} unknowns" if family == "meshes" else f"{row['x']:g}", "total reaction [N]": row["normal"], "work of friction [N mm]": row["dissipation"],
+                "stick edge [mm]": row["stick"], "s": row["seconds"]["median"],
                 **{f"error of {key}": row[f"{key}_error"] for key in ("normal", "dissipation", "stick")},
             }
             for row in data[family]

@@ -21,7 +21,15 @@ for module in (report_draw, report_draw_sizes):
             DRAW[name], TABLES[name] = getattr(module, name), getattr(module, f"{name}_tables")
 
 STYLE = study_page.STYLE + "\nsvg { max-width: 100%; height: auto; } .bad { color: #b00020; }"
-DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
+# Text stays text: a page of a tenth of the size, in which one can search.
+DRAWING = {
+    "font.size": 12,
+    "svg.hashsalt": "report",
+    "svg.fonttype": "none",
+    "font.sans-serif": ["DejaVu Sans"],
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+}
 
 
 def write(report: dict, file: Path, figures: Path) -> dict[str, str]:
@@ -63,10 +71,10 @@ def head(report: dict) -> str:
         f"{html.escape(machine['processor'])}, {machine['cores']} cores, {machine['memory_gb']} GB; "
         f"{html.escape(machine['compiler'])}; DOLFINx {machine['dolfinx']}, PETSc {machine['petsc']}, "
         f"dolfinx_contact {machine['dolfinx_contact']} ({machine['commit']}). Times are processor seconds of one "
-        "thread on a machine that other programs shared: ratios mean more than times. Work and precision, the ladder and "
+        "thread; each section states the load. Work and precision, the ladder and "
         "imports are medians of repeated, interleaved runs, with the least and the largest; a step of peers and growth is "
-        "the mean of a programme that ran once, meshes ran once "
-        f"(load average up to {max(loads, default=0):.1f}). Raw numbers: "
+        "the mean of a programme that ran once; meshes are medians of three where they take seconds and ran once where "
+        f"they take longer (load average up to {max(loads, default=0):.1f}). Raw numbers: "
         "report/report.json.</p>"
     )  # fmt: skip
 
@@ -81,8 +89,16 @@ def remarks(section: dict) -> list[str]:
         lines.append(
             f"<p class='bad'>Not run, there was no time: {html.escape(', '.join(section['not_run']))}.</p>"
         )
+    if section["older"]:
+        lines.append(
+            "<p class='bad'>Made with code that has changed since, there was no time to repeat them: "
+            f"{html.escape(', '.join(section['older']))}.</p>"
+        )
+    dated = section["measured"]
+    when = "; ".join(f"{day}" + (f" ({count})" if len(dated) > 1 else "") for day, count in dated.items())  # fmt: skip
     lines.append(
-        f"<p>Measured {html.escape('; '.join(section['measured']))}, in {section['seconds']:.0f} s.</p>"
+        f"<p>Measured {html.escape(when)}, in {section['seconds']:.0f} s, at a load average of up to "
+        f"{section['load'][0]:.1f}.</p>"
     )
     return lines
 

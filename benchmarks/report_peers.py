@@ -8,7 +8,6 @@ as if our solver had found them; nothing of their own history is lost in that.
 
 from __future__ import annotations
 
-import json
 import resource
 import shutil
 import subprocess
@@ -20,14 +19,18 @@ from time import process_time
 import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
 
 # isort: split
+import condensed_scenes
 import numpy as np
 import report_calculix
+import report_getfem
+import versus_siconos
 from punch import Parameters, Punch, programme
-from report_run import HERE, Measurement, alone
+from report_run import Measurement, alone
 
 TITLE = "Peers, side by side on the same mesh and programme"
 PYTHON = "/usr/bin/python3"  # Debian's, for which GetFEM and Siconos are packaged
 CALCULIX = {"node to surface": 50.0, "mortar": 50.0}  # penalty over Young's modulus, 1/mm
+CAP = 600  # processor seconds of a peer for one programme
 
 
 def plan(size: str) -> list[Measurement]:
@@ -35,50 +38,53 @@ def plan(size: str) -> list[Measurement]:
     more = dict(divisions=2, layers=2) if size == "smallest" else {}
     plans = []
     for refine in meshes:
-        # Seven steps of the fine mesh, two of them after the reversal, are enough for seconds a step.
-        settings = dict(refine=refine, steps=7 if refine or size == "smallest" else 15, mesh=more)
+        # The fine mesh: pressed in one step and raised in two, every one of them with slip of its own; mortar takes
+        # minutes for the first one alone.
+        increments = [1, 2] if refine or size == "smallest" else [5, 10]
+        settings = dict(refine=refine, increments=increments, mesh=more)
         for kind, stiff in CALCULIX.items():
             name = f"peers/calculix_{kind.replace(' ', '_')}_{refine}"
-            plans.append(Measurement(name, "report_peers:calculix", dict(kind=kind, stiff=stiff, **settings), late=refine > 0))  # fmt: skip
-        if refine == 0:
-            plans.append(Measurement("peers/getfem_0", "report_peers:getfem", settings))
+            steps = 1 if refine and kind == "mortar" else sum(increments)
+            plans.append(Measurement(name, "report_peers:calculix", dict(kind=kind, stiff=stiff, steps=steps, **settings), late=refine > 0))  # fmt: skip
+        plans.append(Measurement(f"peers/getfem_{refine}", "report_peers:getfem", settings))
     if size == "smallest":
         return plans[1:2]
     return [*plans, Measurement("peers/siconos", "report_peers:siconos", {})]
 
 
-def calculix(kind: str, stiff: float, refine: int, steps: int, mesh: dict) -> dict:
+def calculix(kind: str, stiff: float, steps: int, refine: int, increments: list, mesh: dict) -> dict:  # fmt: skip
     if shutil.which("ccx") is None:
         return dict(absent="CalculiX is not installed (apt install calculix-ccx)")
-    punch, given = case_a(refine, steps, mesh)
+    punch = case_a(refine, increments, mesh)
+    given = told(punch)
+    given["programme"] = given["programme"][:steps]
     with tempfile.TemporaryDirectory() as directory:
         before = children()
-        u, iterations, said = report_calculix.solve(Path(directory), given, kind, stiff, alone())
+        u, own, said = report_calculix.solve(Path(directory), given, kind, stiff, alone(), CAP)
         seconds = children() - before
-    result = compared(punch, given, u, seconds, refine, mesh)
+    result = compared(punch, given, u, seconds, refine, increments, mesh)
     setting = f"C3D8, penalty {stiff:g} E/mm, increments of its own" if kind != "mortar" else (
         f"C3D8, hard, stick slope {stiff:g} E/mm, increments of its own")  # fmt: skip
-    return result | dict(
-        peer=f"CalculiX, {kind}", setting=setting, said=said, iterations=iterations
-    )
+    return result | dict(peer=f"CalculiX, {kind}", setting=setting, said=said, own=own)
 
 
-def getfem(refine: int, steps: int, mesh: dict) -> dict:
+def getfem(refine: int, increments: list, mesh: dict) -> dict:
     if subprocess.run([PYTHON, "-c", "import getfem"], capture_output=True).returncode:
         return dict(absent="GetFEM is not installed (apt install python3-getfem)")
-    punch, given = case_a(refine, steps, mesh)
+    punch = case_a(refine, increments, mesh)
+    given = told(punch)
     with tempfile.TemporaryDirectory() as directory:
         files = [Path(directory) / name for name in ("mesh.npz", "found.npz")]
-        np.savez(files[0], **given)
-        command = [PYTHON, HERE / "report_getfem.py", *files]
+        np.savez(files[0], cap=CAP, **given)
+        command = [PYTHON, report_getfem.__file__, *files]
         done = subprocess.run(command, env=alone(), capture_output=True, text=True)
         if done.returncode:
             raise RuntimeError(done.stderr[-500:])
         with np.load(files[1]) as found:
-            u, said, iterations = found["u"], str(found["said"]), found["iterations"].tolist()
+            u, said, own = found["u"], str(found["said"]), found["own"].tolist()
             seconds = float(found["seconds"].sum())
-    result = compared(punch, given, u, seconds, refine, mesh)
-    return result | dict(peer="GetFEM, basic contact brick", said=said, iterations=iterations,
+    result = compared(punch, given, u, seconds, refine, increments, mesh)
+    return result | dict(peer="GetFEM, basic contact brick", said=said, own=own,
         setting="nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, residual 1e-9")  # fmt: skip
 
 
@@ -88,18 +94,22 @@ def children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def case_a(refine: int, steps: int, mesh: dict):
-    """Our punch, and all that a peer is told."""
-    punch = Punch(Parameters(case="A", refine=refine), **mesh)
+def case_a(refine: int, increments: list, mesh: dict, tol=1e-10) -> Punch:
+    """Our punch."""
+    loading, unloading = increments
+    return Punch(Parameters(case="A", refine=refine, loading=loading, unloading=unloading, tol=tol), **mesh)  # fmt: skip
+
+
+def told(punch: Punch) -> dict:
+    """All that a peer is told."""
     x, cells = punch.V.tabulate_dof_coordinates(), punch.mesh.topology.index_map(3).size_local
     cells = np.array([punch.V.dofmap.cell_dofs(k) for k in range(cells)])
     own, height = punch.parameters, punch.parameters.height
-    given = dict(
+    return dict(
         x=x, cells=cells, contact=punch.contact.nodes, top=np.flatnonzero(x[:, 2] > height * (1 - 1e-9)),
-        young=own.young, poisson=own.poisson, mu=0.2, programme=np.array(programme(own)[:steps]),
-        cell=height / (4 * 2**refine),
+        young=own.young, poisson=own.poisson, mu=0.2, programme=np.array(programme(own)),
+        cell=height / (4 * 2**own.refine),
     )  # fmt: skip
-    return punch, given
 
 
 class Given:
@@ -112,7 +122,7 @@ class Given:
         return self.answer, 0
 
 
-def compared(punch, given, u, seconds, refine, mesh) -> dict:
+def compared(punch, given, u, seconds, refine, increments, mesh) -> dict:
     """Their error by our measure, and our seconds for the same programme at that error and at 1e-8."""
     problem, judge = punch.problem, Given()
     problem.solver, problem.tol = judge, 1e300
@@ -130,7 +140,7 @@ def compared(punch, given, u, seconds, refine, mesh) -> dict:
         ("at equal error, again", equal),
     ):
         start = process_time()
-        mine = Punch(Parameters(case="A", refine=refine, tol=tol), **mesh)
+        mine = case_a(refine, increments, mesh, tol)
         made = process_time() - start
         for displacement in given["programme"]:
             step = mine.press(displacement)
@@ -140,36 +150,38 @@ def compared(punch, given, u, seconds, refine, mesh) -> dict:
     difference = [np.abs(np.divide(a, b) - 1).tolist() for a, b in zip(forces, exact)]
     return dict(
         refine=refine, unknowns=problem.body.size, steps=len(given["programme"]), done=len(u), seconds=seconds,
-        ours=ours, errors=errors, equal=equal, force_error=difference,
+        increments=increments, ours=ours, errors=errors, equal=equal, force_error=difference,
     )  # fmt: skip
 
 
-SICONOS = (
-    "import sys, json; sys.path.insert(0, {here!r}); import versus_siconos as v; rows = []; "
-    "v.report = lambda *row: rows.append([r if isinstance(r, str) else list(map(float, r)) "
-    "if isinstance(r, list) else float(r) for r in row]); {call}; print('ROWS', json.dumps(rows))"
-)
-
-
 def siconos() -> dict:
-    """The condensed problems of A, B, C by CondensedNewton and by Siconos' NSN_AC (versus_siconos.py)."""
+    """The condensed problems of A, B, C by Siconos' NSN_AC, before and after it by CondensedNewton.
+
+    All answers are judged by tests/condensed_scenes.py from ``W``, ``q`` and the reactions alone.
+    """
     if subprocess.run([PYTHON, "-c", "import siconos.numerics"], capture_output=True).returncode:
         return dict(absent="Siconos is not installed (apt install python3-siconos)")
-    rows = []
+    rows, name = [], "NSN_AC"
     with tempfile.TemporaryDirectory() as directory:
         file = str(Path(directory) / "problems.npz")
-        for python, call in (
-            (sys.executable, f"v.ours({file!r})"), (PYTHON, f"v.siconos({file!r}, 'NSN_AC')"),
-        ):  # fmt: skip
-            script = SICONOS.format(here=str(HERE), call=call)
-            done = subprocess.run(
-                [python, "-c", script], env=alone(), capture_output=True, text=True
-            )
+        for python, what in ((sys.executable, "make"), (sys.executable, "ours"), (PYTHON, name), (sys.executable, "ours again")):  # fmt: skip
+            done = subprocess.run([python, versus_siconos.__file__, file, what], env=alone(), capture_output=True, text=True)  # fmt: skip
             if done.returncode:
                 raise RuntimeError(done.stderr[-500:])
-            rows += json.loads(
-                next(x for x in done.stdout.splitlines() if x.startswith("ROWS"))[5:]
-            )
+        problems = np.load(file)
+        for case, (mu, p) in versus_siconos.LAWS.items():
+            row = dict(case=case, peer=f"Siconos {name}")
+            for solver in ("ours", name, "ours again"):
+                found = np.load(f"{file.removesuffix('npz')}{solver}.npz")
+                judged = [
+                    max(condensed_scenes.judge(problems["W"], q, np.array(mu), np.array(p), r))
+                    for q, r in zip(problems[f"{case}q"], found[f"{case}reaction"])
+                ]
+                row[solver] = dict(seconds=found[f"{case}seconds"].tolist(), errors=judged,
+                    own=found[f"{case}own"].tolist(), converged=int(found[f"{case}converged"].sum()))  # fmt: skip
+                exact = problems[f"{case}r"]
+                row[solver]["difference"] = float(np.abs(found[f"{case}reaction"] - exact).max() / np.abs(exact).max())  # fmt: skip
+            rows.append(row | dict(theirs=row.pop(name)))
     return dict(rows=rows)
 
 
@@ -181,7 +193,7 @@ def evaluate(results: dict) -> dict:
         if "absent" in result:
             continue
         if name.endswith("siconos"):
-            rows += _siconos_rows(result["rows"])
+            rows += [_siconos_row(row) for row in result["rows"]]
             continue
         again = [result["ours"][key] for key in ("at equal error", "at equal error, again")]
         ours = float(np.mean([run["seconds"] - run["mesh"] for run in again]))
@@ -191,24 +203,21 @@ def evaluate(results: dict) -> dict:
             key=name.split("/")[1].replace("_", "-"), peer=result["peer"], case="A", setting=result["setting"],
             unknowns=result["unknowns"], seconds=per, ours=ours / result["steps"],
             ours_tight=(result["ours"]["at 1e-8"]["seconds"] - result["ours"]["at 1e-8"]["mesh"]) / result["steps"],
-            ratio=per / (ours / result["steps"]) if complete else None,
-            done=f"{result['done']} of {result['steps']}", said=result["said"],
+            ratio=per / (ours / result["steps"]) if complete else None, increments=result["increments"],
+            done=f"{result['done']} of {result['steps']}", said=result["said"], own=max(result["own"], default=None),
             error=max(result["errors"], default=None), errors=result["errors"],
             force_error=max((max(pair) for pair in result["force_error"]), default=None),
         ))  # fmt: skip
+    rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["key"]))
     return dict(rows=rows, absent=absent)
 
 
-def _siconos_rows(found: list) -> list[dict]:
-    """``[case, name, seconds, converged, difference]`` of both, as rows."""
-    ours = {case: seconds for case, name, seconds, *_ in found if not name.startswith("Siconos")}
-    rows = []
-    for case, name, seconds, converged, *difference in found:
-        if name.startswith("Siconos"):
-            per, mine = float(np.median(seconds)), float(np.median(ours[case]))
-            rows.append(dict(
-                key=f"siconos-{case}", peer=name, case=case, setting="scaled W, q; start: the step before; tol 1e-10",
-                unknowns=None, seconds=per, ours=mine, ours_tight=mine, ratio=per / mine,
-                done=f"{converged:.0f} of {len(seconds)}", said="", error=None, errors=[], force_error=difference[0],
-            ))  # fmt: skip
-    return rows
+def _siconos_row(row: dict) -> dict:
+    theirs = row["theirs"]
+    per, mine = float(np.median(theirs["seconds"])), float(np.median(row["ours"]["seconds"] + row["ours again"]["seconds"]))  # fmt: skip
+    return dict(
+        key=f"siconos-{row['case']}", peer=row["peer"], case=row["case"], unknowns=None, increments=[5, 10],
+        setting="scaled W, q; start: the step before; tol 1e-10", seconds=per, ours=mine, ours_tight=mine, ratio=per / mine,
+        done=f"{theirs['converged']} of {len(theirs['seconds'])}", said="", error=max(theirs["errors"]),
+        errors=theirs["errors"], own=max(theirs["own"]), our_error=max(row["ours"]["errors"]), force_error=theirs["difference"],
+    )  # fmt: skip

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 import os
 import platform
@@ -20,6 +21,8 @@ from time import perf_counter
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+OWN = [ROOT / name for name in ("dolfinx_contact", "benchmarks", "demos", "tests")]
 LIMIT = 900  # seconds of wall time after which a measurement counts as failed
 
 
@@ -34,18 +37,19 @@ class Measurement:
 
 
 def stored(measurement: Measurement, directory: Path) -> dict | None:
-    """The record that is on disk, if it was made with these settings and this package, and did not fail."""
+    """The record that is on disk, if it was made with these settings and did not fail."""
     file = directory / f"{measurement.name}.json"
-    if not file.exists():
-        return None
-    record = json.loads(file.read_text())
-    wanted = _wanted(measurement)
-    known = "result" in record and all(record[key] == value for key, value in wanted.items())
-    return record if known else None
+    record = json.loads(file.read_text()) if file.exists() else {}
+    return record if "result" in record and record["settings"] == _plain(measurement.settings) else None  # fmt: skip
 
 
-def _wanted(measurement: Measurement) -> dict:
-    return dict(settings=json.loads(json.dumps(measurement.settings)), version=package())
+def current(record: dict) -> bool:
+    """Whether all that a record was made with, our modules and the compiled kernel, is still the same."""
+    return all(digest(ROOT / file) == was for file, was in record["made_with"].items())
+
+
+def _plain(settings: dict) -> dict:
+    return json.loads(json.dumps(settings))
 
 
 def compute(measurement: Measurement, directory: Path) -> dict:
@@ -58,9 +62,9 @@ def compute(measurement: Measurement, directory: Path) -> dict:
     file.parent.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_suffix(".unfinished")
     unfinished.unlink(missing_ok=True)
-    command = [sys.executable, HERE / "report.py", "--measure", measurement.function]
+    command = [sys.executable, HERE / "report_run.py", measurement.function]
     command += [json.dumps(measurement.settings), unfinished]
-    record = _wanted(measurement) | dict(commit=commit(), date=now(), load=[os.getloadavg()[0]])
+    record = dict(settings=_plain(measurement.settings), commit=commit(), date=now(), load=[os.getloadavg()[0]])  # fmt: skip
     start = perf_counter()
     try:
         done = subprocess.run(command, env=alone(), capture_output=True, text=True, timeout=LIMIT)
@@ -70,7 +74,7 @@ def compute(measurement: Measurement, directory: Path) -> dict:
     record.update(seconds=perf_counter() - start)
     record["load"].append(os.getloadavg()[0])
     if unfinished.exists():
-        record["result"] = json.loads(unfinished.read_text())
+        record |= json.loads(unfinished.read_text())
         unfinished.unlink()
     else:
         record["failed"] = said
@@ -82,7 +86,20 @@ def measure(function: str, settings: str, output: str) -> None:
     """What the process of a measurement does."""
     module, name = function.split(":")
     result = getattr(__import__(module), name)(**json.loads(settings))
-    Path(output).write_text(json.dumps(result))
+    Path(output).write_text(json.dumps(dict(result=result, made_with=made_with())))
+
+
+def made_with() -> dict[str, str]:
+    """Digest of every file of this project, and of its compiled kernel, that this process has imported."""
+    files = {Path(file) for m in list(sys.modules.values()) if (file := getattr(m, "__file__", None))}  # fmt: skip
+    own = {f for f in files if f.parent in OWN or f.name.startswith("_kernel")}
+    return {os.path.relpath(file, ROOT): digest(file) for file in sorted(own)}
+
+
+@functools.cache
+def digest(file: Path) -> str:
+    """Of the content; of a file that is not there, of nothing."""
+    return hashlib.sha256(file.read_bytes() if file.exists() else b"").hexdigest()[:16]
 
 
 def alone() -> dict[str, str]:
@@ -105,7 +122,7 @@ def commit() -> str:
     library = ["--", "dolfinx_contact", "cpp"]
 
     def git(*asked):
-        return subprocess.run(["git", *asked, *library], cwd=HERE.parent, capture_output=True, text=True).stdout  # fmt: skip
+        return subprocess.run(["git", *asked, *library], cwd=ROOT, capture_output=True, text=True).stdout  # fmt: skip
 
     found = git("log", "-1", "--format=%h").strip()
     return found + "+" * bool(git("status", "--porcelain").strip()) if found else "unknown"
@@ -206,3 +223,8 @@ def spread(values) -> dict:
 def ladder(first: int, last: int) -> list[float]:
     """Tolerances 10^-first ... 10^-last."""
     return [float(f"1e-{k}") for k in range(first, last + 1)]
+
+
+if __name__ == "__main__":
+    sys.path[1:1] = [str(ROOT / "demos"), str(ROOT / "tests")]
+    measure(*sys.argv[1:])

@@ -38,7 +38,8 @@ def plan(size: str) -> list[Measurement]:
 def read(file: str, written: float) -> dict:
     """The whole matrix, as ``make stress`` wrote it."""
     records = [json.loads(line) for line in Path(file).read_text().splitlines()]
-    return dict(records=[short(record) for record in records], whole=True)
+    measured = [record.get("measured", "date and commit not noted") for record in records]
+    return dict(records=[short(record) for record in records], whole=True, measured=measured)
 
 
 def run(solver: str, every: int) -> dict:

@@ -23,6 +23,7 @@ import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from dolfinx import fem
+from report_run import commit, now
 from stress_scenes import PROGRAMMES, Scene, build, scenes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -197,10 +198,11 @@ def main(argv=None) -> list[dict]:
         if (scene.seed is None or solver == "default")  # on plain arrays there is one solver
         and (scene.group, scene.name, solver) not in done
     ]
+    measured = f"{now()[:10]}, {commit()}"
     with log.open("a") as file:
         for k, (scene, solver) in enumerate(todo, start=1):
             outcome = run(scene, SOLVERS[solver]())
-            record = dict(group=scene.group, name=scene.name, solver=solver, **outcome)
+            record = dict(group=scene.group, name=scene.name, solver=solver, measured=measured, **outcome)  # fmt: skip
             records.append(record)
             print(json.dumps(record), file=file, flush=True)
             print(

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: MIT
 """The condensed problems of the paper's punch, solved here and by Siconos; processor seconds.
 
-    python benchmarks/versus_siconos.py problems.npz           # makes the problems and solves them here
+    python benchmarks/versus_siconos.py problems.npz make      # the problems: W, and q of each step
+    python benchmarks/versus_siconos.py problems.npz ours      # solved by CondensedNewton
     python3 benchmarks/versus_siconos.py problems.npz NSN_AC   # with Siconos, by one of its fc3d solvers
 
 Both get the same problems and starts (the step before).  Siconos solves the isotropic law alone: it
-gets the scaled problem, in which every law is the isotropic one with unit friction.
+gets the scaled problem, in which every law is the isotropic one with unit friction.  The answers go to
+problems.<solver>.npz, with the error that the solver itself reports.
 """
 
 from __future__ import annotations
@@ -25,19 +27,9 @@ LAWS = {
 }
 
 
-def report(case, name, seconds, converged, difference=0.0):
-    t = 1e3 * np.array(seconds)
-    print(
-        f"{case} {name}: median {np.median(t):.0f} ms, {t.min():.0f} to {t.max():.0f}, {converged} of "
-        f"{len(t)} converged, largest difference of reactions {difference:.1e}",
-        flush=True,
-    )
-
-
-def ours(file):
-    """Make the problems by one cycle of each case, write them, and solve them once more."""
+def make(file):
+    """One cycle of each case; its condensed problems with their solutions, ``q`` and ``r`` (steps, nodes, 3)."""
     import dolfinx_contact as dc
-    from dolfinx_contact import _kernel
 
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "demos"))
     from punch import Parameters, Punch, programme
@@ -53,27 +45,38 @@ def ours(file):
         if case == "A":
             problems["W"] = punch.problem._condensed.compliance()
     np.savez(file, **problems)
+
+
+def ours(file, name="ours"):
+    """All problems by CondensedNewton."""
+    import dolfinx_contact as dc
+    from dolfinx_contact import _kernel
+
+    problems = np.load(file)
     operator = _kernel.CondensedOperator(problems["W"], 3)
-    start = process_time()
     operator.prepare()
-    print(f"inverse of W, once: {process_time() - start:.2f} s")
-    solver = dc.CondensedNewton()
+    solver, answers = dc.CondensedNewton(), {}
     for case, law in LAWS.items():
-        q, r, seconds = problems[f"{case}q"], problems[f"{case}r"], []
+        q, r = problems[f"{case}q"], problems[f"{case}r"]
+        found = []
         for k in range(len(q)):
             start = process_time()
-            solver.solve_condensed(operator, dc.Friction(*law), q[k], TOL, r[k - 1 : k])
-            seconds.append(process_time() - start)
-        report(case, "CondensedNewton", seconds, len(q))
+            answer = solver.solve_condensed(operator, dc.Friction(*law), q[k], TOL, r[k - 1 : k])
+            seconds = process_time() - start
+            found.append((answer.reaction, seconds, max(answer.error, answer.slip_error), True))
+        answers |= kept(case, found)
+    np.savez(file.removesuffix("npz") + name, **answers)
 
 
 def siconos(file, name):
+    """All problems by Siconos, scaled as the module's text says."""
     import siconos.numerics as sn
 
     problems = np.load(file)
     W = problems["W"]
     n = len(W) // 3
     order = np.arange(3 * n).reshape(n, 3)[:, [2, 0, 1]].ravel()
+    answers = {}
     for case, (mu, p) in LAWS.items():
         mu, p = np.array(mu), np.array(p) / np.max(np.divide(p, mu))
         S, T = np.tile([*mu, 1.0], n), np.tile([*(p**2 / mu), 1.0], n)
@@ -83,20 +86,35 @@ def siconos(file, name):
         T /= length
         M = np.asfortranarray((T[:, None] * W * S)[np.ix_(order, order)])
         problem = sn.FrictionContactProblem(3, M, np.zeros(3 * n), np.ones(n))
-        seconds, converged, difference = [], 0, 0.0
+        found = []
         for k in range(len(q)):
             problem.q = (T * q[k])[order].copy()
-            found = (r[k - 1] / S)[order].copy() if k else np.zeros(3 * n)
+            reaction = (r[k - 1] / S)[order].copy() if k else np.zeros(3 * n)
             options = sn.SolverOptions(getattr(sn, f"SICONOS_FRICTION_3D_{name}"))
             options.dparam[0], options.iparam[0] = TOL, 20_000
             start = process_time()
-            converged += sn.fc3d_driver(problem, found, np.zeros(3 * n), options) == 0
-            seconds.append(process_time() - start)
+            converged = sn.fc3d_driver(problem, reaction, np.zeros(3 * n), options) == 0
+            seconds = process_time() - start
             back = np.empty(3 * n)
-            back[order] = found
-            difference = max(difference, np.abs(back * S - r[k]).max() / np.abs(r[k]).max())
-        report(case, f"Siconos {name}", seconds, converged, difference)
+            back[order] = reaction
+            own = options.dparam[sn.SICONOS_DPARAM_RESIDU]
+            found.append(((back * S).reshape(n, 3), seconds, own, converged))
+        answers |= kept(case, found)
+    np.savez(file.removesuffix("npz") + name, **answers)
+
+
+def kept(case, found) -> dict:
+    """Arrays of one case by name; prints what it took."""
+    columns = ("reaction", "seconds", "own", "converged")
+    arrays = {f"{case}{name}": np.array(column) for name, column in zip(columns, zip(*found))}
+    t = 1e3 * arrays[f"{case}seconds"]
+    print(
+        f"{case}: median {np.median(t):.0f} ms, {t.min():.0f} to {t.max():.0f}, {arrays[case + 'converged'].sum()} of "
+        f"{len(t)} converged, largest error that the solver reports {arrays[case + 'own'].max():.1e}",
+        flush=True,
+    )
+    return arrays
 
 
 if __name__ == "__main__":
-    siconos(*sys.argv[1:]) if len(sys.argv) > 2 else ours(sys.argv[1])
+    {"make": lambda file, _: make(file), "ours": ours}.get(sys.argv[2], siconos)(*sys.argv[1:])
