@@ -427,8 +427,7 @@ class _ContactEquations:
         residual[self.body.fixed] = 0.0
         near = 0.0
         if self._tangent is not None:
-            near = self._tangent.solve(residual)
-            residual -= self._tangent.multiply(near)
+            near, residual = self._tangent.correct(residual)
         correction = near + self.problem._stiffened.solver.apply(residual)
         correction[self.body.fixed] = 0.0
         return correction

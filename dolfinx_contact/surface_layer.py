@@ -30,20 +30,25 @@ class SurfaceLayer:
     def __init__(self, body, contacts, prefix: str):
         self._body, self._contacts, self._prefix = body, contacts, prefix
         self._dofs = _near(body, contacts)
-        first = body.K.getOwnershipRange()[0]
-        rows = PETSc.IS().createGeneral((first + self._dofs).astype(PETSc.IntType), body.comm)
-        block = body.K.createSubMatrix(rows, rows)
-        self._size = block.getSizes()
-        self._offset = block.getOwnershipRange()[0]
-        indptr, indices, values = block.getValuesCSR()
-        self._stiffness = sparse.csr_matrix(
-            (values, indices, indptr), shape=(self._dofs.size, self._size[1][1])
+        first, last = body.K.getOwnershipRange()
+        rows, layer = (
+            PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), body.comm)
+            for dofs in (np.arange(first, last), first + self._dofs)
         )
-        block.destroy()
+        # K on displacements of the layers: a product with all of K would cost a tenth of a cycle more.
+        self._columns = body.K.createSubMatrix(rows, layer)
+        self._near, self._forces = self._columns.createVecs()
+        self._offset = self._columns.getOwnershipRangeColumn()[0]
+        width = self._columns.getSizes()[1]
+        indptr, indices, values = self._columns.getValuesCSR()
+        stiffness = sparse.csr_matrix((values, indices, indptr), shape=(body.size, width[1]))
+        self._stiffness = stiffness[self._dofs]
+        self._size = (width, width)
         self._solver = None
 
     def destroy(self) -> None:
-        """Free the factorisation.  Collective."""
+        """Free the factorisation and the columns of K.  Collective."""
+        self._columns.destroy()
         if self._solver is not None:
             self._solver.destroy()
 
@@ -75,25 +80,35 @@ class SurfaceLayer:
         block = (mix @ self._stiffness - motion).tocsr()
         csr = (block.indptr.astype(PETSc.IntType), block.indices.astype(PETSc.IntType), block.data)
         A = PETSc.Mat().createAIJ(self._size, csr=csr, comm=self._body.comm)
-        self.destroy()
+        if self._solver is not None:
+            self._solver.destroy()
         self._solver = LinearSolver(A, DIRECT, self._prefix, None)
         A.destroy()  # the solver has its own reference
 
-    def solve(self, residual: np.ndarray) -> np.ndarray:
-        """Displacement of the layers that removes the residual there while the body beyond is held."""
+    def correct(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Remove the residual of the layers while the body beyond is held.
+
+        Returns:
+            The displacement, zero beyond the layers, and the residual that it leaves.
+        """
+        near = self._solver.solve(residual[self._dofs])
         correction = np.zeros_like(residual)
-        correction[self._dofs] = self._solver.solve(residual[self._dofs])
-        return correction
+        correction[self._dofs] = near
+        self._near.array_w[:] = near
+        self._columns.mult(self._near, self._forces)
+        return correction, residual - self._mixed(self._forces.array_r.copy(), correction)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """``J x``; zero at fixed degrees of freedom."""
-        y = self._body.multiply(x)
+        return self._mixed(self._body.multiply(x), x)
+
+    def _mixed(self, forces: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """``J x`` from the forces ``K x``, in place."""
         for contact, (left, motion) in zip(self._contacts, self._mixing):
-            forces, displacement = y[contact._dofs], x[contact._dofs]
-            y[contact._dofs] = np.einsum("nij,nj->ni", left, forces)
-            y[contact._dofs] -= np.einsum("nij,nj->ni", motion, displacement)
-        y[self._body.fixed] = 0.0
-        return y
+            mixed = np.einsum("nij,nj->ni", left, forces[contact._dofs])
+            forces[contact._dofs] = mixed - np.einsum("nij,nj->ni", motion, x[contact._dofs])
+        forces[self._body.fixed] = 0.0
+        return forces
 
 
 def _near(body, contacts) -> np.ndarray:
