@@ -106,4 +106,5 @@ def test_replaced_solvers_give_their_memory_back(monkeypatch):
     before, factor = resident(), 13 * 13 * 9 * 3 * 300 * 8  # some hundreds of entries a row: 11 MB
     for k in range(4, 12):
         solve(k)
-    assert resident() - before < 2 * factor
+    # The allocator takes 26 MB once, at some step (40 steps were watched); a leak takes 8 factors and more.
+    assert resident() - before < 4 * factor
