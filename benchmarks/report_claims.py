@@ -87,6 +87,7 @@ def _peers(data):
     for row in data["rows"]:
         if row.get("ratio"):
             yield f"{row['key']}.over-ours", ratio(row["ratio"])
+            yield f"{row['key']}.error", f"{row['error']:.0e}" if row["error"] else "not judged"
 
 
 def _growth(data):

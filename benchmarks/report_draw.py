@@ -21,6 +21,7 @@ COLOURS = {  # Okabe and Ito: for all eyes
 }
 MARKERS = dict(zip(COLOURS, "os^D"))
 REACHED = 1e-8
+COLUMNS = 24  # scenes in a line of the stress matrix
 
 
 def style(solver: str) -> dict:
@@ -208,28 +209,33 @@ def ladder_tables(data):
 def stability(data):
     records = data["records"]
     solvers = list(dict.fromkeys(record["solver"] for record in records))
-    groups = list(dict.fromkeys(record["group"] for record in records))
-    most = max(sum(r["group"] == g and r["solver"] == s for r in records) for g in groups for s in solvers)  # fmt: skip
-    figure = Figure(figsize=(15, 0.36 * len(groups) * len(solvers) ** 0.7 + 2.2), layout="constrained")  # fmt: skip
+    of = {}
+    for record in records:
+        of.setdefault(record["group"], {s: [] for s in solvers})[record["solver"]].append(record)
+    # From above: the first line of each group, of as many as its longest row of scenes needs.
+    lines = [-(-max(map(len, row.values())) // COLUMNS) for row in of.values()]
+    first = np.cumsum([0, *(count + 0.6 for count in lines)])
+    figure = Figure(figsize=(15, 0.21 * first[-1] + 1.4), layout="constrained")
     axes = figure.subplots(1, len(solvers), sharey=True, squeeze=False)[0]
     colours = matplotlib.colormaps["viridis_r"]
     norm = LogNorm(1e-16, 1e-7)
-    columns = max(1, -(-most // 3)) if most > 24 else most
     for ax, solver in zip(axes, solvers):
-        for k, group in enumerate(groups):
-            of = [r for r in records if r["group"] == group and r["solver"] == solver]
-            lines = max(1, -(-len(of) // columns))
-            for i, record in enumerate(of):
-                x, y = i % columns, k + (i // columns + 0.5) / lines - 0.5
-                if record["outcome"] == "refused":
-                    ax.plot(x, y, "x", color="#d00000", ms=6, mew=1.8)
-                elif record["outcome"] == "WRONG":
-                    ax.plot(x, y, "o", color="#d00000", ms=9)
-                else:
-                    ax.plot(x, y, "s", color=colours(norm(max(record["error"], 1e-16))), ms=5)
+        places = [
+            (record, i % COLUMNS, top + i // COLUMNS)
+            for top, row in zip(first, of.values()) for i, record in enumerate(row[solver])
+        ]  # fmt: skip
+        for outcome, marker, size, look in (
+            ("solved", "s", 60, dict(linewidths=0)),
+            ("refused", "x", 45, dict(linewidths=2)),
+            ("WRONG", "o", 70, {}),
+        ):
+            some = [place for place in places if place[0]["outcome"] == outcome]
+            shade = [colours(norm(max(record["error"], 1e-16))) for record, *_ in some]
+            x, y = [place[1] for place in some], [place[2] for place in some]
+            ax.scatter(x, y, size, c=shade if outcome == "solved" else "#d00000", marker=marker, **look)  # fmt: skip
         ax.set_title(solver)
-        ax.set(yticks=range(len(groups)), yticklabels=groups, xticks=[], xlim=(-1, columns))
-        ax.set_ylim(len(groups) - 0.4, -0.6)
+        ax.set(yticks=first[:-1], yticklabels=list(of), xticks=[], xlim=(-1, COLUMNS))
+        ax.set_ylim(first[-1] - 0.6, -1)
         ax.grid(visible=False)
     figure.colorbar(matplotlib.cm.ScalarMappable(norm, colours), ax=axes, label="largest error found by the judge",
         shrink=0.8, aspect=25)  # fmt: skip

@@ -40,13 +40,14 @@ def plan(size: str) -> list[Measurement]:
     for refine in meshes:
         # The fine mesh: pressed in one step and raised in two, every one of them with slip of its own; mortar takes
         # minutes for the first one alone.
-        increments = [1, 2] if refine or size == "smallest" else [5, 10]
+        increments = [5, 10] if size == "full" and not refine else [1, 2]
         settings = dict(refine=refine, increments=increments, mesh=more)
         for kind, stiff in CALCULIX.items():
             name = f"peers/calculix_{kind.replace(' ', '_')}_{refine}"
             steps = 1 if refine and kind == "mortar" else sum(increments)
             plans.append(Measurement(name, "report_peers:calculix", dict(kind=kind, stiff=stiff, steps=steps, **settings), late=refine > 0))  # fmt: skip
-        plans.append(Measurement(f"peers/getfem_{refine}", "report_peers:getfem", settings))
+        if refine == 0:  # on the fine mesh three steps had not ended after six minutes
+            plans.append(Measurement("peers/getfem_0", "report_peers:getfem", settings))
     if size == "smallest":
         return plans[1:2]
     return [*plans, Measurement("peers/siconos", "report_peers:siconos", {})]

@@ -85,8 +85,10 @@ def compute(measurement: Measurement, directory: Path) -> dict:
 def measure(function: str, settings: str, output: str) -> None:
     """What the process of a measurement does."""
     module, name = function.split(":")
-    result = getattr(__import__(module), name)(**json.loads(settings))
-    Path(output).write_text(json.dumps(dict(result=result, made_with=made_with())))
+    asked = getattr(__import__(module), name)
+    before = made_with()  # a file may change while it is being measured
+    result = asked(**json.loads(settings))
+    Path(output).write_text(json.dumps(dict(result=result, made_with=made_with() | before)))
 
 
 def made_with() -> dict[str, str]:

@@ -17,7 +17,7 @@ pytest.importorskip("tqdm")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import report
 from report_claims import claims, fill, found
-from report_run import Measurement, compute, stored
+from report_run import Measurement, compute, current, stored
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes of its own")
 ROOT = Path(__file__).resolve().parent.parent
@@ -70,13 +70,15 @@ def test_page_is_self_contained(made):
 
 
 def test_a_stopped_report_continues(made, tmp_path):
-    """A measurement is made once for its settings; one that failed is kept as such and tried again."""
+    """A measurement is made once for its settings and code; one that failed is kept as such and tried again."""
     file = next((made / "measurements").glob("*/*.json"))
     before = file.stat().st_mtime_ns
     good = Measurement("one", "report_run:ladder", dict(first=1, last=2))
     assert stored(good, tmp_path) is None
     record = compute(good, tmp_path)
     assert stored(good, tmp_path) == record and len(record["result"]) == 2
+    assert current(record) and "benchmarks/report_run.py" in record["made_with"]
+    assert not current(record | dict(made_with={"benchmarks/report_run.py": "of another day"}))
     assert stored(replace(good, settings=dict(first=1, last=3)), tmp_path) is None
     bad = Measurement("two", "report_run:ladder", dict(first=1))
     assert "last" in compute(bad, tmp_path)["failed"] and stored(bad, tmp_path) is None
