@@ -117,4 +117,5 @@ def kept(case, found) -> dict:
 
 
 if __name__ == "__main__":
-    {"make": lambda file, _: make(file), "ours": ours}.get(sys.argv[2], siconos)(*sys.argv[1:])
+    file, what = sys.argv[1:]
+    make(file) if what == "make" else (ours if what.startswith("ours") else siconos)(file, what)
