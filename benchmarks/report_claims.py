@@ -88,6 +88,10 @@ def _peers(data):
         if row.get("ratio"):
             yield f"{row['key']}.over-ours", ratio(row["ratio"])
             yield f"{row['key']}.error", f"{row['error']:.0e}" if row["error"] else "not judged"
+            yield f"{row['key']}.ms", f"{1e3 * row['seconds']:.0f}"
+            yield f"{row['key']}.ours-ms", f"{1e3 * row['ours']:.0f}"
+            yield f"{row['key']}.done", row["done"]
+            yield f"{row['key']}.difference", f"{row['force_error']:.1e}"
 
 
 def _growth(data):
