@@ -54,22 +54,21 @@ def solutions(W, q, friction, first, starts: int, seed: int) -> list[list]:
             r = dc.solve_condensed(W, q, friction, newton, TOL, r0=start).reaction
         except dc.CondensedNotConverged:
             continue
-        k = nearest(found, r)
-        if k is None:
-            found.append([r, 0, judge(W, q, friction.mu, friction.p, r)])
-            k = len(found) - 1
-        found[k][1] += 1
+        found[number(found, r, W, q, friction)][1] += 1
     return found
 
 
-def nearest(found, r) -> int | None:
-    """Number of the solution that ``r`` is, or None."""
+def number(found, r, W, q, friction) -> int:
+    """Which of the solutions found ``r`` is; a new one is judged and added."""
     apart = [np.abs(r - known).max() / np.abs(r).max() for known, *_ in found]
-    return int(np.argmin(apart)) if min(apart) <= APART else None
+    if min(apart) <= APART:
+        return int(np.argmin(apart))
+    found.append([r.copy(), 0, judge(W, q, friction.mu, friction.p, r)])
+    return len(found) - 1
 
 
 def examine(case: str, refine: int, steps: int | None, starts: int, report=print) -> list[dict]:
-    """One record per step; ``by`` has the solution that each solver finds, or None for no known one."""
+    """One record per step; ``by`` has the number of the solution that each map of the fixed point finds."""
     parameters = Parameters(case=case, refine=refine, tol=TOL)
     punches = {name: Punch(parameters, solver=make()) for name, make in SOLVERS.items()}
     leader, records, W = Punch(parameters, solver=dc.CondensedNewton()), [], None
@@ -87,7 +86,7 @@ def examine(case: str, refine: int, steps: int | None, starts: int, report=print
                 punch.problem.load(checkpoint.name)
                 try:
                     punch.press(displacement)
-                    by[name] = nearest(found, punch.contact.reaction)
+                    by[name] = number(found, punch.contact.reaction, W, q, friction)
                 except dc.NotConverged as failure:
                     by[name] = f"not converged, {failure.step.error:.0e}"
         largest = np.abs(found[0][0]).max()
