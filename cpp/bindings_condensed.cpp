@@ -4,6 +4,7 @@
 // The condensed contact problem on NumPy arrays. The GIL is released while it is solved.
 #include <dolfinx_contact/condensed.h>
 
+#include <memory>
 #include <optional>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -24,13 +25,13 @@ VectorXd vector(const Array &array, Index size, const char *name) {
     return Eigen::Map<const VectorXd>(array.data(), size);
 }
 
-Operator make_operator(const Array &W, int dim) {
-    if (dim != 2 && dim != 3)
-        throw py::value_error("dim must be 2 or 3, not " + std::to_string(dim));
+std::unique_ptr<Operator> make_operator(const Array &W, int dim) {
+    if (dim < 1 || dim > 3)
+        throw py::value_error("dim must be 1, 2 or 3, not " + std::to_string(dim));
     if (W.ndim() != 2 || W.shape(0) != W.shape(1) || W.shape(0) % dim != 0)
         throw py::value_error("W must be square with " + std::to_string(dim) + " rows per contact");
     const Eigen::Map<const RowMajor> map(W.data(), W.shape(0), W.shape(1));
-    return {MatrixXd(map), dim};
+    return std::make_unique<Operator>(map, dim);
 }
 
 template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, Index nodes) {
@@ -48,11 +49,16 @@ template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, I
 
 Solution solve_any(const Operator &op, const Array &mu, const std::optional<Array> &p,
                    const Array &q, const std::vector<Array> &starts, const Options &options) {
-    const Index size = op.W().rows();
+    const Index size = op.W().size();
     const VectorXd free = vector(q, size, "q");
     std::vector<VectorXd> from;
     for (const Array &start : starts)
         from.push_back(vector(start, size, "a start"));
+    if (op.dim() == 1) {
+        const AnyLaw<0> any = Uniform<Frictionless>{};
+        const py::gil_scoped_release release;
+        return solve<0>(op, any, free, from, options);
+    }
     if (op.dim() == 2) {
         const auto any = law<1>(mu, p, op.nodes());
         const py::gil_scoped_release release;

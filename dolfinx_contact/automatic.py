@@ -23,7 +23,7 @@ class Automatic:
         comm = equations.body.comm
         contacts = equations.problem.contacts
         nodes = comm.allreduce(sum(len(contact.nodes) for contact in contacts))
-        fits = condensed.fits(comm, nodes, contacts[0].frame.shape[0])
+        fits = condensed.fits(comm, nodes, condensed.components(contacts))
         solvers = [CondensedNewton(), FixedPoint()]
         if nodes > CROSSOVER:
             why = f"{nodes} contact nodes, more than {CROSSOVER}"

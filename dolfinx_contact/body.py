@@ -82,6 +82,7 @@ class ElasticBody:
             for dofs in (np.arange(first, last), first + self.fixed)
         )
         self._coupling = self.K.createSubMatrix(rows, fixed)
+        self._lift, self._lifted = self._coupling.createVecs()
         self.K.zeroRowsColumns(fixed)
         with raised_together(self.comm):
             if not np.isfinite(self.K.getDiagonal().array).all():
@@ -116,10 +117,9 @@ class ElasticBody:
             self._external = -self.internal_force(np.zeros_like(lift))
             self._load_digest = digest
         external = self._external.copy()
-        right, left = self._coupling.createVecs()
-        right.array_w[:] = lift[self.fixed]
-        self._coupling.mult(right, left)
-        b = external - left.array_r
+        self._lift.array_w[:] = lift[self.fixed]
+        self._coupling.mult(self._lift, self._lifted)
+        b = external - self._lifted.array_r
         with raised_together(self.comm):
             for name, values in (("boundary values", lift), ("loads", external), ("loads", b)):
                 if not np.isfinite(values).all():

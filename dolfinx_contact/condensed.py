@@ -23,7 +23,8 @@ class CondensedBody:
 
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
     sparse right-hand sides; it is held by rank 0 alone.  A degree of freedom fixed by a boundary
-    condition neither moves nor has a reaction of friction.
+    condition neither moves nor has a reaction of friction.  Without friction at any contact there are
+    normal components alone.
 
     Args:
         body: The elastic body, its stiffness assembled.
@@ -35,16 +36,17 @@ class CondensedBody:
 
     def __init__(self, body, contacts):
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
-        self.dim = self._contacts[0].frame.shape[0]
+        self.dim = components(self._contacts)
+        gdim = self._contacts[0].frame.shape[0]
         # One row per local direction of a node: its global components, none at fixed dofs.
-        dofs, components = [np.zeros((0, self.dim), int)], [np.zeros((0, self.dim, self.dim))]
-        turns = [np.zeros((0, self.dim, self.dim))]
+        dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, self.dim, gdim))]
+        turns = [np.zeros((0, self.dim, gdim))]
         for contact in self._contacts:
             free = ~np.isin(contact._dofs, body.fixed)
             dofs.append(contact._dofs)
-            turns.append(principal_axes(contact.friction, len(free), self.dim))
-            components.append(turns[-1] @ contact.frame * free[:, None, :])
-        self._dofs, self._frames, self._turns = map(np.concatenate, (dofs, components, turns))
+            turns.append(principal_axes(contact.friction, len(free), gdim)[:, -self.dim :])
+            frames.append(turns[-1] @ contact.frame * free[:, None, :])
+        self._dofs, self._frames, self._turns = map(np.concatenate, (dofs, frames, turns))
         self._counts = self.comm.allgather(len(self._dofs))
         self.nodes = sum(self._counts)
         _check_memory(self.comm, memory(self.nodes, self.dim))
@@ -55,6 +57,7 @@ class CondensedBody:
             inert = ~W.any(axis=0) & ~W.any(axis=1)
             W[inert, inert] = np.diag(W).mean() / max(1 - inert.mean(), 1 / W.shape[0])
             self.operator = _kernel.CondensedOperator(W, self.dim)
+            del W  # copied
             self.operator.prepare()  # pays after some ten iterations
         self.friction = self._gathered_friction()
         self.past: list | deque = []  # (q, r) of earlier steps, kept by the problem
@@ -65,7 +68,7 @@ class CondensedBody:
 
     def free_displacement(self, displacement: np.ndarray) -> np.ndarray:
         """``q``, ``shape=(nodes, dim)``: slip and gap of all nodes at a displacement of owned dofs."""
-        rows = [np.zeros((0, self.dim))]
+        rows = [np.zeros((0, self._turns.shape[2]))]
         for contact in self._contacts:
             contact.move(displacement)
             rows.append(np.column_stack((contact.slip_increment, contact.gap)))
@@ -103,7 +106,8 @@ class CondensedBody:
     # -- starts ----------------------------------------------------------------------------------
 
     def starts(self, q: np.ndarray) -> list[np.ndarray]:
-        """Reactions to start from: last step's, extrapolated, and those of the most similar step."""
+        """Reactions to start from: last step's, extrapolated, those of the most similar step, and last
+        step's with the change that led to the most similar one."""
         if not self.past:
             return []
         last = self.past[-1]
@@ -112,9 +116,12 @@ class CondensedBody:
             before = self.past[-2]
             starts.append(2 * last[1] - before[1])
         scale = np.abs(q).max()
-        similar = min(self.past, key=lambda past: np.abs(past[0] - q).max())
-        if np.abs(similar[0] - q).max() < 0.1 * scale:
-            starts.append(similar[1])
+        distances = [np.abs(past[0] - q).max() for past in self.past]
+        similar = int(np.argmin(distances))
+        if distances[similar] < 0.1 * scale:
+            starts.append(self.past[similar][1])
+            if similar > 0:
+                starts.append(last[1] + self.past[similar][1] - self.past[similar - 1][1])
         return starts
 
     def remember(self, q: np.ndarray, reaction: np.ndarray) -> None:
@@ -141,11 +148,11 @@ class CondensedBody:
         return Friction(mu, np.where(mu > 0, p, 1.0))
 
     def compliance(self) -> np.ndarray:
-        """W on rank 0, ``shape=(dim nodes, dim nodes)``; an empty array on the others."""
+        """W on rank 0, ``shape=(dim nodes, dim nodes)``, symmetric; an empty array on the others."""
         body, comm, dim = self._body, self.comm, self.dim
         first = body.K.getOwnershipRange()[0]
-        columns = np.repeat(self._dofs[:, None, :], dim, axis=1).reshape(-1, dim) + first
-        values = self._frames.reshape(-1, dim)
+        columns = np.repeat(self._dofs, dim, axis=0) + first
+        values = self._frames.reshape(len(columns), -1)
         columns, values = (self.gather(part) for part in (columns, values))
         size = dim * self.nodes
         W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
@@ -156,8 +163,19 @@ class CondensedBody:
             local = np.einsum("nij,njk->nik", self._frames, answer[self._dofs])
             rows = comm.gather(local.reshape(-1, answer.shape[1]), root=0)
             if comm.rank == 0:
-                W[:, block] = np.concatenate(rows)
+                # W is symmetric, but not to the last bit as it is computed: the mean of both halves.
+                found = np.concatenate(rows)
+                found[block] = (found[block] + found[block].T) / 2
+                found[:start] = (found[:start] + W[block, :start].T) / 2
+                W[:, block], W[block, :start] = found, found[:start].T
         return W
+
+
+def components(contacts) -> int:
+    """Components of a reaction: the normal one alone if no contact has friction."""
+    if all(contact.friction.frictionless for contact in contacts):
+        return 1
+    return contacts[0].frame.shape[0]
 
 
 def memory(nodes: int, dim: int) -> int:

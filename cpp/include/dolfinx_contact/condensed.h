@@ -275,11 +275,12 @@ template <int T, int P> class Cascade {
 ///   over all contacts, kappa = 1 / W_nn the canonical metric of a contact;
 /// - slip_error: largest slip_defect over the load displacement, the largest |(q_t, min(q_n, 0))|.
 ///
+/// T = 0 is contact without friction on normal components alone.
 /// @param starts reactions to start from; the one of the smallest residual is taken
 template <int T>
 Solution solve(const Operator &op, const AnyLaw<T> &law, const VectorXd &q,
                const std::vector<VectorXd> &starts, const Options &options) {
-    if (Coefficients<T>(law, op.nodes()).frictionless())
+    if (T == 0 || Coefficients<T>(law, op.nodes()).frictionless())
         return Cascade<0, T>(op, law, q, options).run(starts);
     return Cascade<T, T>(op, law, q, options).run(starts);
 }

@@ -55,9 +55,10 @@ void fixed_point(const System<T> &system, VectorXd &r, double target, int max_it
         rho.segment<D>(D * i).setConstant(system.rho_t[i]);
         rho[D * i + T] = system.rho_n[i];
     }
-    MatrixXd A = system.left.asDiagonal() * *system.W * system.right.asDiagonal();
+    MatrixXd A = system.W->dense();
+    A.array() *= (system.left * system.right.transpose()).array();
     A.diagonal() += rho.cwiseInverse();
-    const Eigen::PartialPivLU<MatrixXd> body(A);
+    const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> body(A); // in place
     const VectorXd free = system.left.cwiseProduct(system.q), zero = VectorXd::Zero(system.size());
 
     VectorXd z = r - rho.cwiseProduct(system.displacement(r));

@@ -99,11 +99,15 @@ template <int T> class Newton {
                 return End::stalled;
             }
             ++budget.iterations;
-            const VectorXd dr = direction(r, w);
-            const VectorXd dw = system_.change(dr);
+            VectorXd dr, dw;
+            direction(r, w, dr, dw);
             if (!line_search(r, w, dr, dw, *std::max_element(memory.begin(), memory.end()))) {
                 r = best;
                 return End::line_search;
+            }
+            if (std::sqrt(2.0 * state_.merit) <= target * size) { // without the rounding of steps
+                w = system_.displacement(r);
+                state_.evaluate(system_, r, w);
             }
             memory.push_back(state_.merit);
             if (memory.size() > 8)
@@ -119,8 +123,8 @@ template <int T> class Newton {
   private:
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
 
-    /// The smaller of the two eliminations, if there is a choice.
-    VectorXd direction(const VectorXd &r, const VectorXd &w) {
+    /// Newton's step by the smaller of the two eliminations, if there is a choice.
+    void direction(const VectorXd &r, const VectorXd &w, VectorXd &dr, VectorXd &dw) {
         Index compliance = 0, stiffness = 0;
         for (Index i = 0; i < system_.nodes; ++i) {
             const auto &point = state_.points[static_cast<std::size_t>(i)];
@@ -139,54 +143,81 @@ template <int T> class Newton {
             offsets_.push_back(unknowns);
             unknowns += steps_.back().m;
         }
-        const VectorXd found = stiff ? eliminate(*system_.inverse, system_.right.cwiseInverse(),
-                                                 system_.left.cwiseInverse(), unknowns)
-                                     : eliminate(*system_.W, system_.left, system_.right, unknowns);
-        return stiff ? system_.change_of_reaction(found) : found;
+        if (stiff) {
+            dw = eliminate(*system_.inverse, system_.right.cwiseInverse(),
+                           system_.left.cwiseInverse(), unknowns);
+            dr = system_.change_of_reaction(dw);
+        } else {
+            dr = eliminate(*system_.W, system_.left, system_.right, unknowns);
+            dw = system_.change(dr);
+        }
     }
 
     /// c + B y with y from L A (c + B y) + G y = g, A = diag(left) matrix diag(right).
-    VectorXd eliminate(const MatrixXd &matrix, const VectorXd &left, const VectorXd &right,
+    VectorXd eliminate(const Square &matrix, const VectorXd &left, const VectorXd &right,
                        Index unknowns) {
         VectorXd found(system_.size());
-        for (Index i = 0; i < system_.nodes; ++i)
-            found.template segment<D>(D * i) = steps_[static_cast<std::size_t>(i)].c;
+        active_.clear();
+        for (Index i = 0; i < system_.nodes; ++i) {
+            auto &step = steps_[static_cast<std::size_t>(i)];
+            found.template segment<D>(D * i) = step.c;
+            if (step.m > 0)
+                active_.push_back(i);
+        }
         if (unknowns == 0)
             return found;
-        const VectorXd known = left.cwiseProduct(matrix * right.cwiseProduct(found));
-        MatrixXd J(unknowns, unknowns);
-        VectorXd rhs(unknowns), column(system_.size());
-        for (Index j = 0; j < system_.nodes; ++j) {
-            const auto &from = steps_[static_cast<std::size_t>(j)];
-            const Index J0 = offsets_[static_cast<std::size_t>(j)];
-            for (int k = 0; k < from.m; ++k) {
-                const Node weights = at(right, j).cwiseProduct(from.B.col(k));
-                column.noalias() = matrix.template middleCols<D>(D * j) * weights;
-                column.array() *= left.array();
-                for (Index i = 0; i < system_.nodes; ++i) {
-                    const auto &to = steps_[static_cast<std::size_t>(i)];
-                    const Index I0 = offsets_[static_cast<std::size_t>(i)];
-                    const double *v = column.data() + D * i;
-                    for (int l = 0; l < to.m; ++l) {
-                        double sum = 0.0;
-                        for (int c = 0; c < D; ++c)
-                            sum += to.L(l, c) * v[c];
-                        J(I0 + l, J0 + k) = sum;
-                    }
-                }
-                for (int l = 0; l < from.m; ++l)
-                    J(J0 + l, J0 + k) += from.G(l, k);
-            }
-            rhs.segment(J0, from.m) = (from.g - from.L * at(known, j)).head(from.m);
+        const VectorXd known = left.cwiseProduct(matrix * VectorXd(right.cwiseProduct(found)));
+        VectorXd rhs(unknowns);
+        to_.clear();
+        from_.clear();
+        for (const Index i : active_) {
+            const auto &step = steps_[static_cast<std::size_t>(i)];
+            rhs.segment(offset(i), step.m) = (step.g - step.L * at(known, i)).head(step.m);
+            to_.emplace_back(step.L * at(left, i).asDiagonal());
+            from_.emplace_back(at(right, i).asDiagonal() * step.B);
         }
-        const VectorXd y = solve_any_rank(J, rhs);
-        for (Index i = 0; i < system_.nodes; ++i) {
+        assemble(matrix, unknowns);
+        const VectorXd y = solve_any_rank(J_, rhs);
+        for (const Index i : active_) {
             const auto &step = steps_[static_cast<std::size_t>(i)];
             found.template segment<D>(D * i) +=
-                step.B.leftCols(step.m) * y.segment(offsets_[static_cast<std::size_t>(i)], step.m);
+                step.B.leftCols(step.m) * y.segment(offset(i), step.m);
         }
         return found;
     }
+
+    /// J = to matrix from + G, node by node, from the entries of the matrix that are stored.
+    void assemble(const Square &matrix, Index unknowns) {
+        J_.resize(unknowns, unknowns);
+        const auto count = static_cast<Index>(active_.size());
+        for (Index b = 0; b < count; ++b) {
+            const auto [first, last] = matrix.stored(b, count);
+            for (Index a = first; a < last; ++a) {
+                const auto block = matrix.template block<D>(active_[a], active_[b]);
+                couple(a, b, block);
+                if (matrix.symmetric() && a != b)
+                    couple(b, a, block.transpose());
+            }
+            const Index j = active_[b];
+            const auto &step = steps_[static_cast<std::size_t>(j)];
+            J_.block(offset(j), offset(j), step.m, step.m) += step.G.topLeftCorner(step.m, step.m);
+        }
+    }
+    template <class Block> void couple(Index a, Index b, const Block &block) {
+        const Index i = active_[a], j = active_[b];
+        const int rows = steps_[i].m, columns = steps_[j].m;
+        if constexpr (D == 3)
+            if (rows == 2 && columns == 2) { // slipping nodes: the most of them
+                J_.template block<2, 2>(offset(i), offset(j)) =
+                    (to_[a].template topRows<2>() * block) * from_[b].template leftCols<2>();
+                return;
+            }
+        const Eigen::Matrix<double, D, D> entries = to_[a] * block * from_[b];
+        for (int k = 0; k < columns; ++k)
+            for (int l = 0; l < rows; ++l)
+                J_(offset(i) + l, offset(j) + k) = entries(l, k);
+    }
+    Index offset(Index i) const { return offsets_[static_cast<std::size_t>(i)]; }
 
     bool line_search(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw,
                      double reference) {
@@ -198,8 +229,8 @@ template <int T> class Newton {
             trial.evaluate(system_, r_trial, w_trial);
             if (trial.merit <= reference - decrease * length * slope) {
                 r = r_trial;
-                w = system_.displacement(r);
-                state_.evaluate(system_, r, w);
+                w = w_trial;
+                std::swap(state_, trial);
                 return true;
             }
         }
@@ -209,6 +240,8 @@ template <int T> class Newton {
     const System<T> &system_;
     State<T> state_;
     std::vector<NodeStep<T>> steps_;
-    std::vector<Index> offsets_;
+    std::vector<Index> offsets_, active_;
+    std::vector<Eigen::Matrix<double, D, D>> to_, from_;
+    MatrixXd J_;
 };
 } // namespace dolfinx_contact::condensed

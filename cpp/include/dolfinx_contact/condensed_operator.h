@@ -7,6 +7,7 @@
 #include "bipotential.h"
 #include "condensed_system.h"
 #include "slip_rule.h"
+#include <optional>
 
 namespace dolfinx_contact::condensed {
 /// One entry of the cascade that was tried.
@@ -31,42 +32,76 @@ struct Solution {
 };
 
 /// W with what is derived from it once: its normal rows, and its inverse when that begins to pay.
+/// If W is symmetric to the last bit, one triangle of it is kept, and its inverse by Cholesky in
+/// the other triangle of the same array, which has one column more; else both are whole.
 class Operator {
   public:
-    /// W (D n, D n), tangential components first; copied.
-    Operator(MatrixXd W, int dim) : W_(std::move(W)), dim_(dim) {}
+    /// W (D n, D n), D = `dim`, tangential components first; copied. D = 1 is contact without
+    /// friction, of which the normal rows alone are needed.
+    template <class Derived>
+    Operator(const Eigen::MatrixBase<Derived> &W, int dim)
+        : size_(W.rows()), dim_(dim), symmetric_((W.array() == W.transpose().array()).all()),
+          values_(size_, size_ + (symmetric_ ? 1 : 0)),
+          W_(view(values_.data() + (symmetric_ ? size_ : 0), Square::Part::upper)) {
+        if (symmetric_)
+            values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
+        else
+            values_ = W;
+    }
+    Operator(const Operator &) = delete; // views look into it
 
-    const MatrixXd &W() const { return W_; }
+    const Square &W() const { return W_; }
     int dim() const { return dim_; }
-    Index nodes() const { return W_.rows() / dim_; }
+    Index nodes() const { return size_ / dim_; }
 
     /// Rows and columns of the normal components.
-    const MatrixXd &normal() const {
-        if (normal_.size() == 0 && W_.size() > 0) {
+    const Square &normal() const {
+        if (!normal_) {
             const auto rows = Eigen::seqN(dim_ - 1, nodes(), dim_);
-            normal_ = W_(rows, rows);
+            normal_values_ = W_.dense()(rows, rows);
+            normal_.emplace(normal_values_.data(), nodes(), nodes(),
+                            symmetric_ ? Square::Part::lower : Square::Part::all);
         }
-        return normal_;
+        return *normal_;
     }
 
     /// The inverse of W, if prepared and if W is regular, else null.
-    const MatrixXd *inverse() const { return inverse_.size() > 0 ? &inverse_ : nullptr; }
+    const Square *inverse() const { return inverse_ ? &*inverse_ : nullptr; }
 
     /// Inverts W, so that Newton's method may eliminate sticking nodes. For many solves.
-    /// Returns whether W was regular enough.
+    /// Returns whether W was regular enough, and positive definite if symmetric.
     bool prepare() {
-        if (inverse_.size() == 0 && W_.size() > 0) {
-            const Eigen::PartialPivLU<MatrixXd> lu(W_);
-            if (lu.rcond() > 1e-12)
-                inverse_ = lu.inverse();
+        constexpr double smallest_rcond = 1e-12;
+        if (inverse_ || size_ == 0)
+            return true;
+        if (symmetric_) {
+            auto lower = values_.leftCols(size_);
+            lower.triangularView<Eigen::Lower>() = values_.rightCols(size_).transpose();
+            if (!invert(lower))
+                return false;
+            inverse_.emplace(view(values_.data(), Square::Part::lower));
+        } else {
+            inverse_values_ = values_.partialPivLu().inverse();
+            inverse_.emplace(view(inverse_values_.data(), Square::Part::all));
         }
-        return inverse_.size() > 0;
+        if (!(inverse_->norm() * W_.norm() < 1.0 / smallest_rcond))
+            inverse_.reset();
+        return inverse_.has_value();
     }
 
   private:
-    MatrixXd W_, inverse_;
-    mutable MatrixXd normal_;
+    Square view(const double *values, Square::Part triangle) const {
+        return {values, size_, size_, symmetric_ ? triangle : Square::Part::all};
+    }
+
+    Index size_;
     int dim_;
+    bool symmetric_;
+    MatrixXd values_, inverse_values_;
+    Square W_;
+    std::optional<Square> inverse_;
+    mutable MatrixXd normal_values_;
+    mutable std::optional<Square> normal_;
 };
 
 /// The two errors of a state, and the units in which a problem is scaled.
@@ -76,13 +111,14 @@ template <int P> class Judge {
 
     Judge(const Operator &op, const AnyLaw<P> &law, const VectorXd &q) : op_(op), law_(law), q_(q) {
         const Index n = op.nodes();
+        const VectorXd diagonal = op.W().diagonal();
         double mean = 0.0;
         for (Index i = 0; i < n; ++i)
-            mean += std::abs(op.W()(D * i + P, D * i + P)) / static_cast<double>(n);
+            mean += std::abs(diagonal[D * i + P]) / static_cast<double>(n);
         kappa_.resize(n);
         VectorXd pressed(n);
         for (Index i = 0; i < n; ++i) {
-            kappa_[i] = 1.0 / std::max(std::abs(op.W()(D * i + P, D * i + P)), 1e-12 * mean);
+            kappa_[i] = 1.0 / std::max(std::abs(diagonal[D * i + P]), 1e-12 * mean);
             pressed[i] = kappa_[i] * std::max(-q[D * i + P], 0.0);
             Local<P> loaded = q.segment<D>(D * i);
             loaded[P] = std::min(loaded[P], 0.0);

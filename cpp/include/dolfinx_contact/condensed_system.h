@@ -6,14 +6,10 @@
 /// Curnier.
 #pragma once
 
+#include "condensed_matrix.h"
 #include "law.h"
-#include <Eigen/Dense>
 
 namespace dolfinx_contact::condensed {
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// The coefficients of friction of all nodes, (n, T); the metric of a scaled variable needs no
 /// more.
 template <int T> struct Coefficients {
@@ -45,9 +41,9 @@ template <int T> struct System {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    const MatrixXd *W;       // physical
-    const MatrixXd *inverse; // of W, or null
-    VectorXd q;              // physical
+    const Square *W;       // physical
+    const Square *inverse; // of W, or null
+    VectorXd q;            // physical
     VectorXd left, right;
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction
@@ -56,13 +52,13 @@ template <int T> struct System {
     Index size() const { return D * nodes; }
 
     VectorXd displacement(const VectorXd &r) const {
-        return left.cwiseProduct(q + *W * right.cwiseProduct(r));
+        return left.cwiseProduct(q + *W * VectorXd(right.cwiseProduct(r)));
     }
     VectorXd change(const VectorXd &dr) const {
-        return left.cwiseProduct(*W * right.cwiseProduct(dr));
+        return left.cwiseProduct(*W * VectorXd(right.cwiseProduct(dr)));
     }
     VectorXd change_of_reaction(const VectorXd &dw) const {
-        return (*inverse * dw.cwiseQuotient(left)).cwiseQuotient(right);
+        return (*inverse * VectorXd(dw.cwiseQuotient(left))).cwiseQuotient(right);
     }
 
     /// Metric of the residual: rho_n = normal / W_nn and rho_t = tangential / max(W_xx, W_yy).

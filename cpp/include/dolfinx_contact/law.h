@@ -33,6 +33,7 @@ template <class L> struct Field {
 /// A law whose kind is known at run time. Visit it once per contact, not once per node. Friction in
 /// two dimensions (T = 1) is isotropic.
 template <int T> struct AnyLawOf;
+template <> struct AnyLawOf<0> { using type = std::variant<Uniform<Frictionless>>; };
 template <> struct AnyLawOf<1> {
     using type = std::variant<Uniform<Frictionless>, Uniform<Isotropic<1>>, Field<Isotropic<1>>>;
 };
