@@ -38,8 +38,6 @@ class Automatic:
             why = f"{nodes} contact nodes, at most {CROSSOVER}"
         if not fits:
             solvers = solvers[:1]
-        if isinstance(solvers[0], FixedPoint):
-            x = equations.guess()
         iterations, best, chosen = 0, (np.inf, x), ""
         for solver in solvers:
             x, count = solver.solve(equations, best[1], tol)

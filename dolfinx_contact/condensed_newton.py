@@ -146,9 +146,9 @@ class CondensedNewton:
         """
         body = equations.condensed()
         q = body.free_displacement(equations.trial)
-        starts, iterations, error = body.starts(q), 0, np.inf
-        for factor in (0.1, 1e-3):  # this error is not quite the condensed problem's
-            result = body.solve(self, q, max(factor * tol, 1e-14), starts)
+        starts, iterations, error, rounding = body.starts(q), 0, np.inf, 0.0
+        for factor in (0.1, 1e-3, 1e-3):  # this error is not quite the condensed problem's
+            result = body.solve(self, q + rounding, max(factor * tol, 1e-14), starts)
             iterations += result.iterations
             equations.tried = result.tried
             x, previous = body.displacement(equations.trial, result.reaction), error
@@ -156,6 +156,8 @@ class CondensedNewton:
             if error <= tol or not error < previous:
                 break
             starts = [result.reaction]
+            # Of W, which a soft support makes large: slip and gap of the body itself count.
+            rounding = rounding + body.free_displacement(x) - result.displacement
         body.remember(q, result.reaction)
         return x, iterations
 

@@ -69,15 +69,15 @@ class FixedPoint:
 
         Args:
             system: Offers ``balanced(x)``, ``residual(x) -> (residual, error)``,
-                ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()`` and
-                ``total(array)``; nothing else is known of it.
-            x: Start, this rank's unknowns.
+                ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()``,
+                ``trial``, ``guess()`` and ``total(array)``; nothing else is known of it.
+            x: Start, this rank's unknowns; for the bare ``system.trial``, ``system.guess()`` is taken.
 
         Returns:
             The iterate of the smallest error, and the number of iterations.
         """
         iterations, start = 0, perf_counter()
-        best = (np.inf, x)
+        best = (np.inf, system.guess() if x is system.trial else x)
         for factor in METRICS[self.map] if self.rho is None else (self.rho,):
             system.use_metric(self.map, factor)
             anderson = Anderson(x.size, self.depth, system.total)

@@ -16,7 +16,6 @@ from dolfinx_contact._errors import raised_together
 from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
 from dolfinx_contact.condensed import CondensedBody
-from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.contact import Contact, Status
 from dolfinx_contact.error import Errors, projection_residual, relative
 from dolfinx_contact.linear_solver import LinearSolver, stage
@@ -248,12 +247,8 @@ class ContactProblem:
             equations.errors = equations.errors_if_open(trial)
             return trial, equations, 0
         equations.chosen = type(self.solver).__name__
-        # The condensed problem starts from reactions: a guess would cost two residuals.
-        start = (
-            trial if isinstance(self.solver, (Automatic, CondensedNewton)) else equations.guess()
-        )
         with stage("contact: iterations"):
-            x, iterations = self.solver.solve(equations, start, self.tol)
+            x, iterations = self.solver.solve(equations, trial, self.tol)
         equations.measure(x)
         return x, equations, iterations
 

@@ -92,7 +92,26 @@ def test_operator_is_the_compliance_of_the_contact_nodes():
     if scene.mesh.comm.rank == 0:
         expected = (W @ r.ravel()).reshape(-1, 3)
         assert np.abs(local - expected).max() <= 1e-12 * np.abs(expected).max()
-        assert np.abs(W - W.T).max() <= 1e-12 * np.abs(W).max()
+        assert np.array_equal(W, W.T)
+
+
+@pytest.mark.parametrize("cells", [(4, 4, 2), (6, 3)])
+def test_without_friction_normal_components_alone(cells):
+    """mu = 0 keeps the normal rows of W, and its reactions are the limit of those with friction."""
+    found, _ = run(mu=0.0, p=None, cells=cells, solver=dc.CondensedNewton())
+    friction, _ = run(mu=1e-12, p=None, cells=cells, solver=dc.CondensedNewton())
+    assert np.abs(found - friction).max() <= 1e-8 * np.abs(friction).max()
+    assert not found[..., :-1].any()
+    W = []
+    for mu in (0.0, 1e-12):
+        scene = scenes.block(mu=mu, p=None, cells=cells)
+        scene.problem.body.refresh()
+        body = condensed.CondensedBody(scene.problem.body, [scene.contact])
+        W.append(body.compliance())
+    if scene.mesh.comm.rank == 0:
+        normal = W[1][len(cells) - 1 :: len(cells), len(cells) - 1 :: len(cells)]
+        assert W[0].shape == (body.nodes, body.nodes)
+        assert np.abs(W[0] - normal).max() <= 1e-12 * np.abs(normal).max()
 
 
 def test_operator_is_kept_while_the_matrix_stands():

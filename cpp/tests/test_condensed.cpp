@@ -162,6 +162,50 @@ TEST(Condensed, inverse_changes_nothing) {
     EXPECT_FALSE(Operator(MatrixXd::Ones(3, 3), 3).prepare()); // rank one
 }
 
+// A symmetric W shares an array with its inverse, others do not: both are W and its inverse, and
+// the answers are the same.
+TEST(Condensed, symmetric_and_unsymmetric_storage) {
+    Random random(17);
+    auto problem = random_problem<2>(random, 50, 150, {0.3, 0.15}, {0.05, 0.2});
+    problem.W = MatrixXd(problem.W + problem.W.transpose()) / 2;
+    problem.W.diagonal().array() += 2 * problem.W.diagonal().mean();
+    problem.q = problem.w - problem.W * problem.r;
+    auto changed = problem;
+    changed.W(0, 1) *= 1 + 1e-14;
+    const VectorXd x = VectorXd::NullaryExpr(150, [&] { return random.normal(); });
+    for (const auto &of : {problem, changed}) {
+        Operator op = of.op();
+        ASSERT_TRUE(op.prepare());
+        EXPECT_EQ(op.W().symmetric(), of.W == of.W.transpose());
+        EXPECT_TRUE(op.W().dense() == of.W);
+        EXPECT_NEAR(op.W().norm(), of.W.cwiseAbs().colwise().sum().maxCoeff(),
+                    1e-12 * op.W().norm());
+        EXPECT_LE((op.W() * x - of.W * x).norm(), 1e-13 * op.W().norm() * x.norm());
+        EXPECT_LE((of.W * (*op.inverse() * x) - x).norm(), 1e-11 * x.norm());
+        EXPECT_LE((op.inverse()->dense() * of.W - MatrixXd::Identity(150, 150)).norm(), 1e-10);
+        EXPECT_EQ(op.normal().dense()(3, 7), of.W(11, 23));
+        const Solution found = condensed::solve<2>(op, of.law(), of.q, {}, {1e-12, 1e-12});
+        ASSERT_TRUE(found.converged);
+        EXPECT_LE((found.reaction - of.r).norm(), 1e-9 * of.r.norm());
+    }
+    problem.W.diagonal()[149] *= -1;
+    EXPECT_FALSE(problem.op().prepare()); // symmetric, but not positive definite
+}
+
+// Without friction the normal rows of W alone give the same reactions as all of it.
+TEST(Condensed, normal_components_alone) {
+    Random random(19);
+    const auto problem = random_problem<2>(random, 8, 24, {0.0, 0.0}, {1.0, 1.0});
+    const auto rows = Eigen::seqN(2, 8, 3);
+    Operator op(MatrixXd(problem.W(rows, rows)), 1);
+    op.prepare();
+    const AnyLaw<0> law = Uniform<Frictionless>{};
+    const Solution found = condensed::solve<0>(op, law, problem.q(rows), {}, {1e-12, 1e-12});
+    const Solution whole = problem.solve({1e-12, 1e-12});
+    ASSERT_TRUE(found.converged && whole.converged);
+    EXPECT_LE((found.reaction - whole.reaction(rows)).norm(), 1e-9 * whole.reaction.norm());
+}
+
 // Large enough for factors in single precision; started at the solution, nothing is left to do.
 TEST(Condensed, many_contacts) {
     Random random(5);
