@@ -158,8 +158,8 @@ def ladder(data):
     said = {what: [] for what in ("saved", "nothing", "free")}
     for row in compared:
         text = f"{row['rung']} {row['step_ratio']:.2g} of {row['compared_with']}"
-        # What can be switched off, and saves nothing then, costs nothing: that is as it should be.
-        free = row["rung"].startswith("no ") and not row["saves"]
+        # What can be switched off, and saves no time then, costs none: that is as it should be.
+        free = row["rung"].startswith("no ") and "step" not in row["saves"]
         said["saved" if "step" in row["saves"] else "free" if free else "nothing"].append(text)
     yield "ladder", figure, (
         f"Time of a step: {'; '.join(said['saved']) or 'no rung saves any'}. Memory is saved by: "
@@ -169,7 +169,7 @@ def ladder(data):
             for row in compared if row["rung"] == "matrix constant" and "bytes" in row["saves"]
         )
         + (f"Saves less than 10 % of the time: {'; '.join(said['nothing'])}. " if said["nothing"] else "Every rung saves time. ")
-        + (f"Costs nothing that could be saved: {'; '.join(said['free'])}." if said["free"] else "")
+        + (f"Costs next to nothing, for without it: {'; '.join(said['free'])}." if said["free"] else "")
     ).strip()  # fmt: skip
     if data["imports"]:
         yield _imports(data["imports"])

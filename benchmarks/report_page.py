@@ -94,12 +94,12 @@ def remarks(section: dict) -> list[str]:
             "<p class='bad'>Made with code that has changed since, there was no time to repeat them: "
             f"{html.escape(', '.join(section['older']))}.</p>"
         )
-    dated = section["measured"]
-    when = "; ".join(f"{day}" + (f" ({count})" if len(dated) > 1 else "") for day, count in dated.items())  # fmt: skip
-    lines.append(
-        f"<p>Measured {html.escape(when)}, in {section['seconds']:.0f} s, at a load average of up to "
-        f"{section['load'][0]:.1f}.</p>"
-    )
+    if dated := section["measured"]:
+        when = "; ".join(f"{day}" + (f" ({count})" if len(dated) > 1 else "") for day, count in dated.items())  # fmt: skip
+        lines.append(
+            f"<p>Measured {html.escape(when)}, in {section['seconds']:.0f} s, at a load average of up to "
+            f"{section['load'][0]:.1f}.</p>"
+        )
     return lines
 
 
