@@ -21,6 +21,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 from punch import Parameters, Punch, programme
 
+from dolfinx_contact import _kernel
 from dolfinx_contact.condensed import CondensedBody
 
 SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint}
@@ -61,6 +62,41 @@ def study(case: str, solver: str, steps: int | None, cycles: int, **mesh) -> dic
     )  # fmt: skip
 
 
+LAWS = {
+    "frictionless": dict(mu=0.0),
+    "isotropic, mu = 0.2": dict(mu=0.2),
+    "associated, (0.3, 0.15)": dict(mu=(0.3, 0.15)),
+    "case C": dict(mu=(0.3, 0.15), p=(0.05, 0.20)),
+}
+
+
+def laws(first: int = 2, last: int = 31) -> str:
+    """Simpler laws on the same W and q, those of case C, each step from zero."""
+    punch = Punch(Parameters(case="C", cycles=3))
+    solver = punch.problem.solver = dc.CondensedNewton()
+    for displacement in programme(punch.parameters)[:last]:
+        punch.press(displacement)
+    past = [q for q, _ in punch.problem._past][first - 1 : last]
+    W = punch.problem._condensed.compliance()
+    operators = {3: _kernel.CondensedOperator(W, 3), 1: _kernel.CondensedOperator(W[2::3, 2::3], 1)}
+    lines = ["| law | set-up (ms) | iterations | median (ms) | spread (ms) | ms per iteration |"]
+    lines.append("|---" * 6 + "|")
+    setup = {dim: 1e3 * seconds(operator.prepare) for dim, operator in operators.items()}
+    for name, law in LAWS.items():
+        dim = 1 if name == "frictionless" else 3
+        times, iterations = [], 0
+        for q in past:
+            start = process_time()
+            found = solver.solve_condensed(operators[dim], dc.Friction(**law), q[:, -dim:], 1e-10)
+            times.append(1e3 * (process_time() - start))
+            iterations += found.iterations
+        lines.append(
+            f"| {name} | {setup[dim]:.0f} | {iterations / len(past):.1f} | {np.median(times):.1f} | "
+            f"{min(times):.1f} – {max(times):.1f} | {sum(times) / iterations:.1f} |"
+        )
+    return "\n".join(lines)
+
+
 def row(label: str, solver: str, result: dict) -> str:
     t = 1e3 * result["times"]
     return (
@@ -81,7 +117,10 @@ def main(argv=None) -> None:
     parser.add_argument("--cycles", type=int, default=6)
     parser.add_argument("--cases", default="ABC")
     parser.add_argument("--growth", type=int, nargs="*", default=[4, 8, 12, 16], help="divisions")
+    parser.add_argument("--laws", action="store_true", help="simpler laws on the same W and q")
     options = parser.parse_args(argv)
+    if options.laws:
+        print(laws(), flush=True)
     print(HEAD, flush=True)
     for case in options.cases:
         results = {}

@@ -23,7 +23,8 @@ class Automatic:
         comm = equations.body.comm
         contacts = equations.problem.contacts
         nodes = comm.allreduce(sum(len(contact.nodes) for contact in contacts))
-        fits = condensed.fits(comm, nodes, condensed.components(contacts))
+        unknowns = equations.body.K.getSize()[0]
+        fits = condensed.fits(comm, nodes, condensed.components(contacts), unknowns)
         solvers = [CondensedNewton(), FixedPoint()]
         if nodes > CROSSOVER:
             why = f"{nodes} contact nodes, more than {CROSSOVER}"

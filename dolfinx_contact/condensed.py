@@ -49,7 +49,7 @@ class CondensedBody:
         self._dofs, self._frames, self._turns = map(np.concatenate, (dofs, frames, turns))
         self._counts = self.comm.allgather(len(self._dofs))
         self.nodes = sum(self._counts)
-        _check_memory(self.comm, memory(self.nodes, self.dim))
+        _check_memory(self.comm, memory(self.nodes, self.dim, body.K.getSize()[0]))
         W = self.compliance()
         self.operator = None
         if self.comm.rank == 0:
@@ -178,9 +178,14 @@ def components(contacts) -> int:
     return contacts[0].frame.shape[0]
 
 
-def memory(nodes: int, dim: int) -> int:
-    """Bytes that W, its inverse, a Jacobian with its factors and a work block take, about."""
-    return 5 * 8 * (nodes * dim) ** 2
+def memory(nodes: int, dim: int, unknowns: int) -> int:
+    """Bytes that W and its inverse take, with what is needed beside them: an upper bound, docs/solvers.md.
+
+    W is copied once; with its inverse it then needs half of that, and a Jacobian with its factors, or
+    those of the fixed point among the fallbacks, the rest.  Beside W, solving for a block was measured
+    to take six times what its solutions take.
+    """
+    return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
 
 
 def _available() -> float:
@@ -191,9 +196,10 @@ def _available() -> float:
         return np.inf
 
 
-def fits(comm, nodes: int, dim: int) -> bool:
+def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
     """Whether W would fit into half of the memory that rank 0 has free."""
-    return comm.bcast(2 * memory(nodes, dim) <= _available() if comm.rank == 0 else None, root=0)
+    enough = 2 * memory(nodes, dim, unknowns) <= _available() if comm.rank == 0 else None
+    return comm.bcast(enough, root=0)
 
 
 def _check_memory(comm, needed: int) -> None:
