@@ -91,7 +91,8 @@ def _peers(data):
             yield f"{row['key']}.ms", f"{1e3 * row['seconds']:.0f}"
             yield f"{row['key']}.ours-ms", f"{1e3 * row['ours']:.0f}"
             yield f"{row['key']}.done", row["done"]
-            yield f"{row['key']}.difference", f"{row['force_error']:.1e}"
+            if row["force_error"] is not None:
+                yield f"{row['key']}.difference", f"{row['force_error']:.1e}"
 
 
 def _growth(data):
