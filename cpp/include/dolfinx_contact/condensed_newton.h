@@ -193,31 +193,35 @@ template <int T> class Newton {
         for (Index b = 0; b < count; ++b) {
             const auto [first, last] = matrix.stored(b, count);
             for (Index a = first; a < last; ++a) {
-                const auto block = matrix.template block<D>(active_[a], active_[b]);
+                const auto block = matrix.template block<D>(in(active_, a), in(active_, b));
                 couple(a, b, block);
                 if (matrix.symmetric() && a != b)
                     couple(b, a, block.transpose());
             }
-            const Index j = active_[b];
-            const auto &step = steps_[static_cast<std::size_t>(j)];
+            const Index j = in(active_, b);
+            const auto &step = in(steps_, j);
             J_.block(offset(j), offset(j), step.m, step.m) += step.G.topLeftCorner(step.m, step.m);
         }
     }
     template <class Block> void couple(Index a, Index b, const Block &block) {
-        const Index i = active_[a], j = active_[b];
-        const int rows = steps_[i].m, columns = steps_[j].m;
+        const Index i = in(active_, a), j = in(active_, b);
+        const int rows = in(steps_, i).m, columns = in(steps_, j).m;
         if constexpr (D == 3)
             if (rows == 2 && columns == 2) { // slipping nodes: the most of them
                 J_.template block<2, 2>(offset(i), offset(j)) =
-                    (to_[a].template topRows<2>() * block) * from_[b].template leftCols<2>();
+                    (in(to_, a).template topRows<2>() * block) *
+                    in(from_, b).template leftCols<2>();
                 return;
             }
-        const Eigen::Matrix<double, D, D> entries = to_[a] * block * from_[b];
+        const Eigen::Matrix<double, D, D> entries = in(to_, a) * block * in(from_, b);
         for (int k = 0; k < columns; ++k)
             for (int l = 0; l < rows; ++l)
                 J_(offset(i) + l, offset(j) + k) = entries(l, k);
     }
-    Index offset(Index i) const { return offsets_[static_cast<std::size_t>(i)]; }
+    Index offset(Index i) const { return in(offsets_, i); }
+    template <class Vector> static const auto &in(const Vector &vector, Index i) {
+        return vector[static_cast<std::size_t>(i)];
+    }
 
     bool line_search(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw,
                      double reference) {
