@@ -153,7 +153,7 @@ def _punch(data):
         if family != "tolerances":
             ax.set_xticks(x, [f"{v:.3g}" for v in x])
             ax.minorticks_off()
-        _labelled(ax)
+        _labelled(ax, "upper left" if family == "meshes" else "best")
     for (family, colour), marker in zip((("meshes", "#0072b2"), ("increments", "#d55e00"), ("tolerances", "#009e73")), "os^"):  # fmt: skip
         rows = [row for row in data[family] if (row["dissipation_error"] or 0.0) > NOISE]
         axes[3].plot([row["seconds"]["median"] for row in rows], [row["dissipation_error"] for row in rows],
@@ -180,12 +180,12 @@ def _punch(data):
     )  # fmt: skip
 
 
-def _labelled(ax):
+def _labelled(ax, place="best"):
     """Whole decades, and the legend."""
     low, high = np.log10(ax.get_ylim())
     ax.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
     if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize=9)
+        ax.legend(fontsize=9, loc=place)
 
 
 def _closed_forms(data):
