@@ -84,6 +84,7 @@ class Square {
 /// Inverts a symmetric positive definite matrix in place, lower triangle, by halves: n^3
 /// operations, where factors and solves for the columns of the identity take 7/3 n^3. False, and
 /// the triangle lost, if it is not positive definite.
+// NOLINTNEXTLINE(misc-no-recursion): as deep as the logarithm of n
 inline bool invert(Eigen::Ref<MatrixXd> A) {
     const Index n = A.rows(), half = n / 2;
     if (n <= 64) { // smaller halves save nothing
