@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import resource
 import sys
 from pathlib import Path
@@ -101,27 +102,37 @@ def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int,
 
 
 HEAD = (
-    "| unknowns | case | ranks | elastic solve: its | s | cycles: first step | reversal | worst | mean | "
-    "seconds: first step and set-up | reversal | worst other | mean other | bytes per unknown |\n"
-    + "|---" * 14
+    "| unknowns | ranks | elastic: iterations, s | case | cycles: first step | first unloading | worst | mean | "
+    "seconds: first step, with set-up | first unloading | worst other | mean, with set-up | bytes per unknown |\n"
+    + "|---" * 13
     + "|"
 )
+TABLE = re.compile(r"(<!-- elastic ratios -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def row(result: dict) -> str:
-    """Ratios to the elastic solve; the mean is over all steps of the programme."""
+    """Ratios to the elastic solve; means are over a whole cycle, or left out."""
     seconds = float(np.median([t for y in result["elastic"] for t in y["seconds"]]))
     iterations = result["elastic"][0]["iterations"]
     cycles = np.array([step["iterations"] for step in result["steps"]]) / iterations
     times = np.array([step["seconds"] for step in result["steps"]]) / seconds
-    reversal = Parameters().loading
+    unloading = Parameters().loading
+    whole = len(cycles) == len(programme(Parameters(cycles=1)))
+    turn = [f"{x[unloading]:.2f}" if len(x) > unloading else "–" for x in (cycles, times)]
+    mean = [f"{x.mean():.2f}" if whole else "–" for x in (cycles, times)]
     failed = " not converged" * ("failed" in result["steps"][-1])
     return (
-        f"| {result['unknowns']:,} | {result['case']} | {result['ranks']} | {iterations} | {seconds:.3g} | "
-        f"{cycles[0]:.2f} | {cycles[reversal]:.2f} | {cycles.max():.2f}{failed} | {cycles.mean():.2f} | "
-        f"{times[0]:.1f} | {times[reversal]:.2f} | {times[1:].max():.2f} | {times[1:].mean():.2f} | "
+        f"| {result['unknowns']:,} | {result['ranks']} | {iterations}, {seconds:.2g} | {result['case']} | "
+        f"{cycles[0]:.2f} | {turn[0]} | {cycles.max():.2f}{failed} | {mean[0]} | "
+        f"{times[0]:.1f} | {turn[1]} | {times[1:].max(initial=0.0):.2f} | {mean[1]} | "
         f"{result['bytes_per_unknown']:.0f} |"
     )
+
+
+def with_table(text: str, results: list[dict]) -> str:
+    """``text`` with the table of ``results`` between its marks."""
+    table = "\n".join([HEAD, *map(row, results)])
+    return TABLE.sub(lambda match: f"{match[1]}{table}\n{match[2]}", text)
 
 
 def main(argv=None) -> None:
@@ -135,7 +146,12 @@ def main(argv=None) -> None:
     parser.add_argument(
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
     )
+    parser.add_argument("--docs", type=Path, help="JSON whose table goes into docs/method.md")
     options = parser.parse_args(argv)
+    if options.docs:
+        page = Path(__file__).resolve().parent.parent / "docs" / "method.md"
+        page.write_text(with_table(page.read_text(), json.loads(options.docs.read_text())))
+        return
     CASES["frictionless"] = dict(mu=0.0)
     mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
     results = []

@@ -15,6 +15,7 @@ pytest.importorskip("gmsh")
 pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+import elastic_ratio
 import report
 from report_claims import claims, fill, found
 from report_run import Measurement, compute, current, stored
@@ -109,3 +110,11 @@ def test_ratios_in_the_docs_are_those_of_the_committed_report():
     assert markers
     for file, key, text in markers:
         assert text == of["claims"][key], (file.name, key)
+
+
+def test_elastic_ratios_in_the_docs_are_those_of_the_committed_records():
+    """The table of docs/method.md is written from docs/elastic_ratio.json, not typed."""
+    text = (ROOT / "docs" / "method.md").read_text()
+    records = json.loads((ROOT / "docs" / "elastic_ratio.json").read_text())
+    assert elastic_ratio.with_table(text, records) == text
+    assert elastic_ratio.with_table(text, records[:-1]) != text
