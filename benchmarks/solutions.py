@@ -24,7 +24,7 @@ from condensed_scenes import judge
 from punch import CASES, Parameters, Punch, programme
 
 TOL, APART = 1e-10, 1e-6  # solutions differ by more than APART of the largest reaction
-CASES["crossed"] = dict(mu=(1.0, 0.1), p=(0.01, 1.0))
+CROSSED = dict(mu=(1.0, 0.1), p=(0.01, 1.0))
 SOLVERS = {
     "fixed point": dc.FixedPoint,
     "fixed point, paper's map": lambda: dc.FixedPoint(map="bipotential"),
@@ -107,6 +107,7 @@ def examine(case: str, refine: int, steps: int | None, starts: int, report=print
 
 def main(argv=None) -> list[dict]:
     parser = argparse.ArgumentParser(description=__doc__)
+    CASES["crossed"] = CROSSED
     parser.add_argument("--case", choices=CASES, default="crossed")
     parser.add_argument("--refine", type=int, default=-1)
     parser.add_argument("--steps", type=int, help="only the first ones")
