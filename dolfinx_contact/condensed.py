@@ -8,6 +8,7 @@ import os
 from collections import deque
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import _kernel
@@ -152,7 +153,7 @@ class CondensedBody:
         body, comm, dim = self._body, self.comm, self.dim
         first = body.K.getOwnershipRange()[0]
         columns = np.repeat(self._dofs, dim, axis=0) + first
-        values = self._frames.reshape(len(columns), -1)
+        values = self._frames.reshape(-1, self._dofs.shape[1])
         columns, values = (self.gather(part) for part in (columns, values))
         size = dim * self.nodes
         W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
@@ -172,8 +173,9 @@ class CondensedBody:
 
 
 def components(contacts) -> int:
-    """Components of a reaction: the normal one alone if no contact has friction."""
-    if all(contact.friction.frictionless for contact in contacts):
+    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
+    smooth = all(contact.friction.frictionless for contact in contacts)
+    if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
         return 1
     return contacts[0].frame.shape[0]
 

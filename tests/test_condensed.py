@@ -114,6 +114,18 @@ def test_without_friction_normal_components_alone(cells):
         assert np.abs(W[0] - normal).max() <= 1e-12 * np.abs(normal).max()
 
 
+@pytest.mark.parametrize("mu", [0.0, (0.3, 0.15)])
+def test_ranks_without_contact_nodes_take_part(mu):
+    """With the contact of a tall stack on one rank Newton's method gives the fixed point's reactions."""
+    found = []
+    for solver in (dc.CondensedNewton(), dc.FixedPoint()):
+        scene = scenes.block(cells=(2, 2, 12), mu=mu, p=None, tol=1e-11, solver=solver)
+        scene.move_top(0.001, 0.0, -0.01)
+        scene.problem.solve()
+        found.append(scenes.gathered(scene.contact)[1])
+    assert np.abs(found[0] - found[1]).max() <= 1e-8 * np.abs(found[1]).max()
+
+
 def test_operator_is_kept_while_the_matrix_stands():
     """New loads keep W, a new modulus replaces it, and the answers follow."""
     scene = scenes.block()
