@@ -13,7 +13,7 @@ from dolfinx_contact.problem import _ContactEquations
 SHAPES = [(6, 4), (4, 4, 2)]
 
 
-def held_by_springs(stiffness, cells, solver=None, comm=scenes.COMM, tol=1e-9, **options):
+def held_by_springs(stiffness, cells, solver=None, comm=scenes.COMM, tol=1e-10, **options):
     """A block in springs of ``stiffness`` times its modulus, which pull it to ``scene.home``."""
     friction = {"mu": 0.2, "p": None} if len(cells) == 2 else {}
     scene = scenes.block(comm, cells, **friction, **options)
