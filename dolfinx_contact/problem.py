@@ -349,7 +349,7 @@ class _ContactEquations:
         self.chosen, self.tried = "none: nothing touches", ()
         self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
-        self._metric = ("bipotential", 1.0)
+        self._set_metric("bipotential", 1.0)
         self._tangent = None  # SurfaceLayer, once linearised
         self._evaluations = 0
         self._measured = None  # displacement whose errors were measured with F
@@ -372,19 +372,23 @@ class _ContactEquations:
 
     def use_metric(self, map: str, factor: float) -> None:
         """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
-        self._metric = metric = (map, factor)
+        self._set_metric(map, factor)
         self._tangent, problem = None, self.problem
-        if problem._stiffened is not None and problem._stiffened.metric == metric:
+        if problem._stiffened is not None and problem._stiffened.metric == self._metric:
             return
         A = self.body.K.copy()
-        for contact, stiffness in zip(problem.contacts, problem._stiffness):
-            contact.rho = factor * stiffness
+        for contact in problem.contacts:
             contact.add_springs(A, contact.springs(map))
         problem._free_springs()  # one factorisation at a time: memory counts more than time
         with stage("contact: set-up of springs"):
             rigid = RigidBalance(self.body, problem.contacts, A)
-            problem._stiffened = _Stiffened(metric, self.body.solver(A), rigid)
+            problem._stiffened = _Stiffened(self._metric, self.body.solver(A), rigid)
         A.destroy()  # the solver has its own reference
+
+    def _set_metric(self, map: str, factor: float) -> None:
+        self._metric = (map, factor)
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            contact.rho = factor * stiffness
 
     def balanced(self, x: np.ndarray) -> np.ndarray:
         """``x``, moved along the rigid motions that only soft springs resist, see ``RigidBalance``."""
@@ -392,8 +396,6 @@ class _ContactEquations:
             return x
         self._measured = None  # contacts will move
         forces = self.b - self.body.multiply(x)
-        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = self._metric[1] * stiffness
         return self.problem._stiffened.rigid.balanced(x, forces, self._metric[0])
 
     def linearise(self, x: np.ndarray) -> None:
@@ -452,9 +454,8 @@ class _ContactEquations:
         return self.errors.largest
 
     def _asked(self, forces: np.ndarray):
-        """The contacts, each with its metric and the reactions that balance the forces at its nodes."""
-        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = self._metric[1] * stiffness
+        """The contacts, each with the reactions that balance the forces at its nodes."""
+        for contact in self.problem.contacts:
             contact.take_reaction(-forces)
             yield contact
 
