@@ -96,14 +96,10 @@ class SurfaceLayer:
         correction[self._dofs] = near
         self._near.array_w[:] = near
         self._columns.mult(self._near, self._forces)
-        return correction, residual - self._mixed(self._forces.array_r.copy(), correction)
+        return correction, residual - self.multiply(correction, self._forces.array_r.copy())
 
-    def multiply(self, x: np.ndarray) -> np.ndarray:
-        """``J x``; zero at fixed degrees of freedom."""
-        return self._mixed(self._body.multiply(x), x)
-
-    def _mixed(self, forces: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """``J x`` from the forces ``K x``, in place."""
+    def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``, in their place."""
         for contact, (left, motion) in zip(self._contacts, self._mixing):
             mixed = np.einsum("nij,nj->ni", left, forces[contact._dofs])
             forces[contact._dofs] = mixed - np.einsum("nij,nj->ni", motion, x[contact._dofs])
