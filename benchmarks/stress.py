@@ -3,7 +3,7 @@
 """The stress matrix: every scene times every solver, every answer judged by the NumPy twin.
 
 A run that is stopped continues where it was; ``--output`` then holds one line per scene and solver.
-At the end: a table, ``stress.json``, ``stress.csv`` and ``stress.png``.
+At the end: a table, ``stress.json``, ``stress.csv`` and ``stress.png``; ``stress-small`` with ``--small``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from report_run import commit, now
-from stress_scenes import PROGRAMMES, Scene, build, scenes
+from stress_scenes import Scene, build, scenes, small
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import twin_solver
@@ -125,7 +125,7 @@ def run(scene: Scene, solver) -> dict:
             problem = dc.ContactProblem(
                 built.F, built.u, [built.contact], bcs=built.bcs, solver=solver, tol=TOL
             )
-            for top in PROGRAMMES[scene.programme]:
+            for top in scene.tops:
                 built.move_top(top)
                 step = problem.solve()
                 errors = twin.errors()
@@ -186,14 +186,17 @@ def main(argv=None) -> list[dict]:
     parser.add_argument("--every", type=int, default=1, help="run every n-th scene only")
     parser.add_argument("--first", type=int, default=0, help="start with this scene")
     parser.add_argument("--solver", choices=SOLVERS, help="this solver only")
+    parser.add_argument("--small", action="store_true", help="the same scenes on small bodies")
     options = parser.parse_args(argv)
     options.output.mkdir(parents=True, exist_ok=True)
-    log = options.output / "stress.jsonl"
+    name = "stress-small" if options.small else "stress"
+    log = options.output / f"{name}.jsonl"
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(r["group"], r["name"], r["solver"]) for r in records}
+    chosen = scenes()[options.first :: options.every]
     todo = [
         (scene, solver)
-        for scene in scenes()[options.first :: options.every]
+        for scene in (map(small, chosen) if options.small else chosen)
         for solver in ([options.solver] if options.solver else SOLVERS)
         if (scene.seed is None or solver == "default")  # on plain arrays there is one solver
         and (scene.group, scene.name, solver) not in done
@@ -210,13 +213,13 @@ def main(argv=None) -> list[dict]:
                 f"{scene.group}: {scene.name} ({solver})",
                 flush=True,
             )
-    (options.output / "stress.json").write_text(json.dumps(records, indent=1))
-    with (options.output / "stress.csv").open("w", newline="") as file:
+    (options.output / f"{name}.json").write_text(json.dumps(records, indent=1))
+    with (options.output / f"{name}.csv").open("w", newline="") as file:
         columns = list(dict.fromkeys(key for record in records for key in record))
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(records)
-    draw(records, options.output / "stress.png")
+    draw(records, options.output / f"{name}.png")
     print(summary(records))
     for record in records:
         if record["outcome"] != "solved":

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -34,6 +34,12 @@ class Scene:
     programme: str = "press"
     body: dict = field(default_factory=dict)
     seed: int | None = None  # of a random condensed problem
+    most_steps: int | None = None  # of the programme
+
+    @property
+    def tops(self) -> list[tuple]:
+        """Displacements of the top, step by step, scene's axes."""
+        return PROGRAMMES[self.programme][: self.most_steps]
 
 
 def cycles(count, high=0.01, low=0.002):
@@ -112,6 +118,12 @@ def build(
         )
 
     return SimpleNamespace(V=V, u=u, F=F, bcs=bcs, contact=contact, move_top=move_top, turn=turn)
+
+
+def small(scene: Scene) -> Scene:
+    """The same scene for slow programs: nine contact nodes where it names no number of cells, and of a
+    thousand steps the first 90."""
+    return replace(scene, body={"cells": (2, 2, 1)} | scene.body, most_steps=90)
 
 
 def rotation(seed):

@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import stress
-from stress_scenes import scenes
+from stress_scenes import scenes, small
 
 LONG = ("six cycles", "1000 tiny steps")
 # Four solutions are known, and rounding decides whether a start leads to one, see docs/solvers.md.
@@ -31,6 +31,19 @@ def test_there_are_enough_scenes():
     assert len(every) >= 400 and len({(s.group, s.name) for s in every}) == len(every)
 
 
+def test_small_scenes_are_the_same_scenes():
+    """At small size no scene is missing, and only the thousand steps are cut."""
+    for scene in scenes():
+        less = small(scene)
+        assert (less.group, less.name, less.seed) == (scene.group, scene.name, scene.seed)
+        assert less.body.items() >= scene.body.items()
+        assert less.seed is not None or (
+            len(less.tops) == len(scene.tops)
+            if scene.programme != LONG[1]
+            else len(less.tops) == 90
+        )
+
+
 def test_an_interrupted_run_continues(tmp_path):
     """What is done is not done again, and the tables come from all of it."""
     pytest.importorskip("matplotlib")
@@ -42,6 +55,11 @@ def test_an_interrupted_run_continues(tmp_path):
     assert again[0] == first[0] and len(again) == len(first)
     assert [r["outcome"] for r in again] == [r["outcome"] for r in first]
     assert {"stress.json", "stress.csv", "stress.png"} <= {f.name for f in tmp_path.iterdir()}
+    before = (tmp_path / "stress.jsonl").read_text()
+    assert len(stress.main([*options, "--every", "200", "--small"])) == len(first)
+    assert (
+        tmp_path / "stress.jsonl"
+    ).read_text() == before  # small bodies have a table of their own
 
 
 def test_many_problems_in_one_process():
