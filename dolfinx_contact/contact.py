@@ -47,7 +47,8 @@ class Contact:
         V: First-order continuous Lagrange space of displacements, one component per dimension.
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The rigid plane.
-        friction: The friction law, the same on all ranks.
+        friction: The friction law, the same on all ranks; or on all of them one with coefficients
+            per node, ``shape=(n, 2)``, for the n nodes of each.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
 
     Raises:
@@ -87,8 +88,9 @@ class Contact:
                 raise ValueError(
                     f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}."
                 )
-        described = repr((plane, plane.displacement.tolist(), friction, wear))
-        same = described == mesh.comm.bcast(described, root=0) or friction.mu.ndim > 1
+        law = "friction per node" if friction.mu.ndim == 2 else friction
+        described = repr((plane, plane.displacement.tolist(), law, wear))
+        same = described == mesh.comm.bcast(described, root=0)
         blocks = fem.locate_dofs_topological(V, fdim, facets)
         owned = V.dofmap.index_map.size_local
         self.nodes = np.unique(blocks[blocks < owned])
@@ -262,11 +264,10 @@ class Contact:
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
         before = self.previous_reaction
-        if not self.friction.frictionless:
-            work = -0.5 * (before + self.reaction)[:, :-1] * self.slip_increment
-            self.dissipation += work.sum(axis=1)
-            if self.wear is not None:
-                self.wear_depth += self.wear.depth(work, self.area)
+        work = -0.5 * (before + self.reaction)[:, :-1] * self.slip_increment
+        self.dissipation += work.sum(axis=1)
+        if self.wear is not None:
+            self.wear_depth += self.wear.depth(work, self.area)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         self.slip_path += touched * np.linalg.norm(self.slip_increment, axis=1)
         self._converged = _State(
@@ -447,7 +448,7 @@ def _check_law(plane, friction, gdim: int) -> None:
 
 
 def _check_coefficients(friction, n: int) -> None:
-    for name in ("mu", "p"):
+    for name in ("mu", "p", "axes"):
         shape = np.shape(getattr(friction, name))
         if len(shape) == 2 and shape[0] != n:
             raise ValueError(

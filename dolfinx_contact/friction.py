@@ -28,7 +28,7 @@ def _coefficients(name: str, value) -> np.ndarray:
     )
     if has_bool or array.dtype.kind not in "iuf":
         raise ValueError(f"{name} must be real numbers, not {value!r} of type {array.dtype}")
-    if array.shape != () and not (array.ndim in (1, 2) and array.size and array.shape[-1] == 2):
+    if array.shape != () and not (array.ndim in (1, 2) and array.shape[-1] == 2):
         raise ValueError(
             f"{name} must be one number, a pair, or an array of shape (n, 2) with a pair per node, "
             f"not of shape {array.shape}: {value!r}"
@@ -47,7 +47,8 @@ class Friction:
 
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
-            ``shape=(n, 2)`` with a pair for each node. Zero is frictionless.
+            ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
+            frictionless.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
@@ -108,7 +109,7 @@ class Friction:
         q = q / q.max(axis=-1, keepdims=True)
         # p proportional to mu up to rounding is the associated rule
         q[1.0 - q.min(axis=-1) <= 4 * np.finfo(float).eps] = 1.0
-        if q.min() < _SMALLEST:
+        if q.min(initial=1.0) < _SMALLEST:
             raise ValueError(
                 f"p/mu must not differ by more than {_LARGEST} between the two directions, "
                 f"but does with {given}"

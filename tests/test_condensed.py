@@ -7,6 +7,7 @@ import pytest
 import scenes
 import ufl
 from dolfinx import fem, mesh
+from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact import condensed
@@ -124,6 +125,29 @@ def test_ranks_without_contact_nodes_take_part(mu):
         scene.problem.solve()
         found.append(scenes.gathered(scene.contact)[1])
     assert np.abs(found[0] - found[1]).max() <= 1e-8 * np.abs(found[1]).max()
+
+
+@pytest.mark.parametrize("solver", [dc.CondensedNewton, dc.FixedPoint])
+def test_friction_per_node_where_ranks_have_no_contact_node(solver):
+    """A field of coefficients, with wear, gives on all ranks together what it gives on one."""
+
+    def pressed(comm):
+        scene = scenes.block(comm, cells=(2, 2, 12), tol=1e-11)
+        nodes = scene.contact.x
+        mu = np.column_stack((0.2 + 0.1 * nodes[:, 0], 0.3 + 0.2 * nodes[:, 1]))
+        friction = dc.Friction(mu, p=(0.05, 0.20), axes=np.tile([0.6, 0.8], (len(mu), 1)))
+        contact = dc.Contact(scene.V, scene.facets, scene.plane, friction, dc.Wear(1e-4))
+        problem = dc.ContactProblem(scene.F, scene.u, [contact], scene.bcs, None, solver(), 1e-11)
+        for top in ((0.001, 0.0, -0.01), (0.004, 0.002, -0.01)):
+            scene.move_top(*top)
+            problem.solve()
+        return contact, scenes.gathered(contact)[1]
+
+    (contact, together), (_, alone) = pressed(scenes.COMM), pressed(MPI.COMM_SELF)
+    fewest = scenes.COMM.allreduce(len(contact.nodes), op=MPI.MIN)
+    assert fewest == 0 or scenes.COMM.size == 1
+    assert contact.friction.mu.shape == (len(contact.nodes), 2)
+    assert np.abs(together - alone).max() <= 1e-8 * np.abs(alone).max()
 
 
 def test_operator_is_kept_while_the_matrix_stands():

@@ -72,6 +72,17 @@ def test_coefficients_per_node():
     assert Friction((0.3, 0.15), p=np.ones((4, 2))).mu.shape == (4, 2)
 
 
+@pytest.mark.parametrize("rule", [{}, dict(p=(0.05, 0.20)), dict(p=np.ones((0, 2))), dict(k=2)])
+def test_coefficients_of_no_node(rule):
+    """A rank without contact nodes has coefficients per node as well: none, and a law for none."""
+    friction = Friction(np.ones((0, 2)), **rule)
+    assert friction.mu.shape == friction.p.shape == friction.Q.shape == (0, 2)
+    law = friction.law(3)
+    assert law.nodes == 0 and law.load_function(np.ones((0, 3))).shape == (0,)
+    with pytest.raises(ValueError, match="0"):
+        law.load_function(np.ones((1, 3)))
+
+
 def test_axes_per_node():
     """Principal axes are kept as unit vectors; they matter only where friction is not isotropic, and
     have no meaning in two dimensions."""
@@ -110,6 +121,10 @@ def test_immutable_and_unchanged_by_a_pickle():
         (dict(mu=None), ("mu", "None")),
         (dict(mu=(1, 2, 3)), ("mu", "(3,)")),
         (dict(mu=()), ("mu", "(0,)")),
+        (dict(mu=np.ones((0, 3))), ("mu", "(0, 3)")),
+        (dict(mu=np.ones((0, 2, 2))), ("mu", "(0, 2, 2)")),
+        (dict(mu=0.3, p=()), ("p", "(0,)")),
+        (dict(mu=np.ones((2, 2)), p=np.ones((0, 2))), ("p", "(0, 2)", "(2, 2)")),
         (dict(mu=[[1, 2], [1]]), ("mu", "[1]")),
         (dict(mu=np.ones((2, 3))), ("mu", "(2, 3)")),
         (dict(mu=(0.3, 0)), ("mu", "(0.3, 0)", "small coefficient")),

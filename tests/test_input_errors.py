@@ -115,6 +115,35 @@ def test_planes_that_differ_between_ranks_are_refused(scene):
         dc.Contact(scene.V, scene.facets, plane(), dc.Friction(mu=0.1 * (1 + COMM.rank)))
 
 
+@pytest.mark.parametrize("name", ["mu", "p", "axes"])
+@pytest.mark.parametrize("change", [1, -1, "none"])
+def test_coefficients_for_other_nodes_are_refused(scene, name, change):
+    """Coefficients per node are those of a rank's own contact nodes: a row too many or too few, or no
+    row, on one rank is an error on all."""
+    counts = COMM.allgather(len(scene.contact.nodes))
+    rows = counts[COMM.rank]
+    if COMM.rank == int(np.argmax(counts)):
+        rows = 0 if change == "none" else rows + change
+    field = np.tile([0.6, 0.8], (rows, 1))
+    friction = dc.Friction(**{"mu": (0.3, 0.15), name: field})
+    with pytest.raises(ValueError, match=r"friction\.\w+ has \d+ rows"):
+        dc.Contact(scene.V, scene.facets, plane(), friction)
+
+
+def test_coefficients_per_node_on_some_ranks_only_are_refused(scene):
+    """Coefficients are per node on all ranks or on none, whichever rank is the exception; and what is
+    not per node is compared all the same."""
+    if COMM.size == 1:
+        pytest.skip("needs more than one rank")
+    field = dc.Friction(np.tile([0.3, 0.15], (len(scene.contact.nodes), 1)))
+    for exception in (0, COMM.size - 1):
+        friction = dc.Friction((0.3, 0.15)) if COMM.rank == exception else field
+        with pytest.raises(ValueError, match="differ between ranks"):
+            dc.Contact(scene.V, scene.facets, plane(), friction)
+    with pytest.raises(ValueError, match="differ between ranks"):
+        dc.Contact(scene.V, scene.facets, plane(point=(0, 0, COMM.rank)), field)
+
+
 def test_plane_that_moves_differently_between_ranks_is_refused():
     """A displacement set on one rank only is noticed before it becomes a result."""
     if COMM.size == 1:
