@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import resource
 import sys
 from pathlib import Path
@@ -101,40 +100,6 @@ def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int,
     )  # fmt: skip
 
 
-HEAD = (
-    "| unknowns | ranks | elastic: iterations, s | case | cycles: first step | first unloading | worst | mean | "
-    "seconds: first step, with set-up | first unloading | worst other | mean, with set-up | bytes per unknown |\n"
-    + "|---" * 13
-    + "|"
-)
-TABLE = re.compile(r"(<!-- elastic ratios -->\n).*?(<!-- end -->)", re.DOTALL)
-
-
-def row(result: dict) -> str:
-    """Ratios to the elastic solve; means are over a whole cycle, or left out."""
-    seconds = float(np.median([t for y in result["elastic"] for t in y["seconds"]]))
-    iterations = result["elastic"][0]["iterations"]
-    cycles = np.array([step["iterations"] for step in result["steps"]]) / iterations
-    times = np.array([step["seconds"] for step in result["steps"]]) / seconds
-    unloading = Parameters().loading
-    whole = len(cycles) == len(programme(Parameters(cycles=1)))
-    turn = [f"{x[unloading]:.2f}" if len(x) > unloading else "–" for x in (cycles, times)]
-    mean = [f"{x.mean():.2f}" if whole else "–" for x in (cycles, times)]
-    failed = " not converged" * ("failed" in result["steps"][-1])
-    return (
-        f"| {result['unknowns']:,} | {result['ranks']} | {iterations}, {seconds:.2g} | {result['case']} | "
-        f"{cycles[0]:.2f} | {turn[0]} | {cycles.max():.2f}{failed} | {mean[0]} | "
-        f"{times[0]:.1f} | {turn[1]} | {times[1:].max(initial=0.0):.2f} | {mean[1]} | "
-        f"{result['bytes_per_unknown']:.0f} |"
-    )
-
-
-def with_table(text: str, results: list[dict]) -> str:
-    """``text`` with the table of ``results`` between its marks."""
-    table = "\n".join([HEAD, *map(row, results)])
-    return TABLE.sub(lambda match: f"{match[1]}{table}\n{match[2]}", text)
-
-
 def main(argv=None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", default="A,B,C,frictionless")
@@ -146,12 +111,7 @@ def main(argv=None) -> None:
     parser.add_argument(
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
     )
-    parser.add_argument("--docs", type=Path, help="JSON whose table goes into docs/method.md")
     options = parser.parse_args(argv)
-    if options.docs:
-        page = Path(__file__).resolve().parent.parent / "docs" / "method.md"
-        page.write_text(with_table(page.read_text(), json.loads(options.docs.read_text())))
-        return
     CASES["frictionless"] = dict(mu=0.0)
     mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
     results = []
@@ -163,7 +123,11 @@ def main(argv=None) -> None:
             if options.json and MPI.COMM_WORLD.rank == 0:
                 options.json.write_text(json.dumps(results, indent=1) + "\n")
     if MPI.COMM_WORLD.rank == 0:
-        print(HEAD, *map(row, results), sep="\n")
+        # Here, because records of the report are kept as long as what they were measured with is the same.
+        from elastic_table import TITLES, row
+        from quotes import table
+
+        print(table(TITLES, map(row, results)))
 
 
 if __name__ == "__main__":

@@ -184,7 +184,7 @@ def seconds_to(curve: dict, error: float) -> float | None:
 
 
 def evaluate(results: dict) -> dict:
-    """By scene: seconds to 1e-8, ratios to the best, set-up, and after how many steps it pays."""
+    """By scene: seconds to 1e-8, ratios to the best, set-up and steps."""
     rows = []
     for name, result in results.items():
         times = {label: seconds_to(c, TOL) for label, c in result["curves"].items()}
@@ -200,15 +200,5 @@ def evaluate(results: dict) -> dict:
                 setup=run["setup"], step=later, all=sum(run["seconds"]), refused=run["said"],
                 iterations=sum(run["iterations"]), error=run["error"],
             )  # fmt: skip
-        row["pays_after"] = pays_after(row)
         rows.append(row)
     return dict(rows=rows)
-
-
-def pays_after(row: dict) -> float | None:
-    """Steps after which the dearer set-up of the condensed Newton pays against the return map; None: never."""
-    newton, fixed = row["condensed Newton"], row["fixed point, return"]
-    if not newton["step"] or not fixed["step"]:
-        return None
-    gain = fixed["step"]["median"] - newton["step"]["median"]
-    return max(newton["setup"] - fixed["setup"], 0.0) / gain if gain > 0 else None

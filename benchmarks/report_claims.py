@@ -1,71 +1,42 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Numbers of the report in README and docs: written between markers, from report.json, never by hand.
-
-A marker is ``<!-- report:key -->text<!-- /report -->``; ``key`` is one of ``claims`` in report.json.
-"""
+"""What README and docs quote of the report; quotes.py writes it there."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-MARKER = re.compile(r"<!-- report:([\w.-]+) -->(.*?)<!-- /report -->", re.DOTALL)
-
-
-def marked(root: Path) -> list[Path]:
-    """Files that may hold markers."""
-    return [root / "README.md", *sorted((root / "docs").glob("*.md"))]
-
-
-def found(root: Path) -> list[tuple[Path, str, str]]:
-    """File, key and text of every marker."""
-    return [
-        (file, *match.groups())
-        for file in marked(root)
-        for match in MARKER.finditer(file.read_text())
-    ]
-
-
-def fill(root: Path, values: dict[str, str]) -> list[Path]:
-    """Write what the markers stand for; gives the files that changed.
-
-    Raises:
-        KeyError: a marker whose claim was not measured.
-    """
-    changed = []
-    for file in marked(root):
-        text = file.read_text()
-        new = MARKER.sub(lambda m: f"<!-- report:{m[1]} -->{values[m[1]]}<!-- /report -->", text)
-        if new != text:
-            file.write_text(new)
-            changed.append(file)
-    return changed
+import numpy as np
+from quotes import ratio, table
 
 
 def claims(sections: dict) -> dict[str, str]:
-    """Sentences and ratios that README and docs quote, by key; what was not measured is not there."""
-    quoted = {}
-    for name, section in sections.items():
-        if section["data"]:
-            quoted |= {f"{name}.{key}": text for key, text in QUOTES[name](section["data"])}
-    return quoted
-
-
-def ratio(value: float) -> str:
-    """A ratio as a reader wants it: two digits."""
-    return f"{value:.0f}" if value >= 10 else f"{value:.1f}" if value >= 1 else f"{value:.2f}"
+    """Sentences and ratios by key, from the sections of report.json; what was not measured is not there."""
+    return {
+        f"{name}.{key}": text
+        for name, quoted in QUOTED.items()
+        if sections.get(name) and sections[name]["data"]
+        for key, text in quoted(sections[name]["data"])
+    }
 
 
 def _algebraic(data):
     for row in data["rows"]:
         scene = re.sub(r"\W+", "-", row["scene"])
-        for solver in ("fixed point, return", "fixed point, bipotential"):
-            newton, other = row["condensed Newton"]["seconds_to_1e_8"], row[solver]["seconds_to_1e_8"]  # fmt: skip
-            if newton and other:
-                yield f"{scene}.{solver.split()[-1]}-over-newton", ratio(other / newton)
-        if row["pays_after"] is not None:
-            yield f"{scene}.pays-after", f"{row['pays_after']:.0f}"
+        newton, fixed = (row[s]["seconds_to_1e_8"] for s in ("condensed Newton", "fixed point, return"))  # fmt: skip
+        if newton and fixed:
+            yield f"{scene}.return-over-newton", ratio(fixed / newton)
+        if after := pays_after(row["runs"]):
+            yield f"{scene}.pays-after", str(after)
+
+
+def pays_after(runs: dict) -> int | None:
+    """Steps of the programme from which on the condensed Newton has taken less than the return map, all set-up included."""
+    newton, fixed = (np.cumsum(runs[s]["seconds"]) for s in ("condensed Newton", "fixed point, return"))  # fmt: skip
+    steps = min(len(newton), len(fixed))
+    behind = np.flatnonzero(newton[:steps] > fixed[:steps])
+    first = int(behind[-1]) + 2 if len(behind) else 1
+    return first if first <= steps else None
 
 
 def _ladder(data):
@@ -77,22 +48,18 @@ def _ladder(data):
         yield "import-over-dolfinx", ratio(ours / dolfinx)
 
 
-def _stability(data):
-    for solver, count in data.get("by_solver", {}).items():
-        yield f"{solver.replace(' ', '-')}.solved", f"{count['solved']} of {count['scenes']}"
-    yield "third-state", str(data.get("third_state", ""))
-
-
 def _peers(data):
+    judged = [row for row in data["rows"] if row["key"].startswith("siconos")]
+    titles = ["case", "Siconos (ms)", "converged", "its largest error by our judge", "`CondensedNewton` (ms)", "ratio",
+        "reactions differ by"]  # fmt: skip
+    yield "siconos", table(titles, [
+        [row["case"], f"{1e3 * row['seconds']:.0f}", row["done"], f"{row['error']:.0e}", f"{1e3 * row['ours']:.0f}",
+         ratio(row["ratio"]), f"{row['force_error']:.1e}"] for row in judged
+    ])  # fmt: skip
     for row in data["rows"]:
         if row.get("ratio"):
             yield f"{row['key']}.over-ours", ratio(row["ratio"])
             yield f"{row['key']}.error", f"{row['error']:.0e}" if row["error"] else "not judged"
-            yield f"{row['key']}.ms", f"{1e3 * row['seconds']:.0f}"
-            yield f"{row['key']}.ours-ms", f"{1e3 * row['ours']:.0f}"
-            yield f"{row['key']}.done", row["done"]
-            if row["force_error"] is not None:
-                yield f"{row['key']}.difference", f"{row['force_error']:.1e}"
 
 
 def _growth(data):
@@ -111,5 +78,4 @@ def _meshes(data):
         yield f"dissipation-{answer['percent']:g}-percent", answer["text"]
 
 
-QUOTES = dict(algebraic=_algebraic, meshes=_meshes, peers=_peers, growth=_growth, ladder=_ladder,
-    stability=_stability)  # fmt: skip
+QUOTED = dict(algebraic=_algebraic, meshes=_meshes, peers=_peers, growth=_growth, ladder=_ladder)

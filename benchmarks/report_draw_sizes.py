@@ -94,8 +94,13 @@ def growth(data):
             ax.plot([row["unknowns"] for row in of], y, **{**style(solver), "label": label})
         ax.set(xscale="log", yscale="log", xlabel="unknowns", ylabel=title)
     legend(figure, axes[0], ncols=2)
+    sizes = {
+        solver: [row["unknowns"] for row in rows if row["solver"] == solver]
+        for solver in data["fits"]
+    }
     fits = "; ".join(
         f"{solver} {fit['step']:.2f}" + (f" (memory {fit['bytes']:.2f})" if fit["bytes"] else "")
+        + f" from {min(sizes[solver]):,} to {max(sizes[solver]):,}"
         for solver, fit in data["fits"].items() if fit["step"] is not None
     )  # fmt: skip
     largest = max(rows, key=lambda row: (row["unknowns"], row["bytes"]))

@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: MIT
 """Time per load step of both solvers on the paper's punch, and how it grows with the contact.
 
+    python benchmarks/solvers.py --parts laws --json docs/solvers.json     # one part anew, the others stay
+
 Processor seconds of this process (one thread), because other programs may share the machine; all
-rows of a table come from one run.  Set-up is measured apart: one factorisation of K, the condensed
-operator with its inverse, and the factorisation with springs of the fixed point.
+rows of a part come from one run.  Set-up is measured apart: one factorisation of K, and the condensed
+operator with its inverse.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import sys
 from pathlib import Path
 from time import process_time
@@ -19,58 +23,68 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
-from punch import Parameters, Punch, programme
+from punch import CASES, Parameters, Punch, programme
+from report_run import Memory, commit, machine, now
+from solvers_table import claims
 
 from dolfinx_contact import _kernel
-from dolfinx_contact.condensed import CondensedBody
+from dolfinx_contact.condensed import CondensedBody, memory
 
 SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint}
-
-
-def seconds(action) -> float:
-    start = process_time()
-    action()
-    return process_time() - start
-
-
-def study(case: str, solver: str, steps: int | None, cycles: int, **mesh) -> dict:
-    """Set-up and steps of one case."""
-    punch = Punch(Parameters(case=case, cycles=cycles), **mesh)
-    problem, body = punch.problem, punch.problem.body
-    problem.solver = SOLVERS[solver]()
-    displacements = programme(punch.parameters)[:steps]
-    body.refresh()
-    factor = seconds(lambda: body.solve(np.zeros(body.size)))
-    operator = 0.0
-    if solver == "condensed":
-        # As the first step does it; thrown away, so that all steps are measured alike.
-        problem.contacts[0].set_metric(body.K)
-        operator = seconds(lambda: CondensedBody(body, problem.contacts))
-    times, iterations, errors, totals = [], [], [], []
-    for displacement in displacements:
-        start = process_time()
-        record = punch.press(displacement)
-        times.append(process_time() - start)
-        iterations.append(record["iterations"])
-        errors.append(record["error"])
-        totals.append((record["normal_reaction"], record["tangential_reaction_sum"]))
-    times[0] -= operator  # the operator that the first step made for itself
-    return dict(
-        nodes=len(punch.contact.nodes), unknowns=body.size, factor=factor, operator=operator,
-        times=np.array(times), iterations=np.array(iterations), error=max(errors),
-        totals=np.array(totals),
-    )  # fmt: skip
-
-
 LAWS = {
     "frictionless": dict(mu=0.0),
     "isotropic, mu = 0.2": dict(mu=0.2),
     "associated, (0.3, 0.15)": dict(mu=(0.3, 0.15)),
-    "case C": dict(mu=(0.3, 0.15), p=(0.05, 0.20)),
+    "case C": CASES["C"],
 }
 
 
-def laws(first: int = 2, last: int = 31) -> str:
+def timed(function, *arguments) -> tuple[float, object]:
+    """Processor seconds of a call, and its result."""
+    start = process_time()
+    result = function(*arguments)
+    return process_time() - start, result
+
+
+def steps(case: str, solver: str, count: int | None = None, cycles: int = 1, **mesh) -> dict:
+    """Set-up and the first ``count`` steps of one case."""
+    punch = Punch(Parameters(case=case, cycles=cycles), **mesh)
+    problem, body = punch.problem, punch.problem.body
+    problem.solver = SOLVERS[solver]()
+    body.refresh()
+    factor, _ = timed(body.solve, np.zeros(body.size))
+    used, operator = Memory(), 0.0
+    if solver == "condensed":
+        # As the first step does it; thrown away, so that all steps are measured alike.
+        operator, _ = timed(CondensedBody, body, problem.contacts)
+    done = [
+        timed(punch.press, displacement) for displacement in programme(punch.parameters)[:count]
+    ]
+    times, records = map(list, zip(*done))
+    times[0] -= operator  # the operator that the first step made for itself
+    nodes = len(punch.contact.nodes)
+    return dict(
+        case=case, solver=solver, nodes=nodes, unknowns=body.size, factor=factor, operator=operator, times=times,
+        iterations=[record["iterations"] for record in records], error=max(record["error"] for record in records),
+        totals=[(record["normal_reaction"], record["tangential_reaction_sum"]) for record in records],
+        kept=8 * 3 * nodes * (3 * nodes + 1), estimate=memory(nodes, 3, body.size), peak=used.added(),
+    )  # fmt: skip
+
+
+def study() -> list[dict]:
+    """Six cycles of each case."""
+    return [steps(case, solver, cycles=6) for case in "ABC" for solver in SOLVERS]
+
+
+def growth(meshes: list) -> list[dict]:
+    """Eight steps of case C on ever finer meshes, given by divisions and layers."""
+    return [
+        steps("C", solver, 8, divisions=divisions, layers=layers)
+        for divisions, layers in meshes for solver in SOLVERS
+    ]  # fmt: skip
+
+
+def laws(first: int = 2, last: int = 31) -> list[dict]:
     """Simpler laws on the same W and q, those of case C, each step from zero."""
     punch = Punch(Parameters(case="C", cycles=3))
     solver = punch.problem.solver = dc.CondensedNewton()
@@ -79,63 +93,64 @@ def laws(first: int = 2, last: int = 31) -> str:
     past = [q for q, _ in punch.problem._past][first - 1 : last]
     W = punch.problem._condensed.compliance()
     operators = {3: _kernel.CondensedOperator(W, 3), 1: _kernel.CondensedOperator(W[2::3, 2::3], 1)}
-    lines = ["| law | set-up (ms) | iterations | median (ms) | spread (ms) | ms per iteration |"]
-    lines.append("|---" * 6 + "|")
-    setup = {dim: 1e3 * seconds(operator.prepare) for dim, operator in operators.items()}
+    inverse = {dim: timed(operator.prepare)[0] for dim, operator in operators.items()}
+    rows = []
     for name, law in LAWS.items():
         dim = 1 if name == "frictionless" else 3
-        times, iterations = [], 0
-        for q in past:
-            start = process_time()
-            found = solver.solve_condensed(operators[dim], dc.Friction(**law), q[:, -dim:], 1e-10)
-            times.append(1e3 * (process_time() - start))
-            iterations += found.iterations
-        lines.append(
-            f"| {name} | {setup[dim]:.0f} | {iterations / len(past):.1f} | {np.median(times):.1f} | "
-            f"{min(times):.1f} – {max(times):.1f} | {sum(times) / iterations:.1f} |"
-        )
-    return "\n".join(lines)
+        done = [
+            timed(solver.solve_condensed, operators[dim], dc.Friction(**law), q[:, -dim:], 1e-10)
+            for q in past
+        ]
+        times, found = map(list, zip(*done))
+        rows.append(dict(
+            law=name, inverse=inverse[dim], times=times, iterations=[of.iterations for of in found], nodes=len(past[0]),
+            slipping=float(np.mean([(of.status == dc.Status.SLIP).sum() for of in found])),
+        ))  # fmt: skip
+    return rows
 
 
-def row(label: str, solver: str, result: dict) -> str:
-    t = 1e3 * result["times"]
-    return (
-        f"| {label} | {result['nodes']} | {solver} | {result['factor']:.2f} | {result['operator']:.2f} | "
-        f"{result['iterations'].mean():.1f} | {np.median(t):.0f} | {t[1:].min():.0f} – {t[1:].max():.0f} | "
-        f"{t[1:].sum() / 1e3:.2f} | {result['error']:.0e} |"
-    )
+def operator(repeat: int = 7) -> list[dict]:
+    """W with its inverse, without friction and with it, and a factorisation of K, interleaved."""
+    problems = {case: Punch(Parameters(case=case)).problem for case in ("frictionless", "C")}
+    rows = [dict(case=case, operator=[], factor=[]) for case in problems]
+    for _ in range(repeat):
+        for row, problem in zip(rows, problems.values()):
+            body = problem.body
+            body.refresh()
+            body._elastic = None
+            row["factor"].append(timed(body.solve, np.zeros(body.size))[0])
+            row["operator"].append(timed(CondensedBody, body, problem.contacts)[0])
+    return rows
 
 
-HEAD = (
-    "| scene | contact nodes | solver | factor K (s) | W and inverse (s) | iterations a step | median (ms) | "
-    "spread (ms) | all but the first (s) | worst error |\n" + "|---" * 10 + "|"
-)
+TWO_LAYERS = [(divisions, 2) for divisions in (4, 8, 12, 16)]
+PUNCH = [(divisions, divisions // 2) for divisions in (8, 12, 16)]
+PARTS = {
+    "study": study,
+    "growth": lambda: growth(TWO_LAYERS),
+    "punch": lambda: growth(PUNCH),
+    "laws": laws,
+    "operator": operator,
+}
 
 
 def main(argv=None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cycles", type=int, default=6)
-    parser.add_argument("--cases", default="ABC")
-    parser.add_argument("--growth", type=int, nargs="*", default=[4, 8, 12, 16], help="divisions")
-    parser.add_argument("--laws", action="store_true", help="simpler laws on the same W and q")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--json", type=Path, help="records to put the parts into")
     options = parser.parse_args(argv)
-    if options.laws:
-        print(laws(), flush=True)
-    print(HEAD, flush=True)
-    for case in options.cases:
-        results = {}
-        for solver in SOLVERS:
-            results[solver] = study(case, solver, None, options.cycles)
-            print(row(f"{case}, {options.cycles} cycles", solver, results[solver]), flush=True)
-        newton, fixed = (results[solver]["totals"] for solver in SOLVERS)
-        difference = (np.abs(newton - fixed) / np.abs(fixed)).max()
-        print(f"Totals of {len(newton)} steps differ by at most {difference:.1e}.\n", flush=True)
-    if options.growth:
-        print(HEAD, flush=True)
-    for divisions in options.growth:
-        for solver in SOLVERS:
-            result = study("C", solver, 8, 1, divisions=divisions, layers=2)
-            print(row("C, 8 steps, 2 layers", solver, result), flush=True)
+    CASES["frictionless"] = LAWS["frictionless"]
+    file = options.json
+    records = json.loads(file.read_text()) if file and file.exists() else {}
+    for part in options.parts:
+        load = [os.getloadavg()[0]]
+        rows = PARTS[part]()
+        load.append(os.getloadavg()[0])
+        records[part] = dict(rows=rows, date=now(), commit=commit(), processor=machine()["processor"], load=load)  # fmt: skip
+        for key, text in claims({part: records[part]}).items():
+            print(f"{key}: {text}\n", flush=True)
+        if file:
+            file.write_text(json.dumps(records, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,94 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What docs/method.md quotes of the records of elastic_ratio.py: ratios to an elastic solve, growth, two ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+from quotes import ratio, table
+
+TITLES = [
+    "unknowns", "ranks", "elastic: iterations, s", "case", "cycles: first step", "first unloading", "worst", "mean",
+    "seconds: first step, with set-up", "first unloading", "worst other", "mean, with set-up", "bytes per unknown",
+]  # fmt: skip
+UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycle
+
+
+def numbers(record: dict) -> dict:
+    """Cycles and seconds of the steps, and what an elastic solve of the same run takes."""
+    elastic = record["elastic"]
+    iterations = elastic[0]["iterations"]
+    solve = float(np.median([t for run in elastic for t in run["seconds"]]))
+    seconds = np.array([step["seconds"] for step in record["steps"]])
+    cycles = np.array([step["iterations"] for step in record["steps"]]) / iterations
+    return dict(record, iterations=iterations, solve=solve, cycles=cycles, times=seconds / solve, seconds=seconds,
+        whole=len(cycles) == CYCLE, set_up=float(np.median([run["setup"] for run in elastic])) / solve)  # fmt: skip
+
+
+def row(record: dict) -> list[str]:
+    """Ratios to the elastic solve; means are over a whole cycle, or left out."""
+    of = numbers(record)
+    cycles, times = of["cycles"], of["times"]
+    turn = [f"{x[UNLOADING]:.2f}" if len(x) > UNLOADING else "–" for x in (cycles, times)]
+    mean = [f"{x.mean():.2f}" if of["whole"] else "–" for x in (cycles, times)]
+    failed = " not converged" * ("failed" in record["steps"][-1])
+    return [
+        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", of["case"],
+        f"{cycles[0]:.2f}", turn[0], f"{cycles.max():.2f}{failed}", mean[0],
+        f"{times[0]:.1f}", turn[1], f"{times[1:].max(initial=0.0):.2f}", mean[1], f"{of['bytes_per_unknown']:.0f}",
+    ]  # fmt: skip
+
+
+def claims(records: list[dict]) -> dict[str, str]:
+    """Table and numbers by key; but for the table and ``ranks``, of runs on one rank beyond 30,000 unknowns."""
+    runs = [numbers(record) for record in records]
+    large = [run for run in runs if run["unknowns"] > 30_000 and run["ranks"] == 1]
+    whole = [run for run in large if run["whole"]]
+    first = [run["times"][0] for run in large]
+    set_up = {n: np.median([run["set_up"] for run in large if run["unknowns"] == n])
+        for n in dict.fromkeys(run["unknowns"] for run in large)}  # fmt: skip
+    return {
+        "table": table(TITLES, map(row, records)),
+        "worst-seconds": ratio(max(run["times"][1:].max() for run in large)),
+        "worst-cycles": f"{max(run['cycles'][1:].max() for run in large):.2f}",
+        "worst-mean": f"{max(run['times'].mean() for run in whole):.2f}",
+        "first-step": f"{min(first):.1f} to {max(first):.1f}",
+        "set-up": ", ".join(f"{ratio(value)} at {unknowns:,}" for unknowns, value in set_up.items()),
+        "exponents": "; ".join(exponents(whole)),
+        "ranks": "; ".join(by_ranks(runs)),
+        "ranks-cycles": " and ".join(str(run["steps"][UNLOADING]["iterations"]) for run in pair(runs)),
+    }  # fmt: skip
+
+
+def exponents(runs: list[dict]):
+    """Growth of the cost of a cycle with the unknowns, in brackets of an elastic solve, from each size to the next."""
+    sizes = sorted({run["unknowns"] for run in runs})
+    for few, many in zip(sizes, sizes[1:]):
+        found = []
+        for small, large in ((a, b) for a in runs for b in runs if a["case"] == b["case"]):
+            if (small["unknowns"], large["unknowns"]) == (few, many):
+                costs = (
+                    large["seconds"].sum() / small["seconds"].sum(),
+                    large["solve"] / small["solve"],
+                )
+                power, elastic = np.log(costs) / np.log(many / few)
+                found.append(f"{small['case']} {power:.2f} ({elastic:.2f})")
+        yield f"from {few:,} to {many:,} unknowns {', '.join(found)}"
+
+
+def pair(runs: list[dict]) -> tuple[dict, dict]:
+    """The runs on one rank and on two that belong together."""
+    two = next(run for run in runs if run["ranks"] == 2)
+    return next(run for run in runs if run["ranks"] == 1 and run["run"] == two["run"]), two
+
+
+def by_ranks(runs: list[dict]):
+    """What two ranks gain."""
+    what = {
+        "elastic solve": lambda run: run["solve"],
+        "first step with set-up": lambda run: run["seconds"][0],
+        "a cycle of the first unloading": lambda run: run["seconds"][UNLOADING] / run["steps"][UNLOADING]["iterations"],
+    }  # fmt: skip
+    for name, seconds in what.items():
+        one, two = map(seconds, pair(runs))
+        yield f"{name} {one:.3g} s to {two:.3g} s, {ratio(one / two)} times as fast"

@@ -1,0 +1,87 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Numbers in README and docs (benchmarks/quotes.py): marked ones are those of the JSON files, ratios are marked.
+
+Covered: all that stands between markers in README.md and docs/*.md, and every ratio in README.md, which has to be marked.
+Not covered: typed numbers of single experiments in docs/*.md, as what was tried and did not help.
+"""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+from random import Random
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+import quotes
+from quotes import ROOT
+
+COUNTS = "two|three|four|five|six|seven|eight|nine|ten|twenty|fifty|a hundred|a thousand"
+RATIO = re.compile(
+    rf"(?:\d|\b(?:{COUNTS}))[ \n]*(?:times|×)|\b(?:twice|thrice|half)\b|\w+fold\b|\d ?%"
+    r"|\b(?:a|one|two) (?:third|quarter|fifth|tenth)s? (?:as|of the (?:time|memory|cost))",
+    re.IGNORECASE,
+)
+
+
+def test_marked_texts_are_those_of_the_json():
+    """Filling the markers anew changes no file; every source is quoted, and no marker is left open."""
+    of, sources = quotes.texts(), set()
+    for file in quotes.marked(ROOT):
+        text = file.read_text()
+        keys = [match[1] for match in quotes.MARKER.finditer(text)]
+        assert text.count("<!--") == 2 * len(keys), file
+        assert quotes.filled(text, of) == text, f"{file}: run python benchmarks/quotes.py"
+        sources |= {key.split(".")[0] for key in keys}
+    assert sources == {key.split(".")[0] for key in of}
+
+
+def shaken(value, random):
+    """The same JSON with every floating point number up to twice as large."""
+    if isinstance(value, dict):
+        return {key: shaken(of, random) for key, of in value.items()}
+    if isinstance(value, list):
+        return [shaken(of, random) for of in value]
+    return value * (1 + random.random()) if isinstance(value, float) else value
+
+
+def test_texts_follow_from_the_raw_numbers(tmp_path):
+    """Other seconds in the JSON files give other ratios: what is quoted is computed, not kept (but for the study)."""
+    random = Random(6)
+    shutil.copytree(ROOT / "docs", tmp_path / "docs")
+    for file in (tmp_path / "docs").rglob("*.json"):
+        file.write_text(json.dumps(shaken(json.loads(file.read_text()), random)))
+    before, after = quotes.texts(ROOT), quotes.texts(tmp_path)
+    for key in (
+        "report.peers.siconos", "report.peers.getfem-0.over-ours", "report.ladder.frictionless",
+        "report.growth.largest.over-elastic", "report.algebraic.A.return-over-newton", "elastic.table", "elastic.ranks",
+        "elastic.worst-seconds", "solvers.study.table", "solvers.growth.table", "solvers.laws.table",
+    ):  # fmt: skip
+        assert after[key] != before[key], key
+
+
+def test_ratios_in_the_readme_are_marked():
+    """No ratio stands in README.md outside of markers."""
+    text = (ROOT / "README.md").read_text()
+    left = quotes.MARKER.sub("", text)
+    assert left != text
+    assert not RATIO.findall(left)
+    for typed in ("takes 5.4 times as long", "3\ntimes", "ten times", "twice", "10 × faster", "tenfold", "by 20 %"):  # fmt: skip
+        assert RATIO.search(typed), typed
+
+
+def test_markers_are_filled(tmp_path):
+    """What stands between markers is replaced, inline and on lines of its own; a marker without a number is an error."""
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "README.md").write_text("<!-- a.b -->2<!-- end --> times\n<!-- a.c -->\n1\n<!-- end -->\n")  # fmt: skip
+    of = {"a.b": "3", "a.c": "| 4 |\n| 5 |"}
+    assert quotes.fill(tmp_path, of) == [tmp_path / "README.md"]
+    assert (tmp_path / "README.md").read_text() == (
+        "<!-- a.b -->3<!-- end --> times\n<!-- a.c -->\n| 4 |\n| 5 |\n<!-- end -->\n"
+    )
+    assert quotes.fill(tmp_path, of) == []
+    with pytest.raises(KeyError):
+        quotes.fill(tmp_path, {"a.b": "3"})
