@@ -65,12 +65,21 @@ def _peers(data):
 def _growth(data):
     for solver, fit in data["fits"].items():
         if fit["step"] is not None:
-            yield f"{solver.replace(' ', '-').replace(',', '')}.exponent", f"{fit['step']:.2f}"
+            key = solver.replace(" ", "-").replace(",", "")
+            yield f"{key}.exponent", f"{fit['step']:.2f}"
+            if last := last_exponent(data["rows"], solver):
+                yield f"{key}.last-exponent", f"{last[1]:.2f}"
     of = [row for row in data["rows"] if row["solver"] == "fixed point, return"]
     if of:
         largest = max(of, key=lambda row: row["unknowns"])
         yield "largest", f"{largest['unknowns']:,}"
         yield "largest.over-elastic", ratio(largest["over_elastic"])
+
+
+def last_exponent(rows: list[dict], solver: str) -> tuple[int, float] | None:
+    """Growth of the seconds of a step over a solver's three largest sizes, and the smallest of these."""
+    of = sorted((row["unknowns"], row["step"]) for row in rows if row["solver"] == solver)[-3:]
+    return (of[0][0], float(np.polyfit(*np.log(np.transpose(of)), 1)[0])) if len(of) == 3 else None
 
 
 def _meshes(data):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from report_claims import last_exponent
 from report_draw import legend, panels, style
 
 NOISE = 1e-9  # relative; ten times the tolerance of the runs
@@ -17,7 +18,7 @@ def peers(data):
     if not rows:
         return
     names = [
-        f"{row['peer']}, {row['case']}" + (f", {row['unknowns']} unknowns" if row["unknowns"] else ", condensed")
+        f"{row['peer']}, {row['case']}, " + (f"{row['unknowns']} unknowns, {_steps(row)}" if row["unknowns"] else "condensed")
         for row in rows
     ][::-1]  # fmt: skip
     figure = Figure(figsize=(13, 0.5 * len(rows) + 1.9), layout="constrained")
@@ -50,7 +51,7 @@ def peers(data):
     figure.legend(handles, labels, loc="outside upper center", frameon=False, ncols=3)
     done = [row for row in rows if row["ratio"]]
     parts = [
-        f"{row['peer']} {row['case']}" + (f" ({row['unknowns']} unknowns)" if row["unknowns"] else "")
+        f"{row['peer']} {row['case']}" + (f" ({row['unknowns']} unknowns, {_steps(row)})" if row["unknowns"] else "")
         + f" {row['ratio']:.2g}" for row in done
     ]  # fmt: skip
     stopped = [f"{row['peer']} ({row['done']}: {row['said'][:80]})" for row in rows if not row["ratio"]]  # fmt: skip
@@ -59,9 +60,15 @@ def peers(data):
         f"Seconds a step over ours at equal error (Siconos: at the same tol): {'; '.join(parts) or 'none finished'}."
         + (f" Faster than we: {', '.join(slower)}." if slower else " No peer is faster.")
         + (f" Stopped: {'; '.join(stopped)}." if stopped else "")
-        + " Only case A can be compared with GetFEM and CalculiX, which know isotropic friction alone."
+        + " Set-ups are included, but for Siconos, which is given W. Only case A can be compared with GetFEM and CalculiX, which know isotropic friction alone."
         + (f" Absent: {absent}." if absent else "")
     )  # fmt: skip
+
+
+def _steps(row) -> str:
+    """How many steps the programme has; where it is one, the set-ups of both weigh most."""
+    count = row["done"].split()[-1]
+    return f"{count} step" + "s" * (count != "1")
 
 
 def peers_tables(data):
@@ -101,6 +108,7 @@ def growth(data):
     fits = "; ".join(
         f"{solver} {fit['step']:.2f}" + (f" (memory {fit['bytes']:.2f})" if fit["bytes"] else "")
         + f" from {min(sizes[solver]):,} to {max(sizes[solver]):,}"
+        + (f", from {last[0]:,} on {last[1]:.2f}" if (last := last_exponent(rows, solver)) and last[0] > min(sizes[solver]) else "")
         for solver, fit in data["fits"].items() if fit["step"] is not None
     )  # fmt: skip
     largest = max(rows, key=lambda row: (row["unknowns"], row["bytes"]))
