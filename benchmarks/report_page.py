@@ -9,17 +9,19 @@ import json
 import re
 from pathlib import Path
 
-import report_draw
-import report_draw_sizes
+import report_draw as solvers
+import report_draw_sizes as sizes
 import study_page
 from matplotlib import rc_context
 
-DRAW, TABLES = {}, {}
-for module in (report_draw, report_draw_sizes):
-    for name in ("algebraic", "meshes", "peers", "growth", "ladder", "stability"):
-        if hasattr(module, name):
-            DRAW[name], TABLES[name] = getattr(module, name), getattr(module, f"{name}_tables")
-
+DRAWN = {  # figures with their sentences, and tables
+    "algebraic": (solvers.algebraic, solvers.algebraic_tables),
+    "meshes": (sizes.meshes, sizes.meshes_tables),
+    "peers": (sizes.peers, sizes.peers_tables),
+    "growth": (sizes.growth, sizes.growth_tables),
+    "ladder": (solvers.ladder, solvers.ladder_tables),
+    "stability": (solvers.stability, solvers.stability_tables),
+}
 STYLE = study_page.STYLE + "\nsvg { max-width: 100%; height: auto; } .bad { color: #b00020; }"
 # Text stays text: a page of a tenth of the size, in which one can search.
 DRAWING = {
@@ -43,13 +45,14 @@ def write(report: dict, file: Path, figures: Path) -> dict[str, str]:
     body, sentences = [head(report)], {}
     for number, (name, section) in enumerate(report["sections"].items(), start=1):
         body.append(f"<h2>{number}. {html.escape(section['title'])}</h2>")
+        figures_of, tables_of = DRAWN[name]
         if section["data"]:
             with rc_context(DRAWING):
-                for figure, drawing, sentence in DRAW[name](section["data"]):
+                for figure, drawing, sentence in figures_of(section["data"]):
                     drawing.savefig(figures / f"{figure}.svg", metadata={"Date": None})
                     sentences[figure] = sentence
                     body.append(picture(figures / f"{figure}.svg", sentence))
-            body += [table(rows) for rows in TABLES[name](section["data"])]
+            body += [table(rows) for rows in tables_of(section["data"])]
         body += remarks(section)
     body.append(f"<h2>Machine</h2><code>{html.escape(json.dumps(report['machine'], indent=1))}</code>")  # fmt: skip
     title = '<meta charset="utf-8"><title>dolfinx_contact: error against run time</title>'
