@@ -63,6 +63,7 @@ class Contact:
         reaction: Force of the plane on the body, ``shape=(n, gdim)``, local frame.
         status: A ``Status`` per node, ``shape=(n,)``.
         rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
+        rho_t: The same for slip alone, which only the map "return" can tell apart; None is ``rho``.
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``, set by
             ``ContactProblem``.  There is neither slip nor friction in them: what the support carries
             is no reaction of the plane.
@@ -108,7 +109,7 @@ class Contact:
         self.law = friction.law(gdim)
         self.frame = plane.frame
         self.x = V.tabulate_dof_coordinates()[self.nodes]
-        self.rho = None
+        self.rho = self.rho_t = None
         self.held = np.zeros((self.nodes.size, gdim - 1), dtype=bool)
         self._size = gdim * owned
         self._dofs = gdim * self.nodes[:, None] + np.arange(gdim)
@@ -227,7 +228,8 @@ class Contact:
         if self.rho is None:
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         self.move(u)
-        metrics = {"bipotential": (self.rho,), "return": (self.rho, self.rho)}[map]
+        rho_t = self.rho if self.rho_t is None else self.rho_t
+        metrics = {"bipotential": (self.rho,), "return": (self.rho, rho_t)}[map]
         result = getattr(self.law, f"{map}_{kind}")(
             self.reaction, self.gap, self.slip_increment, *metrics
         )

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
+from itertools import cycle
 from time import perf_counter
 
 import numpy as np
 
 from dolfinx_contact.anderson import Anderson
+from dolfinx_contact.newton_krylov import NewtonKrylov
 
 # Factors of the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
 METRICS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
-# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early.
-EVERY, GROWTH = 20, 100.0
+# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early; if it
+# does not fall by FALL until the next time, statuses are still changing.
+EVERY, GROWTH, FALL = 20, 100.0, 0.1
+
+# Newton's metrics, along the normal and along slip, which want their own. Where a step has to be shorter
+# than SHORT the next one takes over: the kinks of the residual are elsewhere in another metric.
+NEWTON = ((10.0, 0.1), (10.0, 0.3), (10.0, 0.03), (10.0, 1.0))
+SHORT = 0.1
+
+# Newton's method has failed when the residual was not halved in so many iterations.
+PATIENCE = 100
 
 
 class FixedPoint:
@@ -29,6 +41,10 @@ class FixedPoint:
     the contact is linearised, and the layers next to the plane are then corrected with that
     tangent before the back-solve, see ``SurfaceLayer``.
 
+    A hard step, in which such a tangent does not help, is left to Newton's method on the same residual with a
+    line search, see ``NewtonKrylov``: an iteration is then one of GMRES with the same correction.  If that
+    fails, too, the fixed point goes on.
+
     Args:
         map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
             ``Contact.update``.  The law is the same; with strongly non-associated friction "return"
@@ -36,7 +52,8 @@ class FixedPoint:
         rho: Metric over the nodal normal stiffness; None finds it: the next value of a short list is
             tried where one does not converge, at the cost of a factorisation.
         depth: Number of previous corrections that Anderson's method mixes.
-        max_iterations: Iterations with one metric.
+        newton: Whether Newton's method may be tried, with the first metric.
+        max_iterations: Iterations with one metric; those of Newton's method come on top.
         max_seconds: Wall time after which the search ends, seconds.
 
     Raises:
@@ -48,6 +65,7 @@ class FixedPoint:
         map="return",
         rho=None,
         depth: int = 12,
+        newton: bool = True,
         max_iterations: int = 400,
         max_seconds: float = math.inf,
     ):
@@ -62,57 +80,124 @@ class FixedPoint:
             if not (value is None and name == "rho" or value > 0):
                 raise ValueError(f"{name} must be positive, got {value!r}.")
         self.map, self.rho, self.depth, self.max_iterations = map, rho, depth, max_iterations
-        self.max_seconds = max_seconds
+        self.newton, self.max_seconds = bool(newton), max_seconds
 
     def solve(self, system, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
         """Iterate until ``system``'s error is at most ``tol``, or every metric has been tried.
 
         Args:
             system: Offers ``balanced(x)``, ``residual(x) -> (residual, error)``,
-                ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``, ``forget_tangent()``,
-                ``trial``, ``guess()`` and ``total(array)``; nothing else is known of it.
+                ``correction(residual)``, ``use_metric(map, factor)``, ``newton_metric(normal, tangential)``,
+                ``linearise(x)``, what ``NewtonKrylov`` needs, ``trial``, ``guess()`` and ``total(array)``;
+                nothing else is known of it.
             x: Start, this rank's unknowns; for the bare ``system.trial``, ``system.guess()`` is taken.
 
         Returns:
             The iterate of the smallest error, and the number of iterations.
         """
-        iterations, start = 0, perf_counter()
-        best = (np.inf, system.guess() if x is system.trial else x)
+        x = system.guess() if x is system.trial else x
+        search = _Search(system, x, tol, self.max_seconds)
+        hasty = self.newton
         for factor in METRICS[self.map] if self.rho is None else (self.rho,):
-            system.use_metric(self.map, factor)
-            anderson = Anderson(x.size, self.depth, system.total)
-            x, smallest, due, bound = best[1], np.inf, EVERY, np.inf
-            for iteration in range(self.max_iterations):
-                x = system.balanced(x)
-                residual, error = system.residual(x)
-                if error < best[0]:
-                    best = (error, x)
-                if error <= tol or not np.isfinite(error):
-                    break
-                if self._late(start, system):
-                    return best[1], iterations
-                if error > bound:  # the tangent misleads: without it, again from the best
-                    system.forget_tangent()
-                    anderson.restart()
-                    x, bound, smallest, due = best[1], np.inf, np.inf, iteration + EVERY
-                    continue
-                if iteration >= due:
-                    system.linearise(x)
-                    anderson.restart()
-                    bound, smallest, due = GROWTH * error, np.inf, iteration + EVERY
-                following, norm = anderson.step(x, system.correction(residual))
-                iterations += 1
-                if norm > 1e3 * smallest:  # the differences mislead: start again from the best
-                    anderson.restart()
-                    following, smallest = best[1], np.inf
-                smallest = min(smallest, norm)
-                x = following
-            if best[0] <= tol:
+            search.begin(self.max_iterations)
+            x = search.best
+            while search.goes_on:
+                system.use_metric(self.map, factor)
+                linearised = self._accelerate(search, x, hasty)
+                x = search.best  # of before Newton's method, which may end in a corner
+                if hasty and search.goes_on:
+                    self._newton(search, linearised)
+                hasty = False
+            if search.over:
                 break
-        return best[1], iterations
+        return search.best, search.iterations
 
-    def _late(self, start: float, system) -> bool:
+    def _accelerate(self, search, x: np.ndarray, hasty: bool) -> np.ndarray | None:
+        """Anderson's method from ``x``, until a tangent misleads, or does not help if it is ``hasty``.
+
+        Returns:
+            Where that tangent was taken.
+        """
+        system, linearised, error = search.system, None, np.inf
+        anderson = Anderson(x.size, self.depth, system.total)
+        smallest, due = np.inf, search.left - EVERY
+        while True:
+            x, residual = search.residual(x)
+            if not search.goes_on or search.error > GROWTH * error:
+                return linearised
+            if search.left <= due:
+                if hasty and search.error > FALL * error:
+                    return linearised
+                system.linearise(x)
+                anderson.restart()
+                linearised, error = x, search.error
+                smallest, due = np.inf, search.left - EVERY
+            following, norm = anderson.step(x, system.correction(residual))
+            search.count(1)
+            if norm > 1e3 * smallest:  # the differences mislead: start again from the best
+                anderson.restart()
+                following, smallest = search.best, np.inf
+            smallest = min(smallest, norm)
+            x = following
+
+    def _newton(self, search, x: np.ndarray) -> None:
+        """Newton's method from ``x``, until it fails."""
+        system, metrics = search.system, cycle(NEWTON)
+        halved, since = np.inf, 0
+        with closing(NewtonKrylov(system)) as newton:
+            system.newton_metric(*next(metrics))
+            while True:
+                x, residual = search.residual(x)
+                size = system.size(residual)
+                if size < halved / 2:
+                    halved, since = size, 0
+                if not search.goes_on or since >= PATIENCE:
+                    break
+                system.linearise(x)
+                dx, length, iterations = newton.step(x, residual)
+                since += max(iterations, 1)
+                search.iterations += iterations
+                x = x + length * dx
+                if length < SHORT:
+                    system.newton_metric(*next(metrics))
+
+
+class _Search:
+    """The best iterate so far, and whether the search goes on."""
+
+    def __init__(self, system, x: np.ndarray, tol: float, max_seconds: float):
+        self.system, self.best, self._tol = system, x, tol
+        self.error = self._smallest = np.inf
+        self.iterations = self.left = 0
+        self._start, self._seconds = perf_counter(), max_seconds
+        self.over = self._lost = False
+
+    def begin(self, most: int) -> None:
+        """Another metric, with so many iterations at most."""
+        self.left, self._lost = most, False
+
+    @property
+    def goes_on(self) -> bool:
+        """With the present metric."""
+        return not (self.over or self._lost) and self.left > 0
+
+    def count(self, iterations: int) -> None:
+        """Iterations that were done."""
+        self.iterations += iterations
+        self.left -= iterations
+
+    def residual(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``x`` in balance, and its residual."""
+        x = self.system.balanced(x)
+        residual, self.error = self.system.residual(x)
+        if self.error < self._smallest:
+            self._smallest, self.best = self.error, x
+        self._lost = not np.isfinite(self.error)
+        self.over = self.error <= self._tol or self._late()
+        return x, residual
+
+    def _late(self) -> bool:
         """Whether the time is up on any rank; asks them only if there is a limit."""
-        if self.max_seconds == math.inf:
+        if self._seconds == math.inf:
             return False
-        return bool(system.total([perf_counter() - start > self.max_seconds])[0] > 0)
+        return bool(self.system.total([perf_counter() - self._start > self._seconds])[0] > 0)

@@ -374,7 +374,7 @@ class _ContactEquations:
         """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
         self._set_metric(map, factor)
         self._tangent, problem = None, self.problem
-        if problem._stiffened is not None and problem._stiffened.metric == self._metric:
+        if problem._stiffened is not None and problem._stiffened.metric == (map, factor):
             return
         A = self.body.K.copy()
         for contact in problem.contacts:
@@ -382,13 +382,14 @@ class _ContactEquations:
         problem._free_springs()  # one factorisation at a time: memory counts more than time
         with stage("contact: set-up of springs"):
             rigid = RigidBalance(self.body, problem.contacts, A)
-            problem._stiffened = _Stiffened(self._metric, self.body.solver(A), rigid)
+            problem._stiffened = _Stiffened((map, factor), self.body.solver(A), rigid)
         A.destroy()  # the solver has its own reference
 
-    def _set_metric(self, map: str, factor: float) -> None:
-        self._metric = (map, factor)
+    def _set_metric(self, map: str, normal: float, tangential: float | None = None) -> None:
+        self._map = map
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = factor * stiffness
+            contact.rho = normal * stiffness
+            contact.rho_t = None if tangential is None else tangential * stiffness
 
     def balanced(self, x: np.ndarray) -> np.ndarray:
         """``x``, moved along the rigid motions that only soft springs resist, see ``RigidBalance``."""
@@ -396,7 +397,11 @@ class _ContactEquations:
             return x
         self._measured = None  # contacts will move
         forces = self.b - self.body.multiply(x)
-        return self.problem._stiffened.rigid.balanced(x, forces, self._metric[0])
+        return self.problem._stiffened.rigid.balanced(x, forces, self._map)
+
+    def newton_metric(self, normal: float, tangential: float) -> None:
+        """Residuals from now on are those of the return map, rho along the normal and along slip these factors."""
+        self._set_metric("return", normal, tangential)
 
     def linearise(self, x: np.ndarray) -> None:
         """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
@@ -405,14 +410,30 @@ class _ContactEquations:
             prefix = f"{self.body.prefix}layer_"
             problem._layer = SurfaceLayer(self.body, problem.contacts, prefix)
         contacts = self._asked(self.b - self.body.multiply(x))
-        derivatives = [contact.update_with_derivatives(x, self._metric[0]) for contact in contacts]
+        derivatives = [contact.update_with_derivatives(x, self._map) for contact in contacts]
         with stage("contact: surface layer"):
             problem._layer.linearise(derivatives)
         self._tangent = problem._layer
 
-    def forget_tangent(self) -> None:
-        """Corrections as before ``linearise``."""
-        self._tangent = None
+    def tangent(self, x: np.ndarray) -> np.ndarray:
+        """Minus the derivative of the residual along ``x``, at the displacement of ``linearise``."""
+        return self._tangent.multiply(x, self.body.multiply(x))
+
+    def along(self, x: np.ndarray, dx: np.ndarray):
+        """Function of a length: the norm of the residual of ``x + length dx``, without a product with K."""
+        self._measured = None  # contacts will move
+        forces, change = self.b - self.body.multiply(x), self.body.multiply(dx)
+
+        def size(length: float) -> float:
+            return self.size(self._forces_left(x + length * dx, forces - length * change))
+
+        return size
+
+    def size(self, residual: np.ndarray) -> float:
+        """Norm of the forces out of balance at free degrees of freedom."""
+        residual = residual.copy()
+        residual[self.body.fixed] = 0.0
+        return self.body.norm(residual)
 
     def correction(self, residual: np.ndarray) -> np.ndarray:
         """Displacement that removes the residual while the springs hold the contact nodes.
@@ -460,11 +481,15 @@ class _ContactEquations:
             yield contact
 
     def _update(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        for contact in self._asked(forces):
-            contact.update(x, self._metric[0])
-        residual = self._balance(forces)
+        residual = self._forces_left(x, forces)
         self.errors = self._errors(residual)
         return residual
+
+    def _forces_left(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """What the new reactions leave of ``forces = b - K x``."""
+        for contact in self._asked(forces):
+            contact.update(x, self._map)
+        return self._balance(forces)
 
     def errors_if_open(self, x: np.ndarray) -> Errors:
         """Errors of a state in which no node touches, to rounding, and all reactions are zero."""
