@@ -15,12 +15,9 @@ from mpi4py import MPI
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
-from dolfinx_contact.condensed import CondensedBody
-from dolfinx_contact.contact import Contact, Status
-from dolfinx_contact.error import Errors, projection_residual, relative
-from dolfinx_contact.linear_solver import LinearSolver, stage
-from dolfinx_contact.rigid_balance import RigidBalance
-from dolfinx_contact.surface_layer import SurfaceLayer
+from dolfinx_contact.contact import Contact
+from dolfinx_contact.contact_equations import ContactEquations
+from dolfinx_contact.linear_solver import stage
 
 
 class Counts(NamedTuple):
@@ -229,7 +226,7 @@ class ContactProblem:
             )
         self._restore()
 
-    def _solve(self) -> tuple[np.ndarray, _ContactEquations, int]:
+    def _solve(self) -> tuple[np.ndarray, ContactEquations, int]:
         body = self.body
         assembled = body.refresh()
         if assembled != self._assembled:
@@ -242,7 +239,7 @@ class ContactProblem:
         b, external = body.load()
         with stage("contact: elastic solve"):
             trial = body.free_state(b)
-        equations = _ContactEquations(self, b, trial, *self._load(trial, external))
+        equations = ContactEquations(self, b, trial, *self._load(trial, external))
         if not self._touches:
             equations.errors = equations.errors_if_open(trial)
             return trial, equations, 0
@@ -289,7 +286,7 @@ class ContactProblem:
             if (extremes[: moved.size] != -extremes[moved.size :]).any():
                 raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
 
-    def _record(self, equations: _ContactEquations, iterations: int, seconds: float) -> Step:
+    def _record(self, equations: ContactEquations, iterations: int, seconds: float) -> Step:
         gap, penetration = 0.0, 0.0
         for contact in self.contacts:
             gap += contact.bipotential_gap.sum()
@@ -330,200 +327,6 @@ class ContactProblem:
         self._show(self._states[0])
         for contact in self.contacts:
             contact.restore()
-
-
-class _Stiffened(NamedTuple):
-    """The body with the springs of one metric (map and factor) at its contact nodes."""
-
-    metric: tuple[str, float]
-    solver: LinearSolver
-    rigid: RigidBalance
-
-
-class _ContactEquations:
-    """What a solver sees of a step: a residual, a correction, a metric and a sum over ranks."""
-
-    def __init__(self, problem, b, trial, load: float, load_displacement: float):
-        self.problem, self.body, self.b = problem, problem.body, b
-        self.trial = trial  # displacement without reactions
-        self.chosen, self.tried = "none: nothing touches", ()
-        self.load, self.load_displacement = load, load_displacement
-        self.total = problem.body.total
-        self._set_metric("bipotential", 1.0)
-        self._tangent = None  # SurfaceLayer, once linearised
-        self._evaluations = 0
-        self._measured = None  # displacement whose errors were measured with F
-
-    def guess(self) -> np.ndarray:
-        """The user's ``u`` or the extrapolated last steps, whichever leaves the smaller error."""
-        body, (last, before) = self.body, self.problem._states
-        guesses = [self.problem.u.x.array[: body.size].copy(), 2 * last - before]
-        for guess in guesses:
-            guess[body.fixed] = self.b[body.fixed]
-        return min(guesses, key=lambda guess: self.residual(guess)[1])
-
-    def condensed(self) -> CondensedBody:
-        """The body condensed to its contact nodes, kept while its matrix stands."""
-        problem, self._measured = self.problem, None  # contacts will move
-        if problem._condensed is None:
-            problem._condensed = CondensedBody(self.body, problem.contacts)
-        problem._condensed.past = problem._past
-        return problem._condensed
-
-    def use_metric(self, map: str, factor: float) -> None:
-        """Set the map of the predictor, rho as a factor of the nodal stiffness, and springs to match."""
-        self._set_metric(map, factor)
-        self._tangent, problem = None, self.problem
-        if problem._stiffened is not None and problem._stiffened.metric == (map, factor):
-            return
-        A = self.body.K.copy()
-        for contact in problem.contacts:
-            contact.add_springs(A, contact.springs(map))
-        problem._free_springs()  # one factorisation at a time: memory counts more than time
-        with stage("contact: set-up of springs"):
-            rigid = RigidBalance(self.body, problem.contacts, A)
-            problem._stiffened = _Stiffened((map, factor), self.body.solver(A), rigid)
-        A.destroy()  # the solver has its own reference
-
-    def _set_metric(self, map: str, normal: float, tangential: float | None = None) -> None:
-        self._map = map
-        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            contact.rho = normal * stiffness
-            contact.rho_t = None if tangential is None else tangential * stiffness
-
-    def balanced(self, x: np.ndarray) -> np.ndarray:
-        """``x``, moved along the rigid motions that only soft springs resist, see ``RigidBalance``."""
-        if len(self.problem._stiffened.rigid) == 0:
-            return x
-        self._measured = None  # contacts will move
-        forces = self.b - self.body.multiply(x)
-        return self.problem._stiffened.rigid.balanced(x, forces, self._map)
-
-    def newton_metric(self, normal: float, tangential: float) -> None:
-        """Residuals from now on are those of the return map, rho along the normal and along slip these factors."""
-        self._set_metric("return", normal, tangential)
-
-    def linearise(self, x: np.ndarray) -> None:
-        """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
-        problem, self._measured = self.problem, None  # contacts will move
-        if problem._layer is None:
-            prefix = f"{self.body.prefix}layer_"
-            problem._layer = SurfaceLayer(self.body, problem.contacts, prefix)
-        contacts = self._asked(self.b - self.body.multiply(x))
-        derivatives = [contact.update_with_derivatives(x, self._map) for contact in contacts]
-        with stage("contact: surface layer"):
-            problem._layer.linearise(derivatives)
-        self._tangent = problem._layer
-
-    def tangent(self, x: np.ndarray) -> np.ndarray:
-        """Minus the derivative of the residual along ``x``, at the displacement of ``linearise``."""
-        return self._tangent.multiply(x, self.body.multiply(x))
-
-    def along(self, x: np.ndarray, dx: np.ndarray):
-        """Function of a length: the norm of the residual of ``x + length dx``, without a product with K."""
-        self._measured = None  # contacts will move
-        forces, change = self.b - self.body.multiply(x), self.body.multiply(dx)
-
-        def size(length: float) -> float:
-            return self.size(self._forces_left(x + length * dx, forces - length * change))
-
-        return size
-
-    def size(self, residual: np.ndarray) -> float:
-        """Norm of the forces out of balance at free degrees of freedom."""
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
-        return self.body.norm(residual)
-
-    def correction(self, residual: np.ndarray) -> np.ndarray:
-        """Displacement that removes the residual while the springs hold the contact nodes.
-
-        One application of the preconditioner: exact with a factorisation, one cycle of multigrid.
-        After ``linearise`` the layers next to the plane are corrected first.
-        """
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
-        near = 0.0
-        if self._tangent is not None:
-            near, residual = self._tangent.correct(residual)
-        correction = near + self.problem._stiffened.solver.apply(residual)
-        correction[self.body.fixed] = 0.0
-        return correction
-
-    def residual(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Forces out of balance once every contact node has its projected reaction, and the error.
-
-        The reactions that enter the predictor are those the body asks for, ``K x - f``.  Once the
-        error falls below the tolerance it is measured again with F itself, assembled by DOLFINx.
-        """
-        residual = self._update(x, self.b - self.body.multiply(x))
-        self._measured = None
-        if self.errors.largest <= self.problem.tol:
-            self.errors = self._errors(self._balance(self._assembled(x)))
-            self._measured = x.copy()
-        if self.problem.monitor is not None:
-            counts = self.problem._counts()
-            self.problem.monitor(self._evaluations, self.errors.largest, counts)
-        self._evaluations += 1
-        return residual, self.errors.largest
-
-    def measure(self, x: np.ndarray) -> float:
-        """The error of a displacement by F itself; also takes its reactions, gaps and slips."""
-        if self._measured is None or not self.body.same(x, self._measured):
-            self._update(x, self._assembled(x))
-            self._measured = x.copy()
-        return self.errors.largest
-
-    def _asked(self, forces: np.ndarray):
-        """The contacts, each with the reactions that balance the forces at its nodes."""
-        for contact in self.problem.contacts:
-            contact.take_reaction(-forces)
-            yield contact
-
-    def _update(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        residual = self._forces_left(x, forces)
-        self.errors = self._errors(residual)
-        return residual
-
-    def _forces_left(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """What the new reactions leave of ``forces = b - K x``."""
-        for contact in self._asked(forces):
-            contact.update(x, self._map)
-        return self._balance(forces)
-
-    def errors_if_open(self, x: np.ndarray) -> Errors:
-        """Errors of a state in which no node touches, to rounding, and all reactions are zero."""
-        for contact in self.problem.contacts:
-            contact.move(x)
-            contact.gap = np.maximum(contact.gap, 0.0)
-            contact.reaction = np.zeros_like(contact.reaction)
-            contact.status = np.full_like(contact.status, Status.OPEN)
-        return self._errors(self._assembled(x))
-
-    def _assembled(self, x: np.ndarray) -> np.ndarray:
-        values = self.problem.u.x.array.copy()
-        values[: self.body.size] = x
-        forces = -self.body.internal_force(values)
-        forces[self.body.fixed] = 0.0  # what supports carry
-        return forces
-
-    def _balance(self, forces: np.ndarray) -> np.ndarray:
-        forces = forces.copy()
-        for contact in self.problem.contacts:
-            contact.assemble_reaction(forces)
-        return forces
-
-    def _errors(self, residual: np.ndarray) -> Errors:
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
-        projection, defect = [np.zeros(0)], 0.0
-        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
-            projection.append(projection_residual(contact, stiffness).ravel())
-            defect = max(defect, contact.slip_defect.max(initial=0.0))
-        parts = (relative(part, self.load) for part in (residual, np.concatenate(projection)))
-        squares = self.body.total([part @ part for part in parts])  # one reduction for both norms
-        defect = self.body.largest(relative(np.array([defect]), self.load_displacement))
-        return Errors(float(np.sqrt(squares.max())), defect)
 
 
 def _read_checkpoint(path, ranks: int) -> list[dict[str, np.ndarray]]:

@@ -8,7 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from dolfinx_contact.problem import _ContactEquations
+from dolfinx_contact.contact_equations import ContactEquations
 
 SHAPES = [(6, 4), (4, 4, 2)]
 
@@ -44,7 +44,7 @@ def equations_of(stiffness, cells, map, **options):
     problem._stiffness = [contact.rho for contact in problem.contacts]
     b, external = problem.body.load()
     trial = problem.body.free_state(b)
-    equations = _ContactEquations(problem, b, trial, *problem._load(trial, external))
+    equations = ContactEquations(problem, b, trial, *problem._load(trial, external))
     equations.use_metric(map, 1.0)
     return equations, trial
 

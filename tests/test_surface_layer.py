@@ -7,8 +7,8 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
+from dolfinx_contact.contact_equations import ContactEquations
 from dolfinx_contact.linear_solver import MULTIGRID
-from dolfinx_contact.problem import _ContactEquations
 
 LAWS = [(0.0, None), (0.2, None), ((0.3, 0.15), None), ((0.3, 0.15), (0.05, 0.2))]
 
@@ -22,7 +22,7 @@ def linearised(map, turn=None, **options):
     problem = scene.problem
     b, external = problem.body.load()
     trial = problem.body.solve(b)
-    equations = _ContactEquations(problem, b, trial, *problem._load(trial, external))
+    equations = ContactEquations(problem, b, trial, *problem._load(trial, external))
     equations.use_metric(map, 1.0)
     x = problem._states[0] + 0.3 * (trial - problem._states[0])
     x[problem.body.fixed] = b[problem.body.fixed]
