@@ -57,9 +57,11 @@ def claims(text: str) -> dict[str, str]:
         ("frictionless >= 3 times cheaper than orthotropic",
          f"{ratio(cheaper[0])} times (scaled map), {ratio(cheaper[1])} times (projection)", min(cheaper) >= 3),
     ]  # fmt: skip
+    half = 2 * ns("x86-64", "scaled_map", "nonassociated", "mix", 10**6) / bound
     titles = ["map", "law"]
     return {
         "mix": table([*titles, "B/node", "n = 1e3", "n = 1e6", "n = 1e7", "native, 1e3", "native, 1e6"], each(mix)),
         "branches": table([*titles, *BRANCHES, *(f"{b}, 1e6" for b in BRANCHES)], each(alone)),
+        "scaled-map": f"{plain:.0f} ns", "scaled-map-native": f"{native:.0f} ns", "half-bandwidth": f"{half:.0f}",
         "aims": table(["Aim", "Measured", ""], [(aim, found, "reached" if ok else "**not reached**") for aim, found, ok in aims]),
     }  # fmt: skip
