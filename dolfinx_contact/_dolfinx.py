@@ -102,6 +102,19 @@ def cell_nodes(V):
     return nodes
 
 
+def original_nodes(V):
+    """Index of each owned node in the mesh as it was read or made, whatever the ranks; ``V`` of degree 1."""
+    geometry, nodes = V.mesh.geometry, cell_nodes(V)
+    points = geometry.dofmap
+    if hasattr(points, "array"):  # an adjacency list before 0.8
+        points = points.array.reshape(-1, points.array.size // max(points.num_nodes, 1) or 1)
+    index_map = V.dofmap.index_map
+    original = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int64)
+    corners = points[: len(nodes), : nodes.shape[1]]
+    original[nodes] = np.asarray(geometry.input_global_indices)[corners]
+    return original[: index_map.size_local]
+
+
 def bc_dofs(bc, size: int):
     """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
     dofs, _ = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()

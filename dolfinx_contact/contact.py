@@ -302,7 +302,7 @@ class Contact:
                 found = saved[name].shape if name in saved else "nothing"
                 raise ValueError(
                     f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
-                    "for another mesh, another contact or another number of ranks."
+                    "for another mesh or another contact."
                 )
         self._converged = _State(*(np.array(saved[name]) for name in _State._fields))
         for name in ("dissipation", "slip_path", "wear_depth"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from dataclasses import dataclass
 from time import perf_counter
@@ -12,6 +11,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from dolfinx_contact import checkpoint
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
@@ -178,52 +178,18 @@ class ContactProblem:
         Args:
             path: File name, usually ending in ``.npz``.
         """
-        comm = self.body.comm
-        mine = {"u": self._states[0], "before": self._states[1]}
-        if self._past:
-            mine["past"] = np.array(self._past)
-        if self.body.known:
-            mine |= {f"known{k}": part for k, part in enumerate(self.body.known)}
-        for k, contact in enumerate(self.contacts):
-            mine.update((f"contact{k}_{name}", array) for name, array in contact.save().items())
-        everything = comm.gather(mine, root=0)
-        with raised_together(comm):
-            if comm.rank == 0:
-                flat = {
-                    f"rank{r}_{n}": a for r, part in enumerate(everything) for n, a in part.items()
-                }
-                unfinished = f"{path}.unfinished"
-                with open(unfinished, "wb") as file:
-                    np.savez(file, ranks=comm.size, **flat)
-                os.replace(unfinished, path)
+        checkpoint.save(self, path)
 
     def load(self, path) -> None:
-        """Continue from a checkpoint of the same problem on the same number of ranks.  Collective.
+        """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
 
         On one rank the steps that follow have the same bits as without the interruption.  On several
         ranks MUMPS adds in the order in which messages arrive, and they agree to rounding.
 
         Raises:
-            ValueError: the file is no checkpoint of this problem on as many ranks.
+            ValueError: the file is no checkpoint of this problem.
         """
-        comm = self.body.comm
-        parts = None
-        with raised_together(comm):
-            if comm.rank == 0:
-                parts = _read_checkpoint(path, comm.size)
-        mine = comm.scatter(parts, root=0)
-        with raised_together(comm):
-            for name in ("u", "before"):
-                if name not in mine or mine[name].shape != (self.body.size,):
-                    raise ValueError(f"{path} is no checkpoint of a problem of this size.")
-            for k, contact in enumerate(self.contacts):
-                prefix = f"contact{k}_"
-                contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
-            self._states = [mine["u"], mine["before"]]
-            self._past = deque(map(tuple, mine.get("past", ())), maxlen=self._past.maxlen)
-            self.body.known = (
-                tuple(mine[f"known{k}"] for k in range(3)) if "known0" in mine else None
-            )
+        checkpoint.load(self, path)
         self._restore()
 
     def _solve(self) -> tuple[np.ndarray, ContactEquations, int]:
@@ -327,19 +293,6 @@ class ContactProblem:
         self._show(self._states[0])
         for contact in self.contacts:
             contact.restore()
-
-
-def _read_checkpoint(path, ranks: int) -> list[dict[str, np.ndarray]]:
-    """Arrays of each rank by name."""
-    with np.load(path) as file:
-        written = int(file["ranks"]) if "ranks" in file else 0
-        if written != ranks:
-            raise ValueError(f"{path} was written by {written} rank(s), here are {ranks}.")
-        parts = [{} for _ in range(ranks)]
-        for name in set(file.files) - {"ranks"}:
-            rank, _, rest = name.partition("_")
-            parts[int(rank.removeprefix("rank"))][rest] = file[name]
-    return parts
 
 
 def _checked_contacts(contacts, u) -> list[Contact]:

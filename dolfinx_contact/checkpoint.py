@@ -1,0 +1,122 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""All that the next step starts from, in one file.
+
+Rows belong to nodes by their index in the mesh as it was read or made: partitioners share a mesh anew in
+every run, so neither the ranks' shares nor their number need be those that wrote.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact import _dolfinx
+from dolfinx_contact._errors import raised_together
+
+
+def save(problem, path) -> None:
+    """Write the history of a ``ContactProblem``.  Collective."""
+    comm, nodes = problem.body.comm, _nodes(problem)
+    mine = nodes | {"ranks": np.array([len(nodes["nodes"])])}
+    for name, array in zip(("u", "before"), problem._states):
+        mine[name] = _rows(problem, array)
+    if problem.body.known:
+        digest, b, x = problem.body.known
+        mine |= {"digest": digest[None], "load": _rows(problem, b), "free": _rows(problem, x)}
+    for k, contact in enumerate(problem.contacts):
+        mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
+    if problem._past:
+        mine["past_nodes"] = np.concatenate([a for name, a in nodes.items() if name != "nodes"])
+    everything = comm.gather(mine, root=0)
+    with raised_together(comm):
+        if comm.rank == 0:
+            same = {name for name in mine if name.endswith("_plane")}  # on all ranks
+            file = {
+                name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
+                for name in mine
+            }
+            if problem._past:
+                file["past"] = np.array(problem._past)
+            unfinished = f"{path}.unfinished"
+            with open(unfinished, "wb") as stream:
+                np.savez(stream, **file)
+            os.replace(unfinished, path)
+
+
+def load(problem, path) -> None:
+    """Take the history of a ``ContactProblem`` from a file.  Collective.
+
+    Raises:
+        ValueError: the file is no checkpoint of this problem.
+    """
+    comm, count = problem.body.comm, len(problem.contacts)
+    asked = comm.gather(_nodes(problem), root=0)
+    parts, past = None, ()
+    with raised_together(comm):
+        if comm.rank == 0:
+            with np.load(path) as opened:
+                file = dict(opened)
+            if not {"u", "before", "nodes", "ranks"} <= file.keys():
+                raise ValueError(f"{path} is no checkpoint.")
+            for prefix in ["", *(f"contact{k}_" for k in range(count))]:
+                name, size = f"{prefix}nodes", sum(len(nodes[f"{prefix}nodes"]) for nodes in asked)
+                if name not in file or len(file[name]) != size:
+                    found = len(file[name]) if name in file else "none"
+                    raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
+            parts = [_part(file, nodes, rank, len(asked)) for rank, nodes in enumerate(asked)]
+            if "past" in file:
+                names = [f"contact{k}_nodes" for k in range(count)]
+                order = np.concatenate([nodes[name] for nodes in asked for name in names])
+                past = file["past"][:, :, _positions(file["past_nodes"], order)]
+    mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
+    with raised_together(comm):
+        for k, contact in enumerate(problem.contacts):
+            prefix = f"contact{k}_"
+            contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
+    problem._states = [mine["u"].ravel(), mine["before"].ravel()]
+    problem._past.clear()
+    problem._past.extend(map(tuple, past))
+    problem.body.known = None
+    if comm.allreduce("digest" in mine, op=MPI.LAND):
+        problem.body.known = mine["digest"], mine["load"].ravel(), mine["free"].ravel()
+
+
+def _nodes(problem) -> dict[str, np.ndarray]:
+    """Original indices of this rank's nodes, of the body and of each contact."""
+    original = _dolfinx.original_nodes(problem.u.function_space)
+    contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(problem.contacts)}
+    return {"nodes": original} | contacts
+
+
+def _rows(problem, array: np.ndarray) -> np.ndarray:
+    """Values of owned degrees of freedom, a row a node."""
+    return array.reshape(-1, problem.u.function_space.dofmap.index_map_bs)
+
+
+def _part(file, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
+    """The rows of one rank, which asks for ``nodes``."""
+    part = {}
+    for key, wanted in nodes.items():
+        at, prefix = _positions(file[key], wanted), key.removesuffix("nodes")
+        names = ["u", "before", "load", "free"] if prefix == "" else file
+        for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
+            part[name] = file[name] if name.endswith("_plane") else file[name][at]
+    # Of the coefficients for which the free state holds a rank knows its own share alone.
+    if "digest" in file and len(file["ranks"]) == ranks:
+        last = np.cumsum(file["ranks"])[rank]
+        if np.array_equal(file["nodes"][last - file["ranks"][rank] : last], nodes["nodes"]):
+            part["digest"] = file["digest"][rank]
+    return part
+
+
+def _positions(nodes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Where in ``nodes`` those wanted are."""
+    order = np.argsort(nodes)
+    at = np.searchsorted(nodes, wanted, sorter=order)
+    found = order[np.minimum(at, len(nodes) - 1)]
+    if not np.array_equal(nodes[found], wanted):
+        raise ValueError("checkpoint: it was written for another mesh, or with other contacts.")
+    return found
