@@ -17,9 +17,9 @@ from dolfinx_contact.newton_krylov import NewtonKrylov
 METRICS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
-# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early; if it
-# does not fall by FALL until the next time, statuses are still changing.
-EVERY, GROWTH, FALL = 20, 100.0, 0.1
+# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early; if two
+# tangents do not bring it down to FALL, statuses are still changing.
+EVERY, GROWTH, FALL = 20, 100.0, 0.3
 
 # Newton's metrics, along the normal and along slip, which want their own. Where a step has to be shorter
 # than SHORT the next one takes over: the kinks of the residual are elsewhere in another metric.
@@ -113,24 +113,24 @@ class FixedPoint:
         return search.best, search.iterations
 
     def _accelerate(self, search, x: np.ndarray, hasty: bool) -> np.ndarray | None:
-        """Anderson's method from ``x``, until a tangent misleads, or does not help if it is ``hasty``.
+        """Anderson's method from ``x``, until a tangent misleads, or two do not help if it is ``hasty``.
 
         Returns:
-            Where that tangent was taken.
+            Where the first of the two was taken.
         """
-        system, linearised, error = search.system, None, np.inf
+        system, last, before = search.system, (np.inf, None), (np.inf, None)
         anderson = Anderson(x.size, self.depth, system.total)
         smallest, due = np.inf, search.left - EVERY
         while True:
             x, residual = search.residual(x)
-            if not search.goes_on or search.error > GROWTH * error:
-                return linearised
+            if not search.goes_on or search.error > GROWTH * last[0]:
+                return last[1]
             if search.left <= due:
-                if hasty and search.error > FALL * error:
-                    return linearised
+                if hasty and search.error > FALL * before[0]:
+                    return before[1]
                 system.linearise(x)
                 anderson.restart()
-                linearised, error = x, search.error
+                last, before = (search.error, x), last
                 smallest, due = np.inf, search.left - EVERY
             following, norm = anderson.step(x, system.correction(residual))
             search.count(1)
