@@ -105,7 +105,8 @@ def cell_nodes(V):
 def original_nodes(V):
     """Index of each owned node in the mesh as it was read or made, whatever the ranks; ``V`` of degree 1."""
     geometry, nodes = V.mesh.geometry, cell_nodes(V)
-    points = geometry.dofmap
+    points = getattr(geometry, "dofmaps", None)  # one for each type of cells since 0.8
+    points = geometry.dofmap if points is None else points(0) if callable(points) else points[0]
     if hasattr(points, "array"):  # an adjacency list before 0.8
         points = points.array.reshape(-1, points.array.size // max(points.num_nodes, 1) or 1)
     index_map = V.dofmap.index_map
