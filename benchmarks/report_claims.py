@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import stress_table
 from quotes import ratio, table
 
 
@@ -87,4 +88,6 @@ def _meshes(data):
         yield f"dissipation-{answer['percent']:g}-percent", answer["text"]
 
 
-QUOTED = dict(algebraic=_algebraic, meshes=_meshes, peers=_peers, growth=_growth, ladder=_ladder)
+QUOTED = dict(
+    algebraic=_algebraic, meshes=_meshes, peers=_peers, growth=_growth, ladder=_ladder, stability=stress_table.claims
+)  # fmt: skip

@@ -36,12 +36,18 @@ def plan(size: str) -> list[Measurement]:
 
 
 def read(file: str, written: float) -> dict:
-    """The matrix as ``make stress`` wrote it, and whether it is whole."""
-    records = [json.loads(line) for line in Path(file).read_text().splitlines()]
+    """The matrix as ``make stress`` wrote it, in the order of its scenes, and whether it is whole."""
+    lines = map(json.loads, Path(file).read_text().splitlines())
+    found = {(r["group"], r["name"], r["solver"]): r for r in lines}
+    asked = [
+        (scene.group, scene.name, solver) for scene in scenes() for solver in stress.SOLVERS
+        if scene.seed is None or solver == "default"
+    ]  # fmt: skip
+    records = [found[key] for key in asked if key in found]
     measured = [record.get("measured", "date and commit not noted") for record in records]
-    asked = {(s.group, s.name, solver) for s in scenes() for solver in stress.SOLVERS if s.seed is None or solver == "default"}  # fmt: skip
-    whole = asked <= {(r["group"], r["name"], r["solver"]) for r in records}
-    return dict(records=[short(record) for record in records], whole=whole, measured=measured)
+    return dict(
+        records=[short(r) for r in records], whole=len(records) == len(asked), measured=measured
+    )
 
 
 def run(solver: str, every: int) -> dict:
@@ -61,7 +67,7 @@ def refused() -> dict:
     for law, friction in LAWS.items():
         built = build(spring=0.0, **friction)
         record = dict(group="singular stiffness", name=f"held by nothing {law}", solver="default",
-            outcome="WRONG", error=0.0, slip_error=0.0, steps=0, seconds=0.0)  # fmt: skip
+            outcome="WRONG", error=0.0, slip_error=0.0, steps=0, seconds=0.0, slowest=0.0, methods={})  # fmt: skip
         try:
             problem = dc.ContactProblem(built.F, built.u, [built.contact], bcs=built.bcs)
             built.move_top((0, 0, -0.01))
@@ -73,7 +79,7 @@ def refused() -> dict:
 
 
 def short(record: dict) -> dict:
-    keys = ("group", "name", "solver", "outcome", "steps", "seconds")
+    keys = ("group", "name", "solver", "outcome", "steps", "seconds", "slowest", "methods")
     worst = max(record["error"], record["slip_error"])
     return {key: record[key] for key in keys} | dict(error=worst, said=record.get("said", ""))
 
@@ -86,6 +92,7 @@ def evaluate(results: dict) -> dict:
     singular = [r for r in records if r["group"] == "singular stiffness"]
     others = [r for r in records if r["group"] != "singular stiffness"]
     solved = [r for r in others if r["outcome"] == "solved"]
+    measured = sorted({when for result in results.values() for when in result.get("measured", [])})
     by_solver = {}
     for record in others:
         of = by_solver.setdefault(record["solver"], dict(scenes=0, solved=0, refused=0, WRONG=0))
@@ -93,7 +100,7 @@ def evaluate(results: dict) -> dict:
         of[record["outcome"]] += 1
     return dict(
         records=records, whole=any(result["whole"] for result in results.values()),
-        by_solver=by_solver, third_state=sum(r["outcome"] == "WRONG" for r in records),
+        by_solver=by_solver, measured=measured, third_state=sum(r["outcome"] == "WRONG" for r in records),
         worst=max((r["error"] for r in solved), default=None),
         singular=len(singular), singular_refused=sum(r["outcome"] == "refused" for r in singular),
         all_scenes=len(scenes()), tol=stress.TOL, wrong=stress.WRONG,

@@ -84,6 +84,14 @@ def growth(meshes: list) -> list[dict]:
     ]  # fmt: skip
 
 
+def cycle(meshes: list, repeat: int = 3) -> list[dict]:
+    """One cycle without friction on ever finer meshes, time and again, interleaved."""
+    return [
+        steps("frictionless", solver, divisions=divisions, layers=layers)
+        for _ in range(repeat) for divisions, layers in meshes for solver in SOLVERS
+    ]  # fmt: skip
+
+
 def laws(first: int = 2, last: int = 31) -> list[dict]:
     """Simpler laws on the same W and q, those of case C, each step from zero."""
     punch = Punch(Parameters(case="C", cycles=3))
@@ -125,10 +133,13 @@ def operator(repeat: int = 7) -> list[dict]:
 
 TWO_LAYERS = [(divisions, 2) for divisions in (4, 8, 12, 16)]
 PUNCH = [(divisions, divisions // 2) for divisions in (8, 12, 16)]
+WITHOUT = (8, 10, 12, 14, 16)  # friction
 PARTS = {
     "study": study,
     "growth": lambda: growth(TWO_LAYERS),
     "punch": lambda: growth(PUNCH),
+    "frictionless": lambda: cycle([(divisions, 2) for divisions in WITHOUT]),
+    "frictionless-punch": lambda: cycle([(divisions, divisions // 2) for divisions in WITHOUT]),
     "laws": laws,
     "operator": operator,
 }

@@ -73,14 +73,29 @@ def _growth(rows):
     titles = ["contact nodes", "unknowns", "condensed (s)", "fixed point (s)", "W and inverse (s)",
         "paid back after steps"]  # fmt: skip
     sizes = ["contact nodes", "unknowns", "W and inverse kept (MB)", "estimate (MB)", "measured peak (MB)"]  # fmt: skip
+    return {"table": table(titles, lines), "memory": table(sizes, kept), "even": _even(share)}
+
+
+def _even(share) -> str:
+    """Contact nodes at which both solvers take as long, from nodes and the ratio of their seconds, interpolated."""
     nodes, over = np.log(np.array(share)).T
-    return {
-        "table": table(titles, lines),
-        "memory": table(sizes, kept),
-        "even": f"{np.exp(np.interp(0.0, over, nodes)):.0f} nodes"
-        if over[0] < 0 < over[-1]
-        else "no size",
-    }
+    crosses = over[0] < 0 < over[-1]
+    return f"{np.exp(np.interp(0.0, over, nodes)):.0f} nodes" if crosses else "no size"
+
+
+def _cycle(rows):
+    """Medians over the repetitions of all that a cycle takes but the factors of K, and of its later steps alone."""
+    runs = {}
+    for newton, fixed in _pairs(rows):
+        runs.setdefault((newton["nodes"], newton["unknowns"]), []).append(
+            [*(sum(row["times"]) + row["operator"] for row in (newton, fixed)), _later(newton), _later(fixed)]
+        )  # fmt: skip
+    medians = {size: np.median(seconds, axis=0) for size, seconds in runs.items()}
+    lines = [[*size, *(f"{t:.2f}" for t in seconds)] for size, seconds in medians.items()]
+    titles = ["contact nodes", "unknowns", "condensed (s)", "fixed point (s)", "condensed, all but the first (s)",
+        "fixed point, all but the first (s)"]  # fmt: skip
+    share = [(nodes, t[0] / t[1]) for (nodes, _), t in medians.items()]
+    return {"table": table(titles, lines), "even": _even(share)}
 
 
 def _laws(rows):
@@ -102,4 +117,7 @@ def _operator(rows):
     }  # fmt: skip
 
 
-QUOTED = dict(study=_study, growth=_growth, punch=_growth, laws=_laws, operator=_operator)
+QUOTED = {
+    "study": _study, "growth": _growth, "punch": _growth, "frictionless": _cycle, "frictionless-punch": _cycle,
+    "laws": _laws, "operator": _operator,
+}  # fmt: skip

@@ -25,6 +25,7 @@ import ufl
 from dolfinx import fem
 from report_run import commit, now
 from stress_scenes import Scene, build, scenes, small
+from stress_table import summary
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import twin_solver
@@ -141,22 +142,6 @@ def run(scene: Scene, solver) -> dict:
         record.update(outcome="refused", said=f"{type(said).__name__}: {str(said)[:200]}")
     record.update(seconds=perf_counter() - start, methods=dict(used))
     return record
-
-
-def summary(records: list[dict]) -> str:
-    """Table of outcomes by group and solver."""
-    groups = list(dict.fromkeys(record["group"] for record in records))
-    solvers = [name for name in SOLVERS if any(r["solver"] == name for r in records)]
-    lines = ["| scenes | " + " | ".join(solvers) + " |", "|---" * (len(solvers) + 1) + "|"]
-    for group in [*groups, "all"]:
-        cells = []
-        for solver in solvers:
-            of = [r for r in records if r["solver"] == solver and group in (r["group"], "all")]
-            count = Counter(r["outcome"] for r in of)
-            wrong = f", {count['WRONG']} WRONG" if count["WRONG"] else ""
-            cells.append(f"{count['solved']} / {len(of)}{wrong}" if of else "–")
-        lines.append(f"| {group} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
 
 
 def draw(records: list[dict], file: Path) -> None:

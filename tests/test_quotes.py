@@ -61,8 +61,36 @@ def test_texts_follow_from_the_raw_numbers(tmp_path):
         "report.peers.siconos", "report.peers.getfem-0.over-ours", "report.ladder.frictionless",
         "report.growth.largest.over-elastic", "report.algebraic.A.return-over-newton", "elastic.table", "elastic.ranks",
         "elastic.worst-seconds", "solvers.study.table", "solvers.growth.table", "solvers.laws.table",
+        "solvers.frictionless.table", "report.stability.default.error",
     ):  # fmt: skip
         assert after[key] != before[key], key
+
+
+def test_counts_of_the_stress_matrix_are_those_of_its_outcomes(tmp_path):
+    """An answer that is refused, or wrong, changes the table, the counts and the sentences; a part of the matrix has none."""
+    shutil.copytree(ROOT / "docs", tmp_path / "docs")
+    file = tmp_path / "docs/report/report.json"
+    report = json.loads(file.read_text())
+    data = report["sections"]["stability"]["data"]
+    solved = [r for r in data["records"] if r["solver"] == "condensed" and r["outcome"] == "solved"]
+    before = {key: int(quotes.texts(ROOT)[f"report.stability.condensed.{key}"]) for key in ("solved", "scenes")}  # fmt: skip
+    solved[0]["outcome"], solved[1]["outcome"] = "refused", "WRONG"
+    file.write_text(json.dumps(report))
+    after = {key: text for key, text in quotes.texts(tmp_path).items() if "stability" in key}
+    assert (
+        int(after["report.stability.condensed.solved"]) == before["solved"] - 2 == len(solved) - 2
+    )
+    assert int(after["report.stability.condensed.scenes"]) == before["scenes"]
+    assert (
+        f"{before['solved'] - 2} / {before['scenes']}, 1 WRONG" in after["report.stability.table"]
+    )
+    assert (
+        f"{solved[0]['group']}: {solved[0]['name']}" in after["report.stability.condensed.refused"]
+    )
+    assert after["report.stability.wrong"].startswith("1 answer")
+    data["whole"] = False
+    file.write_text(json.dumps(report))
+    assert not [key for key in quotes.texts(tmp_path) if "stability" in key]
 
 
 def test_ratios_in_the_readme_are_marked():
