@@ -27,7 +27,7 @@ NEWTON = ((10.0, 0.1), (10.0, 0.3), (10.0, 0.03), (10.0, 1.0))
 SHORT = 0.1
 
 # Newton's method has failed when the residual was not halved in so many iterations.
-PATIENCE = 100
+PATIENCE = 50
 
 
 class FixedPoint:
