@@ -99,7 +99,9 @@ def growth(data):
             fit = data["fits"][solver].get(key)
             label = solver + (f", exponent {fit:.2f}" if fit is not None and key == "step" else "")
             ax.plot([row["unknowns"] for row in of], y, **{**style(solver), "label": label})
-        ax.set(xscale="log", yscale="log", xlabel="unknowns", ylabel=title)
+        # Where other work had taken the memory before, the quick report finds none that was added.
+        some = any((row[key] or 0) > 0 for row in rows)
+        ax.set(xscale="log", yscale="log" if some else "linear", xlabel="unknowns", ylabel=title)
     legend(figure, axes[0], ncols=2)
     sizes = {
         solver: [row["unknowns"] for row in rows if row["solver"] == solver]
