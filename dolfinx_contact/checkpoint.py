@@ -66,11 +66,13 @@ def load(problem, path) -> None:
                 if name not in file or len(file[name]) != size:
                     found = len(file[name]) if name in file else "none"
                     raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
-            parts = [_part(file, nodes, rank, len(asked)) for rank, nodes in enumerate(asked)]
+            orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
+            parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
             if "past" in file:
                 names = [f"contact{k}_nodes" for k in range(count)]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
-                past = file["past"][:, :, _positions(file["past_nodes"], order)]
+                at = _positions(file["past_nodes"], np.argsort(file["past_nodes"]), order)
+                past = file["past"][:, :, at]
     mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
     with raised_together(comm):
         for k, contact in enumerate(problem.contacts):
@@ -96,11 +98,11 @@ def _rows(problem, array: np.ndarray) -> np.ndarray:
     return array.reshape(-1, problem.u.function_space.dofmap.index_map_bs)
 
 
-def _part(file, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
+def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
     """The rows of one rank, which asks for ``nodes``."""
     part = {}
     for key, wanted in nodes.items():
-        at, prefix = _positions(file[key], wanted), key.removesuffix("nodes")
+        at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
         names = ["u", "before", "load", "free"] if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]
@@ -112,9 +114,8 @@ def _part(file, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
     return part
 
 
-def _positions(nodes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Where in ``nodes`` those wanted are."""
-    order = np.argsort(nodes)
+def _positions(nodes: np.ndarray, order: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Where in ``nodes``, which ``order`` sorts, those wanted are."""
     at = np.searchsorted(nodes, wanted, sorter=order)
     found = order[np.minimum(at, len(nodes) - 1)]
     if not np.array_equal(nodes[found], wanted):

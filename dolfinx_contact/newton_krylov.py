@@ -25,7 +25,7 @@ class NewtonKrylov:
     of the preconditioner of stiffness and springs.  No matrix but these is set up.
 
     Args:
-        system: Offers ``body``, ``correction(residual)``, ``tangent(x)`` and ``along(x, dx)``.
+        system: Offers ``body``, ``correction(residual)``, ``tangent(x)``, ``size(residual)`` and ``along(x, dx)``.
     """
 
     def __init__(self, system):
@@ -70,8 +70,7 @@ class NewtonKrylov:
         self._residual.array_w[self._system.body.fixed] = 0.0
         self._solver.solve(self._residual, self._step)
         dx, iterations = self._step.array_r.copy(), self._solver.getIterationNumber()
-        size, length = self._system.along(x, dx), 1.0
-        before = size(0.0)
+        size, before, length = self._system.along(x, dx), self._system.size(residual), 1.0
         while not size(length) <= (1 - 1e-4 * length) * before:
             length /= 2
             if length < SHORTEST:
