@@ -113,9 +113,7 @@ class ContactEquations:
 
     def size(self, residual: np.ndarray) -> float:
         """Norm of the forces out of balance at free degrees of freedom."""
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
-        return self.body.norm(residual)
+        return self.body.norm(self._free(residual))
 
     def correction(self, residual: np.ndarray) -> np.ndarray:
         """Displacement that removes the residual while the springs hold the contact nodes.
@@ -123,8 +121,7 @@ class ContactEquations:
         One application of the preconditioner: exact with a factorisation, one cycle of multigrid.
         After ``linearise`` the layers next to the plane are corrected first.
         """
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
+        residual = self._free(residual)
         near = 0.0
         if self._tangent is not None:
             near, residual = self._tangent.correct(residual)
@@ -182,12 +179,16 @@ class ContactEquations:
             contact.status = np.full_like(contact.status, Status.OPEN)
         return self._errors(self._assembled(x))
 
+    def _free(self, forces: np.ndarray) -> np.ndarray:
+        """Forces without what supports carry."""
+        forces = forces.copy()
+        forces[self.body.fixed] = 0.0
+        return forces
+
     def _assembled(self, x: np.ndarray) -> np.ndarray:
         values = self.problem.u.x.array.copy()
         values[: self.body.size] = x
-        forces = -self.body.internal_force(values)
-        forces[self.body.fixed] = 0.0  # what supports carry
-        return forces
+        return self._free(-self.body.internal_force(values))
 
     def _balance(self, forces: np.ndarray) -> np.ndarray:
         forces = forces.copy()
@@ -196,8 +197,7 @@ class ContactEquations:
         return forces
 
     def _errors(self, residual: np.ndarray) -> Errors:
-        residual = residual.copy()
-        residual[self.body.fixed] = 0.0
+        residual = self._free(residual)
         projection, defect = [np.zeros(0)], 0.0
         for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
             projection.append(projection_residual(contact, stiffness).ravel())
