@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import sys
 from pathlib import Path
-from time import process_time
+from time import perf_counter, process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "demos"))
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -25,6 +26,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 from mpi4py import MPI
 from punch import CASES, Parameters, Punch, programme
+from report_run import commit, now
 
 from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
 
@@ -51,7 +53,22 @@ def peak_memory(comm) -> int:
     return comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
-def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int, **mesh) -> dict:
+def bandwidth(comm, repeat: int = 5) -> float:
+    """Bytes per second of a + b -> c, all ranks at a time: what products with large matrices are bound by."""
+    a, b, c = (np.ones(20_000_000) for _ in range(3))
+    seconds = []
+    for _ in range(repeat):
+        comm.Barrier()
+        start = perf_counter()
+        np.add(a, b, out=c)
+        seconds.append(comm.allreduce(perf_counter() - start, op=MPI.MAX))
+    return comm.size * 3 * c.nbytes / min(seconds)
+
+
+def measure(
+    case: str, refine: int, steps: int | None, cycles: int, repeat: int, kept, **mesh
+) -> dict:
+    """Ratios of one run; ``kept(record)`` is called after every step, so that a run that is killed leaves them."""
     comm = MPI.COMM_WORLD
     before = peak_memory(comm)
     punch = Punch(Parameters(case=case, cycles=cycles, refine=refine), **mesh)
@@ -62,42 +79,54 @@ def measure(case: str, refine: int, steps: int | None, cycles: int, repeat: int,
     punch.approach.value = -displacements[0]
     body.refresh()
     b, _ = body.load()
-    yardsticks = [elastic_solve(body, b, repeat)]
-    unknowns = punch.head()["unknowns"]
+    record = dict(
+        case=case, unknowns=punch.head()["unknowns"], ranks=comm.size, commit=commit(), date=now(),
+        load=[os.getloadavg()[0]], elastic=[elastic_solve(body, b, repeat)], steps=[],
+    )  # fmt: skip
+    iterations, solve = record["elastic"][0]["iterations"], np.median(record["elastic"][0]["seconds"])  # fmt: skip
     if comm.rank == 0:
         print(
-            f"case {case}, {unknowns} unknowns, {comm.size} rank(s): elastic solve "
-            f"{yardsticks[0]['iterations']} iterations, {np.median(yardsticks[0]['seconds']):.3g} s",
+            f"case {case}, {record['unknowns']} unknowns, {comm.size} rank(s): elastic solve "
+            f"{iterations} iterations, {solve:.3g} s",
             flush=True,
         )
-    records = []
     for displacement in displacements:
         start = process_time()
         try:
-            record = punch.press(displacement)
+            of = punch.press(displacement)
+            of = {key: of[key] for key in ("open", "stick", "slip", "error", "iterations", "tangential_reaction_sum")}  # fmt: skip
         except dc.NotConverged as failure:
-            record = dict(displacement=displacement, failed=str(failure),
-                          iterations=failure.step.iterations)  # fmt: skip
-        record["seconds"] = comm.allreduce(process_time() - start, op=MPI.MAX)
-        records.append(record)
-        ratio = record["iterations"] / yardsticks[0]["iterations"]
-        ratio_s = record["seconds"] / np.median(yardsticks[0]["seconds"])
-        statuses = "{open} open, {stick} stick, {slip} slip, {error:.1e}"
-        outcome = record.get("failed") or statuses.format(**record)
+            of = dict(failed=str(failure), iterations=failure.step.iterations)
+        of["seconds"] = comm.allreduce(process_time() - start, op=MPI.MAX)
+        record["steps"].append(of)
+        record["bytes_per_unknown"] = (peak_memory(comm) - before) / record["unknowns"]
+        kept(record)
+        outcome = of.get("failed") or "{open} open, {stick} stick, {slip} slip, {error:.1e}".format(**of)  # fmt: skip
         if comm.rank == 0:
             print(
-                f"  {displacement:.4f} mm  {record['iterations']:5d} cycles ({ratio:.2f})  {record['seconds']:8.2f} s "
-                f"({ratio_s:.2f})  {outcome}",
+                f"  {displacement:.4f} mm  {of['iterations']:5d} cycles ({of['iterations'] / iterations:.2f})  "
+                f"{of['seconds']:8.2f} s ({of['seconds'] / solve:.2f})  {outcome}",
                 flush=True,
             )
-        if "failed" in record:
+        if "failed" in of:
             break
-    yardsticks.append(elastic_solve(body, b, repeat))
-    peak = peak_memory(comm)
-    return dict(
-        case=case, refine=refine, unknowns=unknowns, ranks=comm.size, elastic=yardsticks,
-        steps=records, bytes_per_unknown=(peak - before) / unknowns,
-    )  # fmt: skip
+    record["elastic"].append(elastic_solve(body, b, repeat))
+    record["bandwidth"] = bandwidth(comm)
+    record["load"].append(os.getloadavg()[0])
+    kept(record)
+    return record
+
+
+def keep(file: Path, record: dict) -> None:
+    """Write a record to the file, a line each, in place of the one of the same case, unknowns and ranks."""
+
+    def which(of):
+        return of["ranks"], of["unknowns"], of["case"]
+
+    records = {which(of): of for of in (json.loads(file.read_text()) if file.exists() else [])}
+    records[which(record)] = record
+    lines = (json.dumps(records[key], separators=(",", ":")) for key in sorted(records))
+    file.write_text("[" + ",\n".join(lines) + "]\n")
 
 
 def main(argv=None) -> None:
@@ -106,22 +135,26 @@ def main(argv=None) -> None:
     parser.add_argument("--refine", type=int, nargs="*", default=[0, 1])
     parser.add_argument("--steps", type=int, help="only the first ones")
     parser.add_argument("--cycles", type=int, default=1)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--repeat", type=int, default=3, help="elastic solves, before and after the steps")  # fmt: skip
+    parser.add_argument(
+        "--json", type=Path, help="where records go, each in place of its predecessor"
+    )
     parser.add_argument(
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
     )
     options = parser.parse_args(argv)
     CASES["frictionless"] = dict(mu=0.0)
     mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
+    writes = options.json and MPI.COMM_WORLD.rank == 0
     results = []
     for refine in options.refine:
         for case in options.cases.split(","):
             results.append(
-                measure(case, refine, options.steps, options.cycles, options.repeat, **mesh)
-            )
-            if options.json and MPI.COMM_WORLD.rank == 0:
-                options.json.write_text(json.dumps(results, indent=1) + "\n")
+                measure(
+                    case, refine, options.steps, options.cycles, options.repeat,
+                    lambda record: writes and keep(options.json, record), **mesh,
+                )
+            )  # fmt: skip
     if MPI.COMM_WORLD.rank == 0:
         # Here, because records of the report are kept as long as what they were measured with is the same.
         from elastic_table import TITLES, row

@@ -123,7 +123,7 @@ def growth(data):
         chosen.append(f"for {what} at {len(of) - len(wrong)} of {len(of)} sizes" + f", not at {', '.join(wrong)}" * bool(wrong))  # fmt: skip
     yield "growth", figure, (
         (f"Seconds a step grow with the unknowns to the power of: {fits}. " if fits else "")
-        + f"At {largest['unknowns']:,} unknowns one of these large steps (pressed in one, raised in two) takes "
+        + f"At {largest['unknowns']:,} unknowns one of these steps (pressed in one, raised by two of the paper's ten) takes "
         f"{largest['over_elastic']:.1f} elastic solves ({largest['solver']}) and {largest['bytes'] / largest['unknowns'] / 1e3:.1f} kB an unknown. "
         + (f"solver=None takes the fastest {'; '.join(chosen)}." if data["choices"] else "What solver=None takes was not measured.")
         + "".join(f" Refused: {text}." for text in data["refused"])

@@ -23,7 +23,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 OWN = [ROOT / name for name in ("dolfinx_contact", "benchmarks", "demos", "tests")]
-LIMIT = 900  # seconds of wall time after which a measurement counts as failed
+LIMIT = 1800  # seconds of wall time after which a measurement counts as failed
 
 
 @dataclass(frozen=True)
