@@ -33,6 +33,7 @@ def texts(root: Path = ROOT) -> dict[str, str]:
         "elastic": elastic_table.claims(read("elastic_ratio.json")),
         "solvers": solvers_table.claims(read("solvers.json")),
         "kernel": kernel_table.claims((root / "docs/kernel_bench.csv").read_text()),
+        "ferrari": kernel_table.ferrari(read("ferrari.json")),
         "study": read("study/study.json"),
     }
     return {f"{name}.{key}": text for name, of in sources.items() for key, text in of.items()}

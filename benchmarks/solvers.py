@@ -16,7 +16,6 @@ import json
 import os
 import sys
 from pathlib import Path
-from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "demos"))
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -25,6 +24,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 from punch import CASES, Parameters, Punch, programme
 from report_run import Memory, commit, machine, now
+from solvers_operator import assembly, first_steps, operator, shares, timed
 from solvers_table import claims
 
 from dolfinx_contact import _kernel
@@ -37,13 +37,6 @@ LAWS = {
     "associated, (0.3, 0.15)": dict(mu=(0.3, 0.15)),
     "case C": CASES["C"],
 }
-
-
-def timed(function, *arguments) -> tuple[float, object]:
-    """Processor seconds of a call, and its result."""
-    start = process_time()
-    result = function(*arguments)
-    return process_time() - start, result
 
 
 def steps(case: str, solver: str, count: int | None = None, cycles: int = 1, **mesh) -> dict:
@@ -84,10 +77,10 @@ def growth(meshes: list) -> list[dict]:
     ]  # fmt: skip
 
 
-def cycle(meshes: list, repeat: int = 3) -> list[dict]:
-    """One cycle without friction on ever finer meshes, time and again, interleaved."""
+def cycle(meshes: list, case: str = "frictionless", repeat: int = 3) -> list[dict]:
+    """One cycle on ever finer meshes, time and again, interleaved."""
     return [
-        steps("frictionless", solver, divisions=divisions, layers=layers)
+        steps(case, solver, divisions=divisions, layers=layers)
         for _ in range(repeat) for divisions, layers in meshes for solver in SOLVERS
     ]  # fmt: skip
 
@@ -117,31 +110,21 @@ def laws(first: int = 2, last: int = 31) -> list[dict]:
     return rows
 
 
-def operator(repeat: int = 7) -> list[dict]:
-    """W with its inverse, without friction and with it, and a factorisation of K, interleaved."""
-    problems = {case: Punch(Parameters(case=case)).problem for case in ("frictionless", "C")}
-    rows = [dict(case=case, operator=[], factor=[]) for case in problems]
-    for _ in range(repeat):
-        for row, problem in zip(rows, problems.values()):
-            body = problem.body
-            body.refresh()
-            body._elastic = None
-            row["factor"].append(timed(body.solve, np.zeros(body.size))[0])
-            row["operator"].append(timed(CondensedBody, body, problem.contacts)[0])
-    return rows
-
-
 TWO_LAYERS = [(divisions, 2) for divisions in (4, 8, 12, 16)]
 PUNCH = [(divisions, divisions // 2) for divisions in (8, 12, 16)]
-WITHOUT = (8, 10, 12, 14, 16)  # friction
+FINER = (8, 10, 12, 14, 16)  # divisions
 PARTS = {
     "study": study,
     "growth": lambda: growth(TWO_LAYERS),
     "punch": lambda: growth(PUNCH),
-    "frictionless": lambda: cycle([(divisions, 2) for divisions in WITHOUT]),
-    "frictionless-punch": lambda: cycle([(divisions, divisions // 2) for divisions in WITHOUT]),
+    "frictionless": lambda: cycle([(divisions, 2) for divisions in FINER]),
+    "frictionless-punch": lambda: cycle([(divisions, divisions // 2) for divisions in FINER]),
+    "cycle-C": lambda: cycle([(divisions, 2) for divisions in FINER[:3]], "C"),
     "laws": laws,
     "operator": operator,
+    "assembly": assembly,
+    "shares": shares,
+    "first-steps": lambda: first_steps([16, 20, 24]),
 }
 
 

@@ -61,19 +61,25 @@ def _study(rows):
     }
 
 
+MEMORY = {"kept": "kept (MB)", "estimate": "estimate (MB)", "peak": "measured peak (MB)"}
+
+
+def _memory(row) -> list[str]:
+    """What W and its inverse keep, what the default reckons with, and the peak, in megabytes."""
+    return [f"{row[key] / 1e6:.0f}" for key in MEMORY]
+
+
 def _growth(rows):
-    lines, share, kept = [], [], []
+    lines, share = [], []
     for newton, fixed in _pairs(rows):
         nodes, steps = newton["nodes"], len(newton["times"]) - 1
         gain = (_later(fixed) - _later(newton)) / steps
         share.append((nodes, _later(newton) / _later(fixed)))
-        lines.append([nodes, newton["unknowns"], f"{_later(newton):.2f}", f"{_later(fixed):.2f}",
-            f"{newton['operator']:.2f}", f"{newton['operator'] / gain:.0f}" if gain > 0 else "never"])  # fmt: skip
-        kept.append([nodes, newton["unknowns"], *(f"{newton[key] / 1e6:.0f}" for key in ("kept", "estimate", "peak"))])  # fmt: skip
+        lines.append([nodes, newton["unknowns"], f"{_later(newton):.2f}", f"{_later(fixed):.2f}", f"{newton['operator']:.2f}",
+            f"{newton['operator'] / gain:.0f}" if gain > 0 else "never", *_memory(newton)])  # fmt: skip
     titles = ["contact nodes", "unknowns", "condensed (s)", "fixed point (s)", "W and inverse (s)",
-        "paid back after steps"]  # fmt: skip
-    sizes = ["contact nodes", "unknowns", "W and inverse kept (MB)", "estimate (MB)", "measured peak (MB)"]  # fmt: skip
-    return {"table": table(titles, lines), "memory": table(sizes, kept), "even": _even(share)}
+        "paid back after steps", *MEMORY.values()]  # fmt: skip
+    return {"table": table(titles, lines), "even": _even(share)}
 
 
 def _even(share) -> str:
@@ -117,7 +123,58 @@ def _operator(rows):
     }  # fmt: skip
 
 
+def _assembly(rows):
+    """Ratios to the first of the ways."""
+    seconds = {row["way"]: float(np.median(row["seconds"])) for row in rows}
+    over = {way.replace(" ", "-"): ratio(value / seconds["blocks"]) for way, value in seconds.items()}  # fmt: skip
+    return {
+        "blocks": f"{seconds['blocks']:.2f} s", "dense-over-blocks": over["dense"],
+        "one-by-one-over-blocks": over["one-by-one"], "apart": f"{max(row['apart'] for row in rows):.0e}",
+    }  # fmt: skip
+
+
+def _shares(rows):
+    titles = ["case", "a step (ms)", "Newton's method (ms)", "back-solves with K (ms)", "F (ms)", "all else (ms)",
+        "an iteration (ms)"]  # fmt: skip
+    lines, others = [], 0.0
+    for row in rows:
+        whole, of, steps = sum(row["times"]), row["seconds"], len(row["times"])
+        spent = [whole, of["newton"], of["back_solves"], of["F"], whole - sum(of.values())]
+        others += whole - of["newton"]
+        each = of["newton"] / sum(row["iterations"])
+        lines.append([row["case"], *(f"{1e3 * t / steps:.1f}" for t in spent), f"{1e3 * each:.1f}"])
+    return {"table": table(titles, lines), "without-newton": f"{others:.1f} s"}
+
+
+def _first_steps(rows):
+    titles = ["contact nodes", "unknowns", "W (s)", "inverse (s)", "Newton's method (s)", "iterations", "slipping nodes",
+        "error"]  # fmt: skip
+    lines, inverse, each = [], [], []
+    for row in rows:
+        of, nodes = row["seconds"], row["nodes"]
+        inverse.append((nodes, of["operator"] - of["W"]))
+        each.append((nodes, of["newton"] / row["iterations"]))
+        lines.append([nodes, row["unknowns"], *(f"{t:.1f}" for t in (of["W"], inverse[-1][1], of["newton"])),
+            row["iterations"], row["slipping"], f"{row['error']:.0e}"])  # fmt: skip
+    alone = all(len(row["branches"]) == 1 for row in rows)
+    said = (
+        "Newton's method itself solved all"
+        if alone
+        else "Not all were solved by Newton's method itself"
+    )
+    return {
+        "table": table(titles, lines), "solved": said,
+        "inverse-grows": _exponent(inverse), "iteration-grows": _exponent(each),
+    }  # fmt: skip
+
+
+def _exponent(of) -> str:
+    """Slope of a straight line through the logarithms of pairs."""
+    return f"{np.polyfit(*np.log(np.array(of)).T, 1)[0]:.1f}"
+
+
 QUOTED = {
     "study": _study, "growth": _growth, "punch": _growth, "frictionless": _cycle, "frictionless-punch": _cycle,
-    "laws": _laws, "operator": _operator,
+    "cycle-C": _cycle, "laws": _laws, "operator": _operator, "assembly": _assembly, "shares": _shares,
+    "first-steps": _first_steps,
 }  # fmt: skip

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Writes docs/ferrari.svg: what Ferrari's closed form loses of the projection on the friction cone.
+"""Writes docs/ferrari.svg and ferrari.json: what Ferrari's closed form loses of the projection on the friction cone.
 
 Both methods solve the quartic of [dSFMH07, Section 2] in R = r_n,
 (d_x d_y)^2 = (mu_x tau_x d_y)^2 + (mu_y tau_y d_x)^2 with d_i = (1 + mu_i^2) R - tau_n, in double
@@ -9,6 +9,7 @@ precision for the same points; the reference has 60 digits. Run it in the reposi
     .venv/bin/python docs/ferrari.py
 """
 
+import json
 from pathlib import Path
 
 import matplotlib
@@ -70,16 +71,15 @@ def exact(tau, mu):
     return [x * m * m * R / ((1 + m * m) * R - n) for m, x in zip(mu, t, strict=True)] + [R]
 
 
-def error(points, tau, mu):
+def error(points, tau, r):
     """Distance of the best of some points from the exact projection, in units of rounding of |tau|."""
-    r = exact(tau, mu)
     distances = [
         float(mp.sqrt(sum((mp.mpf(a) - b) ** 2 for a, b in zip(point.tolist(), r, strict=True))))
         / (UNIT * np.linalg.norm(tau))
         for point in points
         if np.all(np.isfinite(point))
     ]
-    return min(distances, default=np.inf)
+    return min(distances, default=1 / UNIT)  # nothing left of it
 
 
 def slipping_points(rng, mu, count):
@@ -91,25 +91,30 @@ def slipping_points(rng, mu, count):
             yield tau
 
 
-def panel(axes, where, label, cases):
-    """Errors of both methods for points that `cases` gives for each abscissa."""
-    for method, colour, name in (
-        (ferrari, "tab:red", "Ferrari, best of four roots"),
-        (lambda tau, mu: project_cone(tau[None], mu), "tab:blue", "project_cone"),
-    ):
-        errors = [[error(method(tau, mu), tau, mu) for tau, mu in cases(x)] for x in where]
-        axes.loglog(
-            where, np.maximum(np.max(errors, axis=1), 0.1), color=colour, label=f"{name}: worst"
-        )
-        axes.loglog(
-            where,
-            np.maximum(np.median(errors, axis=1), 0.1),
-            "--",
-            color=colour,
-            label=f"{name}: median",
-        )
+METHODS = {
+    "ferrari": (ferrari, "tab:red", "Ferrari, best of four roots"),
+    "project_cone": (lambda tau, mu: project_cone(tau[None], mu), "tab:blue", "project_cone"),
+}
+
+
+def panel(axes, where, label, cases) -> dict:
+    """Errors of both methods for points that `cases` gives for each abscissa: drawn, and as a record."""
+    errors = {name: [] for name in METHODS}
+    for x in where:
+        points = [(tau, mu, exact(tau, mu)) for tau, mu in cases(x)]
+        for name, (method, *_) in METHODS.items():
+            errors[name].append([error(method(tau, mu), tau, r) for tau, mu, r in points])
+    record = {
+        name: dict(worst=np.max(of, axis=1).tolist(), median=np.median(of, axis=1).tolist())
+        for name, of in errors.items()
+    }
+    for name, (_, colour, title) in METHODS.items():
+        for which, style in (("worst", "-"), ("median", "--")):
+            drawn = np.maximum(record[name][which], 0.1)
+            axes.loglog(where, drawn, style, color=colour, label=f"{title}: {which}")
     axes.axhline(4, color="0.7", zorder=0)
     axes.set_xlabel(label)
+    return record | dict(where=list(where))
 
 
 def main():
@@ -129,13 +134,14 @@ def main():
         normal = np.linalg.norm(t / mu, axis=1) * (1 - distance)
         return [(tau, mu) for tau in np.column_stack([t, normal])]
 
-    panel(
+    record = {}
+    record["ratio"] = panel(
         left,
         np.append(1.1, 10.0 ** np.arange(0.5, 8.1, 0.5)),
         "ratio of the coefficients of friction",
         by_ratio,
     )
-    panel(
+    record["distance"] = panel(
         right,
         10.0 ** np.arange(-14, -0.5, 1),
         "relative distance from the friction cone",
@@ -144,6 +150,7 @@ def main():
     left.set_ylabel("error of the projection\nin units of rounding of |τ|")
     right.legend(fontsize="small", loc="upper right")
     figure.savefig(Path(__file__).with_suffix(".svg"), metadata={"Date": None})
+    Path(__file__).with_suffix(".json").write_text(json.dumps(record, indent=1) + "\n")
 
 
 if __name__ == "__main__":
