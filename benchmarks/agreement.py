@@ -3,12 +3,11 @@
 """How far the results of the fixed point are from those of Newton's method over a cycle of the punch.
 
 Each solver goes through its own history. Differences are relative to the largest nodal reaction, and to the
-largest total, of the cycle so far.
+largest total, of the cycle so far.  Run by variants.py.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -47,18 +46,3 @@ def _results(punch, displacement) -> tuple[np.ndarray, np.ndarray]:
     punch.press(displacement)
     r = punch.contact.reaction
     return r, np.append(r.sum(axis=0), np.linalg.norm(r[:, :2], axis=1).sum())
-
-
-def main(argv=None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--refine", type=int, default=0)
-    parser.add_argument("--tol", type=float, nargs="*", default=[1e-10, 1e-11, 1e-12])
-    options = parser.parse_args(argv)
-    for case in "ABC":
-        for tol in options.tol:
-            for name, (nodal, totals) in differences(case, tol, options.refine).items():
-                print(f"| {case} | {tol:.0e} | {name} | {nodal:.1e} | {totals:.1e} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -24,6 +24,7 @@ def texts(root: Path = ROOT) -> dict[str, str]:
     import kernel_table
     import report_claims
     import solvers_table
+    import variants_table
 
     def read(file):
         return json.loads((root / "docs" / file).read_text())
@@ -32,6 +33,7 @@ def texts(root: Path = ROOT) -> dict[str, str]:
         "report": report_claims.claims(read("report/report.json")["sections"]),
         "elastic": elastic_table.claims(read("elastic_ratio.json")),
         "solvers": solvers_table.claims(read("solvers.json")),
+        "variants": variants_table.claims(read("variants.json")),
         "kernel": kernel_table.claims((root / "docs/kernel_bench.csv").read_text()),
         "ferrari": kernel_table.ferrari(read("ferrari.json")),
         "study": read("study/study.json"),

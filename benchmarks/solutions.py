@@ -5,14 +5,15 @@
 Existence is certain for an elastic body, uniqueness is not. Every step is condensed to its contact nodes and
 solved from many random starts; each answer is judged by NumPy functions of the tests. The fixed point then
 does the step from the same history, which is Newton's; solution 0 is the one that Newton's method found there.
+Run by variants.py.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "demos"))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -20,6 +21,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
+import scenes
 from condensed_scenes import judge
 from punch import CASES, Parameters, Punch, programme
 
@@ -67,54 +69,78 @@ def number(found, r, W, q, friction) -> int:
     return len(found) - 1
 
 
-def examine(case: str, refine: int, steps: int | None, starts: int, report=print) -> list[dict]:
-    """One record per step; ``by`` has the number of the solution that each map of the fixed point finds."""
-    parameters = Parameters(case=case, refine=refine, tol=TOL)
-    punches = {name: Punch(parameters, solver=make()) for name, make in SOLVERS.items()}
-    leader, records, W = Punch(parameters, solver=dc.CondensedNewton()), [], None
+def described(found, W, q, friction) -> list[dict]:
+    """What a reader wants to know of each solution; ``apart`` is the largest nodal difference to another one."""
+    reactions = np.array([r for r, *_ in found])
+    slips = np.array([(q + np.tensordot(W.reshape(*q.shape, *q.shape), r, 2))[:, :2] for r in reactions])  # fmt: skip
+    rows = []
+    for (r, hits, errors), slip in zip(found, slips):
+        inside = np.linalg.norm(r[:, :2] / friction.mu, axis=1) < (1 - 1e-9) * r[:, 2]
+        rows.append(dict(
+            hits=hits, error=float(max(errors)), open=int((r[:, 2] == 0).sum()), stick=int(inside.sum()),
+            normal=float(r[:, 2].sum()), tangential=float(np.linalg.norm(r[:, :2], axis=1).sum()),
+            work=float(-(r[:, :2] * slip).sum()), apart=float(np.abs(reactions - r).max() / np.abs(reactions).max()),
+            slips_apart=float(np.abs(slips - slip).max() / np.abs(slips).max()),
+        ))  # fmt: skip
+    return rows
+
+
+def examine(make, programme: list, starts: list[int], report=print) -> list[dict]:
+    """One record per step; ``by`` has the number of the solution that each map of the fixed point finds.
+
+    Args:
+        make: Gives for a solver a scene: ``problem``, ``contact``, and ``move``, which takes an entry of ``programme``.
+        programme: Where the top is at the end of each step.
+        starts: Random starts in each step.
+    """
+    others = {name: make(solver()) for name, solver in SOLVERS.items()}
+    leader, records, W = make(dc.CondensedNewton()), [], None
     friction = leader.contact.friction
-    for k, displacement in enumerate(programme(parameters)[:steps]):
+    for k, (top, count) in enumerate(zip(programme, starts, strict=True)):
         with tempfile.NamedTemporaryFile(suffix=".npz") as checkpoint:
             leader.problem.save(checkpoint.name)
-            leader.press(displacement)
+            leader.move(top)
+            leader.problem.solve()
             contact, by = leader.contact, {}
             W = leader.problem._condensed.compliance() if W is None else W
             w = np.column_stack((contact.slip_increment, contact.gap))
             q = w - (W @ contact.reaction.ravel()).reshape(w.shape)
-            found = solutions(W, q, friction, contact.reaction.copy(), starts, seed=k)
-            for name, punch in punches.items():
-                punch.problem.load(checkpoint.name)
+            found = solutions(W, q, friction, contact.reaction.copy(), count, seed=k)
+            by_newton = len(found)
+            for name, scene in others.items():
+                scene.problem.load(checkpoint.name)
+                scene.move(top)
                 try:
-                    punch.press(displacement)
-                    by[name] = number(found, punch.contact.reaction, W, q, friction)
+                    step = scene.problem.solve()
+                    by[name] = dict(number=number(found, scene.contact.reaction, W, q, friction), iterations=step.iterations)  # fmt: skip
                 except dc.NotConverged as failure:
-                    by[name] = f"not converged, {failure.step.error:.0e}"
-        largest = np.abs(found[0][0]).max()
-        spread = max(np.abs(r - found[0][0]).max() / largest for r, *_ in found)
-        sums = [np.linalg.norm(r[:, :2], axis=1).sum() for r, *_ in found]
+                    by[name] = dict(number=None, iterations=failure.step.iterations, error=failure.step.error)  # fmt: skip
         record = dict(
-            step=k + 1, displacement=displacement, solutions=len(found), hits=[n for _, n, _ in found],
-            spread=spread, sums=sums, errors=[e for *_, e in found], by=by,
+            step=k + 1, top=top, nodes=len(contact.nodes), starts=count, by_newton=by_newton,
+            solutions=described(found, W, q, friction), by=by,
         )  # fmt: skip
         records.append(record)
-        worst = np.max(record["errors"])
-        report(
-            f"{k + 1:3} {displacement:.3f} mm: {sum(record['hits'])} of {starts} starts converged, {len(found)} "
-            f"solution(s), errors <= {worst:.0e}, apart {spread:.1e}, sum|r_t| {min(sums):.7g} to {max(sums):.7g}; {by}"
-        )
+        report(f"{k + 1:3} {top}: {len(found)} solution(s), {by_newton} of them from {count} starts; {by}", flush=True)  # fmt: skip
     return records
 
 
-def main(argv=None) -> list[dict]:
-    parser = argparse.ArgumentParser(description=__doc__)
+def punch(case: str, refine: int):
+    """The punch, and its programme."""
     CASES["crossed"] = CROSSED
-    parser.add_argument("--case", choices=CASES, default="crossed")
-    parser.add_argument("--refine", type=int, default=-1)
-    parser.add_argument("--steps", type=int, help="only the first ones")
-    parser.add_argument("--starts", type=int, default=200)
-    options = parser.parse_args(argv)
-    return examine(options.case, options.refine, options.steps, options.starts)
+    parameters = Parameters(case=case, refine=refine, tol=TOL)
+
+    def make(solver):
+        made = Punch(parameters, solver=solver)
+        return SimpleNamespace(problem=made.problem, contact=made.contact, move=lambda top: setattr(made.approach, "value", -top))  # fmt: skip
+
+    return make, programme(parameters)
 
 
-if __name__ == "__main__":
-    main()
+def block():
+    """A block of 32 bricks, pressed and dragged, then dragged back; a step of tests/test_solutions.py."""
+
+    def make(solver):
+        made = scenes.block(**CROSSED, solver=solver, tol=TOL)
+        return SimpleNamespace(problem=made.problem, contact=made.contact, move=lambda top: made.move_top(*top))  # fmt: skip
+
+    return make, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)]

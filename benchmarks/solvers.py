@@ -128,9 +128,10 @@ PARTS = {
 }
 
 
-def main(argv=None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
-    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
+def main(argv=None, parts=PARTS, claims=claims, description=__doc__) -> None:
+    """Measure parts, and put each into the records as soon as it is there."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
+    parser.add_argument("--parts", nargs="+", choices=parts, default=list(parts))
     parser.add_argument("--json", type=Path, help="records to put the parts into")
     options = parser.parse_args(argv)
     CASES["frictionless"] = LAWS["frictionless"]
@@ -138,7 +139,7 @@ def main(argv=None) -> None:
     records = json.loads(file.read_text()) if file and file.exists() else {}
     for part in options.parts:
         load = [os.getloadavg()[0]]
-        rows = PARTS[part]()
+        rows = parts[part]()
         load.append(os.getloadavg()[0])
         records[part] = dict(rows=rows, date=now(), commit=commit(), processor=machine()["processor"], load=load)  # fmt: skip
         for key, text in claims({part: records[part]}).items():

@@ -3,7 +3,7 @@
 """A step of the punch that has two solutions: case C, 35,451 unknowns, unloading to 0.060 mm.
 
 Both are found by the fixed point with multigrid from the same history, with different metrics rho, and
-are judged by NumPy functions of the tests with a stiffness that is assembled apart.
+are judged by NumPy functions of the tests with a stiffness that is assembled apart.  Run by variants.py.
 """
 
 from __future__ import annotations
@@ -43,20 +43,20 @@ def judged(punch, K, before: np.ndarray, previous: float) -> float:
     return error(normal_stiffness, mu, p, contact.reaction, gap, slip, forces, previous)
 
 
-def main() -> None:
+def both() -> list[dict]:
+    """The solution of each metric, and how far they are apart."""
     punch = Punch(Parameters(case="C", refine=1, tol=1e-10), solver=dc.FixedPoint())
     problem, contact = punch.problem, punch.contact
     problem.body._options = MULTIGRID
     displacements = programme(punch.parameters)
     for displacement in displacements[:STEP]:
-        record = punch.press(displacement)
-        print(f"{displacement:.3f} mm: {record['iterations']} iterations", flush=True)
+        punch.press(displacement)
     derivative = ufl.derivative(punch.F, punch.u, ufl.TrialFunction(punch.V))
     A = dolfinx.fem.petsc.assemble_matrix(dolfinx.fem.form(derivative))
     A.assemble()
     indptr, indices, values = A.getValuesCSR()
     K = csr_matrix((values, indices, indptr))
-    found = []
+    rows, reactions, slips, statuses = [], [], [], []
     problem.tol = TOL
     with tempfile.TemporaryDirectory() as directory:
         problem.save(f"{directory}/history.npz")
@@ -65,18 +65,18 @@ def main() -> None:
             problem.solver = dc.FixedPoint(rho=rho)
             before, previous = punch.u.x.array.copy(), float(np.linalg.norm(contact.reaction))
             record = punch.press(displacements[STEP])
-            forces = np.linalg.norm(contact.reaction[:, :2], axis=1).sum()
-            print(
-                f"{displacements[STEP]:.3f} mm, rho {rho}: {record['iterations']} iterations, errors "
-                f"{record['error']:.1e}, judged {judged(punch, K, before, previous):.1e}, {record['stick']} "
-                f"stick, {record['slip']} slip, sum of tangential forces {forces:.2f} N"
-            )
-            found.append((contact.reaction.copy(), contact.status.copy()))
-    (first, status), (second, other) = found
-    apart = np.abs(first - second).max(axis=1) / np.abs(first).max()
-    print(f"reactions differ by {apart.max():.1e} of the largest; statuses at")
-    print(contact.x[status != other])
-
-
-if __name__ == "__main__":
-    main()
+            kept = ("iterations", "error", "stick", "slip", "normal_reaction", "tangential_reaction_sum")  # fmt: skip
+            rows.append({key: record[key] for key in kept} | dict(
+                solver="FixedPoint()" if rho is None else f"FixedPoint(rho={rho:g})",
+                judged=judged(punch, K, before, previous), displacement=displacements[STEP],
+            ))  # fmt: skip
+            reactions.append(contact.reaction.copy())
+            slips.append(contact.slip_increment.copy())
+            statuses.append(contact.status.copy())
+    apart, slips_apart = (
+        np.abs(one - other).max(axis=1) / np.abs(one).max() for one, other in (reactions, slips)
+    )
+    for row in rows:
+        row.update(apart=float(apart.max()), beyond=int((apart > 1e-3).sum()), slips_apart=float(slips_apart.max()),
+            where=contact.x[statuses[0] != statuses[1]].tolist())  # fmt: skip
+    return rows
