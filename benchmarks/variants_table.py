@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What docs/method.md quotes of the records of variants.py: tables, iterations, differences between solutions."""
+"""What docs/method.md and docs/variants.md quote of the records of variants.py: tables, iterations, differences between solutions."""
 
 from __future__ import annotations
 
@@ -16,11 +16,8 @@ def claims(parts: dict) -> dict[str, str]:
     for part, quoted in QUOTED.items():
         if part in parts:
             found |= {f"{part}.{key}": text for key, text in quoted(parts[part]["rows"]).items()}
-    for together, quoted in TOGETHER.items():
-        if parts.keys() >= set(together):
-            found |= quoted(
-                *({row["name"]: row for row in parts[part]["rows"]} for part in together)
-            )
+    if parts.keys() >= {"unloading", "unloading-fine"}:
+        found |= _unloading(*({row["name"]: row for row in parts[part]["rows"]} for part in ("unloading", "unloading-fine")))  # fmt: skip
     days, processors, commits = (
         " and ".join(dict.fromkeys(record[key][:length] for record in parts.values()))
         for key, length in (("date", 10), ("processor", None), ("commit", None))
@@ -87,34 +84,34 @@ def _steps(row) -> str:
 
 
 def _unloading(coarse, fine):
-    """The first unloading on two meshes."""
-    lines = []
+    """The first unloading on two meshes; Newton's method alone is named by its metrics."""
+    lines, metrics = [], []
     for name, row in coarse.items():
-        if name.endswith(WITHOUT):
-            continue
-        over = [ratio(of[name]["seconds"] / of[AS_IT_IS]["seconds"]) if name in of else "–" for of in (coarse, fine)]  # fmt: skip
-        lines.append([name, _steps(coarse.get(name + WITHOUT)), _steps(row), over[0], _steps(fine.get(name)), over[1]])  # fmt: skip
-    unknowns, more = (f"{of[AS_IT_IS]['unknowns']:,}" for of in (coarse, fine))
-    titles = ["variant", f"{unknowns}: without the tangent", "with it", "seconds", f"{more}: with it", "seconds"]  # fmt: skip
+        if name[0].isdigit():
+            metrics.append([name, _steps(row), _steps(fine.get(name))])
+        elif not name.endswith(WITHOUT):
+            over = [ratio(of[name]["seconds"] / of[AS_IT_IS]["seconds"]) if name in of else "–" for of in (coarse, fine)]  # fmt: skip
+            lines.append([name, _steps(coarse.get(name + WITHOUT)), _steps(row), over[0], _steps(fine.get(name)), over[1]])  # fmt: skip
+    usual = coarse[AS_IT_IS]
+    same = [row["seconds"] / usual["seconds"] for row in coarse.values() if row["error"] == usual["error"]]  # fmt: skip
+    meshes = [f"{of[AS_IT_IS]['unknowns']:,}" for of in (coarse, fine)]
+    titles = ["variant", f"{meshes[0]}: without the tangent", "with it", "seconds", f"{meshes[1]}: with it", "seconds"]  # fmt: skip
     return {
         "unloading.table": table(titles, lines),
+        "unloading.scatter": f"{ratio(min(same))} to {ratio(max(same))}",
         "unloading-fine.without": _steps(fine[AS_IT_IS + WITHOUT]),
-    }
-
-
-def _newton(coarse, fine, raised):
-    """Newton's method in the first unloading on the finer mesh, and in a larger step."""
-    more, larger = (f"{of[AS_IT_IS]['unknowns']:,}" for of in (fine, raised))
-    metrics = [name for name in raised if name in fine and name not in coarse]
-    titles = ["rho over nodal stiffness, along the normal, along slip", f"first unloading, {more}", f"raised to 0.06 mm, {larger}"]  # fmt: skip
-    rules = [
-        [name, _steps(row), ratio(row["seconds"] / raised[AS_IT_IS]["seconds"]), f"{row['tangential']:.2f}" if row["solved"] else "–"]
-        for name, row in raised.items() if name not in metrics
-    ]  # fmt: skip
-    return {
-        "newton.table": table(titles, [[name, _steps(fine[name]), _steps(raised[name])] for name in metrics]),
-        "raised.table": table(["rule", "iterations", "seconds", "sum of tangential forces (N)"], rules),
+        "newton.table": table(["rho over nodal stiffness, along the normal, along slip", *meshes], metrics),
     }  # fmt: skip
+
+
+def _raised(rows):
+    """A larger step, with Newton's method and without."""
+    lines = [
+        [row["name"], _steps(row), ratio(row["seconds"] / rows[0]["seconds"]), f"{row['tangential']:.2f}" if row["solved"] else "–"]
+        for row in rows
+    ]  # fmt: skip
+    titles = ["rule", "iterations", "seconds", "sum of tangential forces (N)"]
+    return {"table": table(titles, lines), "unknowns": f"{rows[0]['unknowns']:,}"}
 
 
 # -- bodies of the stress matrix -----------------------------------------------------------------------
@@ -233,8 +230,5 @@ QUOTED = {
     "coarse": _programme,
     "paper": _programme,
     "order": _pairs,
-}
-TOGETHER = {
-    ("unloading", "unloading-fine"): _unloading,
-    ("unloading", "unloading-fine", "raised"): _newton,
+    "raised": _raised,
 }

@@ -1,4 +1,4 @@
-"""Programs of the documentation that compare solvers (benchmarks/agreement.py, benchmarks/solutions.py)."""
+"""Programs of the documentation that compare solvers and variants of them (benchmarks/variants.py and what it runs)."""
 
 import sys
 from pathlib import Path
@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("gmsh")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import agreement
+import hard_step
 import scenes
 import solutions
 
@@ -43,3 +44,16 @@ def test_a_step_with_several_solutions():
             np.abs(reaction - other).max() < 1e-2 * np.abs(reaction).max() for other, *_ in found
         ]
         assert sum(equal) == 1
+
+
+def test_a_variant_is_another_method_for_as_long_as_it_runs(tmp_path):
+    """Without its tangent, and with Newton's method at once, the fixed point comes to the same forces another way;
+    after that it is what it was."""
+    step, usual = hard_step.HardStep(tmp_path / "loaded.npz", refine=-1), hard_step.AS_IT_IS
+    variants = [usual, usual.without_tangent(), hard_step.NEWTON[-1], usual]
+    first, without, newton, last = [step.row(variant) for variant in variants]
+    for other in (without, newton):
+        assert other["solved"] and other["error"] != first["error"]
+        assert other["tangential"] == pytest.approx(first["tangential"], rel=1e-8)
+    assert without["iterations"] > first["iterations"] == last["iterations"]
+    assert last["error"] == first["error"]
