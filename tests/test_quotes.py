@@ -30,8 +30,7 @@ RATIO = re.compile(
     rf"|\b{PARTS}\s(?:as|of|less|more|faster|slower|shorter|longer|cheaper|fewer)\b",
     re.IGNORECASE,
 )
-TYPED = {"method.md"}  # ratios of single experiments stand there without a record
-FILES = [file.name for file in quotes.marked(ROOT) if file.name not in TYPED]
+FILES = [file.name for file in quotes.marked(ROOT)]
 
 
 def test_marked_texts_are_those_of_the_json():
@@ -102,7 +101,7 @@ def test_counts_of_the_stress_matrix_are_those_of_its_outcomes(tmp_path):
 
 @pytest.mark.parametrize("name", FILES)
 def test_ratios_are_marked(name):
-    """No ratio stands in README.md and docs outside of markers, but in the files that are named above."""
+    """No ratio stands in README.md and docs outside of markers."""
     text = next(file for file in quotes.marked(ROOT) if file.name == name).read_text()
     left = quotes.MARKER.sub("", text)
     assert left != text
