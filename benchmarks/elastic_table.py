@@ -49,15 +49,25 @@ def claims(records: list[dict]) -> dict[str, str]:
         for n in dict.fromkeys(run["unknowns"] for run in large)}  # fmt: skip
     return {
         "table": table(TITLES, map(row, records)),
-        "worst-seconds": ratio(max(run["times"][1:].max() for run in large)),
-        "worst-cycles": f"{max(run['cycles'][1:].max() for run in large):.2f}",
-        "worst-mean": f"{max(run['times'].mean() for run in whole):.2f}",
+        "when": when(records),
+        **worst([run for run in whole if run["case"] != "C"], ""),
+        **worst([run for run in whole if run["case"] == "C"], "C-"),
         "first-step": f"{min(first):.1f} to {max(first):.1f}",
         "set-up": ", ".join(f"{ratio(value)} at {unknowns:,}" for unknowns, value in set_up.items()),
         "exponents": "; ".join(exponents(whole)),
         "ranks": "; ".join(by_ranks(runs)),
         "ranks-cycles": " and ".join(str(run["steps"][UNLOADING]["iterations"]) for run in pair(runs)),
+        "bandwidth": bandwidth(*(run["bandwidth"] for run in pair(runs))),
     }  # fmt: skip
+
+
+def worst(whole: list[dict], name: str) -> dict[str, str]:
+    """The worst step but the first, and the worst mean with set-up, of whole cycles."""
+    return {
+        f"{name}worst-seconds": f"{max(run['times'][1:].max() for run in whole):.2f}",
+        f"{name}worst-cycles": f"{max(run['cycles'][1:].max() for run in whole):.2f}",
+        f"{name}worst-mean": f"{max(run['times'].mean() for run in whole):.2f}",
+    }
 
 
 def exponents(runs: list[dict]):
@@ -76,10 +86,22 @@ def exponents(runs: list[dict]):
         yield f"from {few:,} to {many:,} unknowns {', '.join(found)}"
 
 
+def when(records: list[dict]) -> str:
+    """Day, library and load of all runs."""
+    days, commits = (
+        ", ".join(sorted({of[key][:10] for of in records})) for key in ("date", "commit")
+    )
+    loads = [load for of in records for load in of["load"]]
+    return f"{days}, library of {commits}, load average {min(loads):.1f} to {max(loads):.1f}"
+
+
 def pair(runs: list[dict]) -> tuple[dict, dict]:
-    """The runs on one rank and on two that belong together."""
+    """The run on two ranks, and before it the same on one."""
     two = next(run for run in runs if run["ranks"] == 2)
-    return next(run for run in runs if run["ranks"] == 1 and run["run"] == two["run"]), two
+    which = two["case"], two["unknowns"]
+    return next(
+        run for run in runs if run["ranks"] == 1 and (run["case"], run["unknowns"]) == which
+    ), two
 
 
 def by_ranks(runs: list[dict]):
@@ -92,3 +114,8 @@ def by_ranks(runs: list[dict]):
     for name, seconds in what.items():
         one, two = map(seconds, pair(runs))
         yield f"{name} {one:.3g} s to {two:.3g} s, {ratio(one / two)} times as fast"
+
+
+def bandwidth(one: float, two: float) -> str:
+    """Bytes per second of one rank and of two."""
+    return f"{one / 1e9:.1f} GB/s on one rank and {two / 1e9:.1f} on two, {ratio(two / one)} times as many"
