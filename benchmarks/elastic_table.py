@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
-from quotes import ratio, table
+from quotes import measured, ratio, table
 
 TITLES = [
     "unknowns", "ranks", "elastic: iterations, s", "case", "cycles: first step", "first unloading", "worst", "mean",
@@ -49,7 +49,7 @@ def claims(records: list[dict]) -> dict[str, str]:
         for n in dict.fromkeys(run["unknowns"] for run in large)}  # fmt: skip
     return {
         "table": table(TITLES, map(row, records)),
-        "when": when(records),
+        "when": measured(records),
         **worst([run for run in whole if run["case"] != "C"], ""),
         **worst([run for run in whole if run["case"] == "C"], "C-"),
         "first-step": f"{min(first):.1f} to {max(first):.1f}",
@@ -84,15 +84,6 @@ def exponents(runs: list[dict]):
                 power, elastic = np.log(costs) / np.log(many / few)
                 found.append(f"{small['case']} {power:.2f} ({elastic:.2f})")
         yield f"from {few:,} to {many:,} unknowns {', '.join(found)}"
-
-
-def when(records: list[dict]) -> str:
-    """Day, library and load of all runs."""
-    days, commits = (
-        ", ".join(sorted({of[key][:10] for of in records})) for key in ("date", "commit")
-    )
-    loads = [load for of in records for load in of["load"]]
-    return f"{days}, library of {commits}, load average {min(loads):.1f} to {max(loads):.1f}"
 
 
 def pair(runs: list[dict]) -> tuple[dict, dict]:

@@ -16,6 +16,7 @@ from unittest.mock import patch
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
+import variants_table
 from punch import Parameters, Punch, programme
 from report_run import commit
 from solvers_operator import timed
@@ -28,7 +29,6 @@ from dolfinx_contact.linear_solver import MULTIGRID
 LOADING, MOST = 5, 400  # steps before the first unloading, iterations with one metric
 NEVER = {"fixed_point.EVERY": 10**9}
 AT_ONCE = {"fixed_point.FALL": -1.0}  # the first tangent is not waited for
-WITHOUT = "without the tangent"
 
 
 class Tally(dc.FixedPoint):
@@ -61,7 +61,7 @@ class Variant(NamedTuple):
 
     def without_tangent(self) -> Variant:
         return self._replace(
-            name=f"{self.name}, {WITHOUT}", constants=self.constants | NEVER, solver=self.solver | dict(newton=False)
+            name=self.name + variants_table.WITHOUT, constants=self.constants | NEVER, solver=self.solver | dict(newton=False)
         )  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def along_slip(factor: float) -> dict:
     return {"contact_equations.ContactEquations._set_metric": set_metric}
 
 
-AS_IT_IS = Variant("as it is")
+AS_IT_IS = Variant(variants_table.AS_IT_IS)
 METRICS_AND_CYCLES = [
     AS_IT_IS,
     *(Variant(f"rho {rho} of the nodal stiffness", solver=dict(rho=rho)) for rho in (0.3, 3.0)),

@@ -14,6 +14,8 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parent.parent
 MARKER = re.compile(r"<!-- ([\w.-]+) -->(\n?)(.*?)(\n?)<!-- end -->", re.DOTALL)
 
@@ -49,6 +51,22 @@ def ratio(value: float) -> str:
 def table(titles, lines) -> str:
     """Titles and lines of cells in Markdown."""
     return "\n".join(f"| {' | '.join(map(str, x))} |" for x in (titles, ["---"] * len(titles), *lines))  # fmt: skip
+
+
+def measured(records: list[dict]) -> str:
+    """When records were measured, on what, with which library and at which load."""
+    days, processors, commits = (
+        " and ".join(dict.fromkeys(record[key][:length] for record in records if key in record))
+        for key, length in (("date", 10), ("processor", None), ("commit", None))
+    )
+    loads = [load for record in records for load in record["load"]]
+    where = f"{processors}, " if processors else ""
+    return f"{days}, {where}commit {commits}, load average {min(loads):.1f} to {max(loads):.1f}"
+
+
+def exponent(pairs) -> float:
+    """Slope of a straight line through the logarithms of pairs, least squares."""
+    return float(np.polyfit(*np.log(np.transpose(pairs)), 1)[0])
 
 
 def marked(root: Path) -> list[Path]:

@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import stress_table
-from quotes import ratio, table
+from quotes import exponent, ratio, table
 
 
 def claims(sections: dict) -> dict[str, str]:
@@ -80,7 +80,7 @@ def _growth(data):
 def last_exponent(rows: list[dict], solver: str) -> tuple[int, float] | None:
     """Growth of the seconds of a step over a solver's three largest sizes, and the smallest of these."""
     of = sorted((row["unknowns"], row["step"]) for row in rows if row["solver"] == solver)[-3:]
-    return (of[0][0], float(np.polyfit(*np.log(np.transpose(of)), 1)[0])) if len(of) == 3 else None
+    return (of[0][0], exponent(of)) if len(of) == 3 else None
 
 
 def _meshes(data):

@@ -39,10 +39,7 @@ def read(file: str, written: float) -> dict:
     """The matrix as ``make stress`` wrote it, in the order of its scenes, and whether it is whole."""
     lines = map(json.loads, Path(file).read_text().splitlines())
     found = {(r["group"], r["name"], r["solver"]): r for r in lines}
-    asked = [
-        (scene.group, scene.name, solver) for scene in scenes() for solver in stress.SOLVERS
-        if scene.seed is None or solver == "default"
-    ]  # fmt: skip
+    asked = [(scene.group, scene.name, solver) for scene, solver in stress.pairs(scenes())]
     records = [found[key] for key in asked if key in found]
     measured = [record.get("measured", "date and commit not noted") for record in records]
     return dict(

@@ -5,19 +5,14 @@
 from __future__ import annotations
 
 import numpy as np
-from quotes import ratio, table
+from quotes import exponent, measured, ratio, table
 
 
 def claims(parts: dict) -> dict[str, str]:
     """Tables and numbers by part and key; ``when`` says when, on what and at which load the part was measured."""
     found = {}
     for part, record in parts.items():
-        low, high = sorted(record["load"])
-        of = QUOTED[part](record["rows"])
-        of["when"] = (
-            f"{record['date'][:10]}, {record['processor']}, commit {record['commit']}, load average "
-            f"{low:.1f} to {high:.1f}"
-        )  # fmt: skip
+        of = QUOTED[part](record["rows"]) | {"when": measured([record])}
         found |= {f"{part}.{key}": text for key, text in of.items()}
     return found
 
@@ -164,13 +159,8 @@ def _first_steps(rows):
     )
     return {
         "table": table(titles, lines), "solved": said,
-        "inverse-grows": _exponent(inverse), "iteration-grows": _exponent(each),
+        "inverse-grows": f"{exponent(inverse):.1f}", "iteration-grows": f"{exponent(each):.1f}",
     }  # fmt: skip
-
-
-def _exponent(of) -> str:
-    """Slope of a straight line through the logarithms of pairs."""
-    return f"{np.polyfit(*np.log(np.array(of)).T, 1)[0]:.1f}"
 
 
 QUOTED = {

@@ -144,6 +144,16 @@ def run(scene: Scene, solver) -> dict:
     return record
 
 
+def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:
+    """Scenes and the solvers that they are given to: on plain arrays there is one."""
+    return [
+        (scene, solver)
+        for scene in chosen
+        for solver in solvers
+        if scene.seed is None or solver == "default"
+    ]
+
+
 def draw(records: list[dict], file: Path) -> None:
     """Judged error against seconds per step, by outcome and solver."""
     import matplotlib
@@ -179,12 +189,12 @@ def main(argv=None) -> list[dict]:
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(r["group"], r["name"], r["solver"]) for r in records}
     chosen = scenes()[options.first :: options.every]
+    if options.small:
+        chosen = list(map(small, chosen))
     todo = [
         (scene, solver)
-        for scene in (map(small, chosen) if options.small else chosen)
-        for solver in ([options.solver] if options.solver else SOLVERS)
-        if (scene.seed is None or solver == "default")  # on plain arrays there is one solver
-        and (scene.group, scene.name, solver) not in done
+        for scene, solver in pairs(chosen, [options.solver] if options.solver else SOLVERS)
+        if (scene.group, scene.name, solver) not in done
     ]
     measured = f"{now()[:10]}, {commit()}"
     with log.open("a") as file:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from quotes import ratio, table
+from quotes import measured, ratio, table
 
 AS_IT_IS, WITHOUT = "as it is", ", without the tangent"
 FIRST_UNLOADING = 5  # the steps before are those of loading
@@ -18,13 +18,7 @@ def claims(parts: dict) -> dict[str, str]:
             found |= {f"{part}.{key}": text for key, text in quoted(parts[part]["rows"]).items()}
     if parts.keys() >= {"unloading", "unloading-fine"}:
         found |= _unloading(*({row["name"]: row for row in parts[part]["rows"]} for part in ("unloading", "unloading-fine")))  # fmt: skip
-    days, processors, commits = (
-        " and ".join(dict.fromkeys(record[key][:length] for record in parts.values()))
-        for key, length in (("date", 10), ("processor", None), ("commit", None))
-    )
-    loads = [load for record in parts.values() for load in record["load"]]
-    found["when"] = f"{days}, {processors}, commit {commits}, load average {min(loads):.1f} to {max(loads):.1f}"  # fmt: skip
-    return found
+    return found | {"when": measured(parts.values())}
 
 
 def percent(value: float) -> str:

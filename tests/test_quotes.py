@@ -30,7 +30,6 @@ RATIO = re.compile(
     rf"|\b{PARTS}\s(?:as|of|less|more|faster|slower|shorter|longer|cheaper|fewer)\b",
     re.IGNORECASE,
 )
-FILES = [file.name for file in quotes.marked(ROOT)]
 
 
 def test_marked_texts_are_those_of_the_json():
@@ -99,10 +98,10 @@ def test_counts_of_the_stress_matrix_are_those_of_its_outcomes(tmp_path):
     assert not [key for key in quotes.texts(tmp_path) if "stability" in key]
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_ratios_are_marked(name):
+@pytest.mark.parametrize("file", quotes.marked(ROOT), ids=lambda file: file.name)
+def test_ratios_are_marked(file):
     """No ratio stands in README.md and docs outside of markers."""
-    text = next(file for file in quotes.marked(ROOT) if file.name == name).read_text()
+    text = file.read_text()
     left = quotes.MARKER.sub("", text)
     assert left != text
     found = [left[max(0, m.start() - 40) : m.end() + 20] for m in RATIO.finditer(left)]
