@@ -126,6 +126,10 @@ template <int T> struct Block {
         branch[i] = result.branch;
     }
 
+    void keep(const Reaction<T> &result, int i) {
+        keep(CodedReaction<T>{result.r, static_cast<double>(result.branch)}, i);
+    }
+
     [[gnu::always_inline]] void keep(const Start<T> &start, int i) {
         keep(CodedReaction<T>{start.r, start.branch}, i);
         for (int k = 0; k < D; ++k)
@@ -134,7 +138,7 @@ template <int T> struct Block {
     }
 
     void keep(const Linearisation<T> &result, int i) {
-        keep(CodedReaction<T>{result.value.r, static_cast<double>(result.value.branch)}, i);
+        keep(result.value, i);
         for (int a = 0; a < D; ++a)
             for (int b = 0; b < D; ++b) {
                 by_reaction[a * D + b][i] = result.by_reaction(a, b);

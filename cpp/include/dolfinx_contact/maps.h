@@ -5,7 +5,7 @@
 /// batch.h.
 #pragma once
 
-#include "return_map.h"
+#include "smoothed_map.h"
 
 namespace dolfinx_contact {
 /// What a function of one node may look at.
@@ -53,6 +53,14 @@ struct ReturnMap {
     template <class Law, class P, class Root>
     auto point(const Law &law, const P &, double scale, const Root &root) const {
         return return_point(law, scale, root);
+    }
+};
+
+/// With a jump, and one equation after the other: not for loops that have to be fast.
+struct SmoothedMap {
+    double rounding;
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return smoothed_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t, rounding);
     }
 };
 
@@ -110,6 +118,13 @@ struct ScaledJacobian {
 struct ReturnJacobian {
     template <class Law, class S> auto operator()(const Law &law, const S &s) const {
         return return_jacobian(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
+    }
+};
+
+struct SmoothedJacobian {
+    double rounding;
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return smoothed_jacobian(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t, rounding);
     }
 };
 } // namespace dolfinx_contact

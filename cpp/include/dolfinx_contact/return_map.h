@@ -95,15 +95,21 @@ Reaction<T> return_map(const Law &law, const Local<T> &r, double gap, const Tang
     return {start.r, branch_of(start.branch)};
 }
 
+/// Derivative by (du_t, x_n), of that by (tau, r_n - rho_n x_n).
+template <int T>
+Jacobian<T> return_by_motion(const Jacobian<T> &by_predictor, double rho_n, double rho_t) {
+    Local<T> rho = Local<T>::Constant(rho_t);
+    rho[T] = rho_n;
+    return -by_predictor * rho.asDiagonal();
+}
+
 /// return_map with its derivatives on the branch taken.
 template <class Law, int T = Law::tangents>
 Linearisation<T> return_jacobian(const Law &law, const Local<T> &r, double gap,
                                  const Tangent<T> &slip, double rho_n, double rho_t) {
     Linearisation<T> out;
     out.value = return_map(law, r, gap, slip, rho_n, rho_t, &out.by_reaction);
-    Local<T> rho = Local<T>::Constant(rho_t);
-    rho[T] = rho_n;
-    out.by_motion = -out.by_reaction * rho.asDiagonal();
+    out.by_motion = return_by_motion<T>(out.by_reaction, rho_n, rho_t);
     return out;
 }
 } // namespace dolfinx_contact
