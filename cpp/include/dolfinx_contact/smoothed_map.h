@@ -102,8 +102,13 @@ Jacobian<T> smoothed_derivative(const Law &law, const RoundedEquation<T> &equati
 ///     du_i = -s r_i / q_i,   s (r_n - |M^-1 r_t|) = rounding,
 ///
 /// whatever rho_n, rho_t: `rounding` >= 0 is a length, and the law the limit for rounding -> 0. The
-/// normal part is not smoothed. For rounding = 0, or where mu = 0, this is return_map. The branch
+/// normal part is not smoothed. For rounding = 0, or where mu = 0, this is return_map; the branch
 /// is that of return_map in any case.
+///
+/// With x0 that of return_map, sum q_i (x_i - x0_i)^2 <= rho_t rounding R: x0 is a projection,
+/// hence sum q_i (z_i - x0_i) (x_i - x0_i) <= 0, while q_i (z_i - x_i) = lambda x_i.
+///
+/// The derivative is Lipschitz continuous where R > 0, its own derivative jumps where z = 0.
 ///
 /// If `derivative` is given, it receives the derivative by (tau, r_n - rho_n x_n).
 template <class Law, int T = Law::tangents>
