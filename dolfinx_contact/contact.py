@@ -64,6 +64,9 @@ class Contact:
         status: A ``Status`` per node, ``shape=(n,)``.
         rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
         rho_t: The same for slip alone, which only the map "return" can tell apart; None is ``rho``.
+        rounding: Of the map "smoothed", length: slips far above it obey the law, see ``smoothed_map.h``.
+        drag: None, or for the map "smoothed" springs per node, force per length, and the slip increments
+            to which they pull back.
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``, set by
             ``ContactProblem``.  There is neither slip nor friction in them: what the support carries
             is no reaction of the plane.
@@ -110,6 +113,7 @@ class Contact:
         self.frame = plane.frame
         self.x = V.tabulate_dof_coordinates()[self.nodes]
         self.rho = self.rho_t = None
+        self.rounding, self.drag = 0.0, None
         self.held = np.zeros((self.nodes.size, gdim - 1), dtype=bool)
         self._size = gdim * owned
         self._dofs = gdim * self.nodes[:, None] + np.arange(gdim)
@@ -207,7 +211,8 @@ class Contact:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
             map: "bipotential" for the paper's predictor and Euclidean projection [dSFMH07, Section
                 2], "return" for a predictor without the translated normal term and a projection in
-                the metric of the slip rule.  Both have the same fixed points.
+                the metric of the slip rule.  Both have the same fixed points.  "smoothed" is the second
+                one with the corner between sticking and slipping rounded off, see ``rounding``.
 
         Raises:
             ValueError: ``rho`` has not been set; see ``set_metric``.
@@ -229,12 +234,26 @@ class Contact:
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         self.move(u)
         rho_t = self.rho if self.rho_t is None else self.rho_t
-        metrics = {"bipotential": (self.rho,), "return": (self.rho, rho_t)}[map]
+        metrics = {
+            "bipotential": (self.rho,),
+            "return": (self.rho, rho_t),
+            "smoothed": (self.rho, rho_t, self.rounding),
+        }[map]
         result = getattr(self.law, f"{map}_{kind}")(
             self.reaction, self.gap, self.slip_increment, *metrics
         )
         self.reaction, self.status = result[:2]
+        if map == "smoothed" and self.drag is not None:
+            self._pull_back(*result[2:])
         return result[2:]
+
+    def _pull_back(self, _=None, by_motion=None) -> None:
+        """The springs of ``drag``, in the reactions and, if they are given, in their derivatives."""
+        stiffness, home = self.drag
+        self.reaction[:, :-1] -= stiffness[:, None] * (self.slip_increment - home)
+        if by_motion is not None:
+            for k in range(home.shape[1]):
+                by_motion[:, k, k] -= stiffness
 
     def take_reaction(self, forces: np.ndarray) -> None:
         """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""

@@ -13,6 +13,10 @@ from dolfinx_contact.linear_solver import LinearSolver, stage
 from dolfinx_contact.rigid_balance import RigidBalance
 from dolfinx_contact.surface_layer import SurfaceLayer
 
+# Newton's metric over the nodal stiffness, along the normal and along slip, which want their own: along slip
+# it weights errors of slip against errors of reaction.
+NEWTON = (10.0, 0.1)
+
 
 class _Stiffened(NamedTuple):
     """The body with the springs of one metric (map and factor) at its contact nodes."""
@@ -34,6 +38,7 @@ class ContactEquations:
         self._set_metric("bipotential", 1.0)
         self._tangent = None  # SurfaceLayer, once linearised
         self._evaluations = 0
+        self._known = None  # a displacement, and the forces b - K x that it leaves
         self._measured = None  # displacement whose errors were measured with F
 
     def guess(self) -> np.ndarray:
@@ -81,9 +86,20 @@ class ContactEquations:
         forces = self.b - self.body.multiply(x)
         return self.problem._stiffened.rigid.balanced(x, forces, self._map)
 
-    def newton_metric(self, normal: float, tangential: float) -> None:
-        """Residuals from now on are those of the return map, rho along the normal and along slip these factors."""
-        self._set_metric("return", normal, tangential)
+    def round_off(self, rounding: float, drag: float = 0.0, home=None) -> None:
+        """Residuals from now on are those of a law without kink between sticking and slipping.
+
+        Args:
+            rounding: Over the load displacement; 0 is the law itself.
+            drag: Springs over the nodal stiffness, which pull slips back to those at ``home``.
+            home: Displacement, owned degrees of freedom; needed with ``drag``.
+        """
+        self._set_metric("smoothed", *NEWTON)
+        for contact, stiffness in zip(self.problem.contacts, self.problem._stiffness):
+            contact.rounding, contact.drag = rounding * self.load_displacement, None
+            if drag > 0.0:
+                contact.move(home)
+                contact.drag = drag * stiffness, contact.slip_increment
 
     def linearise(self, x: np.ndarray) -> None:
         """From now on corrections know how the contact nodes respond at ``x``, see ``SurfaceLayer``."""
@@ -91,7 +107,7 @@ class ContactEquations:
         if problem._layer is None:
             prefix = f"{self.body.prefix}layer_"
             problem._layer = SurfaceLayer(self.body, problem.contacts, prefix)
-        contacts = self._asked(self.b - self.body.multiply(x))
+        contacts = self._asked(self._forces(x))
         derivatives = [contact.update_with_derivatives(x, self._map) for contact in contacts]
         with stage("contact: surface layer"):
             problem._layer.linearise(derivatives)
@@ -104,12 +120,17 @@ class ContactEquations:
     def along(self, x: np.ndarray, dx: np.ndarray):
         """Function of a length: the norm of the residual of ``x + length dx``, without a product with K."""
         self._measured = None  # contacts will move
-        forces, change = self.b - self.body.multiply(x), self.body.multiply(dx)
+        forces, change = self._forces(x), self.body.multiply(dx)
 
         def size(length: float) -> float:
             return self.size(self._forces_left(x + length * dx, forces - length * change))
 
         return size
+
+    def out_of_balance(self, x: np.ndarray) -> np.ndarray:
+        """The residual alone, as ``residual`` returns it."""
+        self._measured = None  # contacts will move
+        return self._forces_left(x, self._forces(x))
 
     def size(self, residual: np.ndarray) -> float:
         """Norm of the forces out of balance at free degrees of freedom."""
@@ -135,7 +156,7 @@ class ContactEquations:
         The reactions that enter the predictor are those the body asks for, ``K x - f``.  Once the
         error falls below the tolerance it is measured again with F itself, assembled by DOLFINx.
         """
-        residual = self._update(x, self.b - self.body.multiply(x))
+        residual = self._update(x, self._forces(x))
         self._measured = None
         if self.errors.largest <= self.problem.tol:
             self.errors = self._errors(self._balance(self._assembled(x)))
@@ -152,6 +173,12 @@ class ContactEquations:
             self._update(x, self._assembled(x))
             self._measured = x.copy()
         return self.errors.largest
+
+    def _forces(self, x: np.ndarray) -> np.ndarray:
+        """``b - K x``; of the array that was asked for last without another product."""
+        if self._known is None or self._known[0] is not x:
+            self._known = (x, self.b - self.body.multiply(x))
+        return self._known[1]
 
     def _asked(self, forces: np.ndarray):
         """The contacts, each with the reactions that balance the forces at its nodes."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from contextlib import closing
-from itertools import cycle
 from time import perf_counter
 
 import numpy as np
 
 from dolfinx_contact.anderson import Anderson
-from dolfinx_contact.newton_krylov import NewtonKrylov
+from dolfinx_contact.smoothing_newton import SmoothingNewton
 
 # Factors of the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
@@ -20,14 +18,6 @@ METRICS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early; if two
 # tangents do not bring it down to FALL, statuses are still changing.
 EVERY, GROWTH, FALL = 20, 100.0, 0.3
-
-# Newton's metrics, along the normal and along slip, which want their own. Where a step has to be shorter
-# than SHORT the next one takes over: the kinks of the residual are elsewhere in another metric.
-NEWTON = ((10.0, 0.1), (10.0, 0.3), (10.0, 0.03), (10.0, 1.0))
-SHORT = 0.1
-
-# Newton's method has failed when the residual was not halved in so many iterations.
-PATIENCE = 50
 
 
 class FixedPoint:
@@ -41,9 +31,9 @@ class FixedPoint:
     the contact is linearised, and the layers next to the plane are then corrected with that
     tangent before the back-solve, see ``SurfaceLayer``.
 
-    A hard step, in which such a tangent does not help, is left to Newton's method on the same residual with a
-    line search, see ``NewtonKrylov``: an iteration is then one of GMRES with the same correction.  If that
-    fails, too, the fixed point goes on.
+    A hard step, in which such a tangent does not help, is left to Newton's method on the same residual with the
+    law rounded off, see ``SmoothingNewton``: an iteration is then one of GMRES with the same correction.  If
+    that fails, too, the fixed point goes on.
 
     Args:
         map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
@@ -87,8 +77,8 @@ class FixedPoint:
 
         Args:
             system: Offers ``balanced(x)``, ``residual(x) -> (residual, error)``,
-                ``correction(residual)``, ``use_metric(map, factor)``, ``newton_metric(normal, tangential)``,
-                ``linearise(x)``, what ``NewtonKrylov`` needs, ``trial``, ``guess()`` and ``total(array)``;
+                ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``,
+                what ``SmoothingNewton`` and ``NewtonKrylov`` need, ``trial``, ``guess()`` and ``total(array)``;
                 nothing else is known of it.
             x: Start, this rank's unknowns; for the bare ``system.trial``, ``system.guess()`` is taken.
 
@@ -106,7 +96,7 @@ class FixedPoint:
                 linearised = self._accelerate(search, x, hasty)
                 x = search.best  # of before Newton's method, which may end in a corner
                 if hasty and search.goes_on:
-                    self._newton(search, linearised)
+                    SmoothingNewton(search).solve(linearised)
                 hasty = False
             if search.over:
                 break
@@ -139,27 +129,6 @@ class FixedPoint:
                 following, smallest = search.best, np.inf
             smallest = min(smallest, norm)
             x = following
-
-    def _newton(self, search, x: np.ndarray) -> None:
-        """Newton's method from ``x``, until it fails."""
-        system, metrics = search.system, cycle(NEWTON)
-        halved, since = np.inf, 0
-        with closing(NewtonKrylov(system)) as newton:
-            system.newton_metric(*next(metrics))
-            while True:
-                x, residual = search.residual(x)
-                size = system.size(residual)
-                if size < halved / 2:
-                    halved, since = size, 0
-                if not search.goes_on or since >= PATIENCE:
-                    break
-                system.linearise(x)
-                dx, length, iterations = newton.step(x, residual)
-                since += max(iterations, 1)
-                search.iterations += iterations
-                x = x + length * dx
-                if length < SHORT:
-                    system.newton_metric(*next(metrics))
 
 
 class _Search:
