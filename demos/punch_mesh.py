@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 
 import gmsh
+from scipy.optimize import brentq
 
 from dolfinx_contact._dolfinx import model_to_mesh
 
 CONTACT, TOP = 1, 2  # tags of the facets z = 0 and z = height
 
 
-def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4):
+def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4, lowest=None):
     """Mesh of a punch standing on z = 0, its axis along z, distributed over ``comm``.
 
     Args:
@@ -28,6 +29,8 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         divisions: Quadrilaterals along each side of each of the five blocks; even, so that the
             axis of the punch is a line of nodes.
         layers: Hexahedra along the height.
+        lowest: Height of those on the plane, from where they grow layer by layer by the same factor; None
+            makes all equally high.
 
     Returns:
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
@@ -46,12 +49,16 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         )
     if not (0 < radius < math.inf and 0 < height < math.inf):
         raise ValueError(f"radius and height must be positive, got {radius!r} and {height!r}.")
+    if lowest is not None and not 0 < lowest * layers < height:
+        raise ValueError(f"lowest must be less than a {layers:g}th of the height, got {lowest!r}.")
     gmsh.initialize()
     try:
         if comm.rank == 0:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.model.add("punch")
-            _build(height / radius, int(divisions), int(layers))
+            _build(
+                height / radius, int(divisions), **_layers(int(layers), lowest and lowest / height)
+            )
         punch = model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()
@@ -59,7 +66,20 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
     return punch
 
 
-def _build(height, divisions, layers):
+def _layers(count, lowest):
+    """What gmsh is told of the layers; ``lowest`` over the height."""
+    if lowest is None:
+        return dict(numElements=[count])
+
+    def top(growth, k):
+        return lowest * math.expm1(k * growth) / math.expm1(growth)
+
+    growth = brentq(lambda growth: top(growth, count) - 1, 1e-9, math.log(1 / lowest))
+    tops = [top(growth, k) for k in range(1, count)] + [1.0]
+    return dict(numElements=[1] * count, heights=tops)
+
+
+def _build(height, divisions, **layers):
     """The punch of radius 1 (gmsh's tolerances are absolute), every block transfinite."""
     geo = gmsh.model.geo
     rim = 1 / math.sqrt(2)
@@ -80,7 +100,7 @@ def _build(height, divisions, layers):
         geo.mesh.setTransfiniteSurface(block)
         geo.mesh.setRecombine(2, block)
     # extrude answers, for each surface, its copy, the volume and the sides
-    extruded = [geo.extrude([(2, b)], 0, 0, height, [layers], recombine=True) for b in blocks]
+    extruded = [geo.extrude([(2, b)], 0, 0, height, recombine=True, **layers) for b in blocks]
     geo.synchronize()
     gmsh.model.removeEntities([(0, centre)])  # or it would be meshed as a node of no element
 
