@@ -82,7 +82,7 @@ def measure(
     record = dict(
         case=case, unknowns=punch.head()["unknowns"], ranks=comm.size, commit=commit(), date=now(),
         load=[os.getloadavg()[0]], elastic=[elastic_solve(body, b, repeat)], steps=[],
-    )  # fmt: skip
+    ) | {key: mesh[key] for key in ("lowest",) if mesh[key] is not None}  # fmt: skip
     iterations, solve = record["elastic"][0]["iterations"], np.median(record["elastic"][0]["seconds"])  # fmt: skip
     if comm.rank == 0:
         print(
@@ -118,10 +118,10 @@ def measure(
 
 
 def keep(file: Path, record: dict) -> None:
-    """Write a record to the file, a line each, in place of the one of the same case, unknowns and ranks."""
+    """Write a record to the file, a line each, in place of the one of the same case, mesh and ranks."""
 
     def which(of):
-        return of["ranks"], of["unknowns"], of["case"]
+        return of["ranks"], of["unknowns"], of["case"], of.get("lowest", 0.0)
 
     records = {which(of): of for of in (json.loads(file.read_text()) if file.exists() else [])}
     records[which(record)] = record
@@ -142,9 +142,10 @@ def main(argv=None) -> None:
     parser.add_argument(
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
     )
+    parser.add_argument("--lowest", type=float, help="height of the elements on the plane, mm; else all are equal")  # fmt: skip
     options = parser.parse_args(argv)
     CASES["frictionless"] = dict(mu=0.0)
-    mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
+    mesh = dict(divisions=options.divisions, layers=options.divisions // 2, lowest=options.lowest)
     writes = options.json and MPI.COMM_WORLD.rank == 0
     results = []
     for refine in options.refine:

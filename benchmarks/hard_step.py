@@ -23,7 +23,6 @@ from solvers_operator import timed
 
 from dolfinx_contact.contact_equations import ContactEquations
 from dolfinx_contact.fixed_point import EVERY, METRICS
-from dolfinx_contact.fixed_point import NEWTON as BUILT_IN
 from dolfinx_contact.linear_solver import MULTIGRID
 
 LOADING, MOST = 5, 400  # steps before the first unloading, iterations with one metric
@@ -106,21 +105,24 @@ TANGENTS = [
 ]
 
 
-def newton(name: str, *metrics, accuracy: float = 0.1) -> Variant:
-    """Newton's method alone, after the first iterations, with metrics along the normal and along slip."""
-    changed = AT_ONCE | {"fixed_point.NEWTON": metrics, "newton_krylov.ACCURACY": accuracy}
-    return Variant(name, changed, dict(max_iterations=EVERY + 1), kind=NewtonNext)
+def newton(name: str, **changed) -> Variant:
+    """Newton's method alone, after the first iterations, with other constants of its modules."""
+    constants = AT_ONCE | {key.replace("__", "."): value for key, value in changed.items()}
+    name = variants_table.ALONE + name
+    return Variant(name, constants, dict(max_iterations=EVERY + 1), kind=NewtonNext)
 
 
 NEWTON = [
-    newton("1, 1", (1.0, 1.0)),
-    newton("1, 0.1", (1.0, 0.1)),
-    newton("10, 0.3", (10.0, 0.3)),
-    newton("10, 0.1", (10.0, 0.1)),
-    newton("10, 0.03", (10.0, 0.03)),
-    newton("10, 0.1; systems to 0.01", (10.0, 0.1), accuracy=0.01),
-    newton("10, and 0.1, 0.3, 0.03, 1 in turn", *BUILT_IN),
-]  # fmt: skip
+    newton("law not rounded off", smoothing_newton__START=0.0),
+    newton("metric 1, 1", contact_equations__NEWTON=(1.0, 1.0)),
+    newton("metric 10, 0.3", contact_equations__NEWTON=(10.0, 0.3)),
+    newton("metric 10, 0.03", contact_equations__NEWTON=(10.0, 0.03)),
+    newton("rounding at first as large as the error", smoothing_newton__START=1.0),
+    newton("rounding at first 0.01 of the error", smoothing_newton__START=0.01),
+    newton("rounding to a third at a time", smoothing_newton__QUICKEST=0.3),
+    newton("systems to 0.01", newton_krylov__ACCURACY=0.01),
+    newton(variants_table.AS_IT_IS),
+]
 
 
 # On the finer mesh each takes minutes.
@@ -129,8 +131,9 @@ FINE = [
     TANGENTS[0],
     TANGENTS[5],
     AS_IT_IS.without_tangent(),
-    NEWTON[-1],
     NEWTON[0],
+    NEWTON[1],
+    NEWTON[-1],
 ]
 
 

@@ -135,7 +135,7 @@ def rules() -> list[dict]:
     variants = [
         AS_IT_IS,
         Variant("without Newton's method", solver=dict(newton=False)),
-        Variant("Newton's method left after 100 iterations, not 50", {"fixed_point.PATIENCE": 100}),
+        Variant("Newton's method left after 200 iterations, not 600", {"smoothing_newton.MOST": 200}),
         Variant("100 iterations a metric, the list four times over", four, dict(max_iterations=100)),
         Variant("the first metric alone, 1200 iterations", solver=dict(rho=METRICS["return"][0], max_iterations=1200)),
         Variant("without tangent and Newton's method", NEVER, dict(newton=False)),

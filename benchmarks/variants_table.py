@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from quotes import measured, ratio, table
 
-AS_IT_IS, WITHOUT = "as it is", ", without the tangent"
+AS_IT_IS, WITHOUT, ALONE = "as it is", ", without the tangent", "Newton's method alone, "
 FIRST_UNLOADING = 5  # the steps before are those of loading
 
 
@@ -78,11 +78,11 @@ def _steps(row) -> str:
 
 
 def _unloading(coarse, fine):
-    """The first unloading on two meshes; Newton's method alone is named by its metrics."""
-    lines, metrics = [], []
+    """The first unloading on two meshes; those of Newton's method alone in a table of their own."""
+    lines, newton = [], []
     for name, row in coarse.items():
-        if name[0].isdigit():
-            metrics.append([name, _steps(row), _steps(fine.get(name))])
+        if name.startswith(ALONE):
+            newton.append([name.removeprefix(ALONE), _steps(row), _steps(fine.get(name))])
         elif not name.endswith(WITHOUT):
             over = [ratio(of[name]["seconds"] / of[AS_IT_IS]["seconds"]) if name in of else "–" for of in (coarse, fine)]  # fmt: skip
             lines.append([name, _steps(coarse.get(name + WITHOUT)), _steps(row), over[0], _steps(fine.get(name)), over[1]])  # fmt: skip
@@ -94,7 +94,7 @@ def _unloading(coarse, fine):
         "unloading.table": table(titles, lines),
         "unloading.scatter": f"{ratio(min(same))} to {ratio(max(same))}",
         "unloading-fine.without": _steps(fine[AS_IT_IS + WITHOUT]),
-        "newton.table": table(["rho over nodal stiffness, along the normal, along slip", *meshes], metrics),
+        "newton.table": table(["Newton's method", *meshes], newton),
     }  # fmt: skip
 
 
