@@ -50,8 +50,9 @@ def surface(K: np.ndarray, wave: np.ndarray, layers: int) -> np.ndarray:
     return S
 
 
-def worst_direction(mu: np.ndarray, p: np.ndarray):
+def worst_direction(mu, p):
     """``r_t / r_n``, normal of the ellipse and direction of slip where these two are farthest apart."""
+    mu, p = np.array(mu), np.array(p)
     angle = np.linspace(0, np.pi / 2, 7201)
     e = mu * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     nu, d = e / mu**2, e / p**2
@@ -62,7 +63,7 @@ def worst_direction(mu: np.ndarray, p: np.ndarray):
 
 def resistance(height: float, mu, p, poisson: float) -> list[float]:
     """Smallest real part over all directions of a wave, over the mean tangential stiffness, for all WAVES."""
-    e, nu, d = worst_direction(np.array(mu), np.array(p))
+    e, nu, d = worst_direction(mu, p)
     K, directions = brick(height, poisson), np.linspace(0, np.pi, 73)
     rows = []
     for wave in WAVES:
@@ -78,10 +79,12 @@ def resistance(height: float, mu, p, poisson: float) -> list[float]:
 
 
 def rows(poisson: float = 0.3) -> list[dict]:
-    """For case C; the heights at which no wave grows by itself are those that are well posed."""
+    """For case C."""
     from punch import CASES
 
+    _, nu, d = worst_direction(**CASES["C"])
     return [
-        dict(height=height, waves=WAVES, resistance=resistance(height, **CASES["C"], poisson=poisson))
+        dict(height=height, waves=WAVES, angle=np.degrees(np.arccos(nu @ d)),
+            resistance=resistance(height, **CASES["C"], poisson=poisson))
         for height in HEIGHTS
     ]  # fmt: skip

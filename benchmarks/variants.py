@@ -18,6 +18,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import agreement
+import element_height
 import numpy as np
 import solutions
 import solvers
@@ -169,6 +170,7 @@ PARTS = {
     "order": order,
     "raised": raised,
     "unloading-fine": unloading_fine,
+    "height": element_height.rows,
 }  # fmt: skip
 
 if __name__ == "__main__":

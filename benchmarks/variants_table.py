@@ -212,6 +212,17 @@ def _programme(steps):
     }  # fmt: skip
 
 
+def _height(rows):
+    """How the surface of a half-space resists waves of slip, by the height of its elements."""
+    titles = ["height over width", *(f"{wave:g}" for wave in rows[0]["waves"])]
+    return {
+        "table": table(titles, [[f"{row['height']:g}", *(f"{x:.3f}" for x in row["resistance"])] for row in rows]),
+        "angle": f"{rows[0]['angle']:.1f}",
+        "stable": f"{max(row['height'] for row in rows if min(row['resistance']) > 0):g}",
+        "worst": f"{min(min(row['resistance']) for row in rows):.2f}",
+    }  # fmt: skip
+
+
 QUOTED = {
     "iterations": _iterations,
     "increments": _increments,
@@ -225,4 +236,5 @@ QUOTED = {
     "paper": _programme,
     "order": _pairs,
     "raised": _raised,
+    "height": _height,
 }

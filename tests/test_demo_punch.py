@@ -109,9 +109,27 @@ def test_mesh_geometry(radius, height):
     assert volume == pytest.approx(polygon * height, rel=1e-12)
 
 
+def test_layers_grow_from_the_plane():
+    """The lowest layer is as high as asked for, each next one higher by the same factor, and the last one ends on top."""
+    x = owned_coordinates(punch_mesh(COMM, 1, lowest=0.1, height=5.0, divisions=2, layers=2).mesh)
+    levels = np.unique(np.concatenate(COMM.allgather(x[:, 2])).round(9))
+    heights = np.diff(levels)
+    assert heights[0] == pytest.approx(0.1, rel=1e-6)
+    assert heights[1:] / heights[:-1] == pytest.approx([heights[1] / heights[0]] * 3, rel=1e-6)
+    assert heights[1] > heights[0] and levels[-1] == 5.0
+
+
 @pytest.mark.parametrize(
     "options",
-    [dict(refine=-3), dict(refine=0.5), dict(divisions=3), dict(layers=0), dict(radius=0)],
+    [
+        dict(refine=-3),
+        dict(refine=0.5),
+        dict(divisions=3),
+        dict(layers=0),
+        dict(radius=0),
+        dict(lowest=2.5),
+        dict(lowest=-1.0),
+    ],
 )
 def test_mesh_refuses(options):
     """A mesh that cannot be built is a ValueError that names the number."""
