@@ -11,7 +11,7 @@ using namespace dolfinx_contact;
 using namespace dolfinx_contact::testing;
 
 namespace {
-int most_steps = 0; // Newton steps
+int most_rounded_steps = 0; // Newton steps
 
 /// The smoothed map where nothing moves, with rho_t = 1.
 template <class Law, int T = Law::tangents>
@@ -49,7 +49,7 @@ std::string map_properties(const Law &law, const Local<T> &a, const Local<T> &b,
     const RoundedEquation<T> equation = smoothed_equation(law, a, rounding);
     int steps = 0;
     const SecularRoot<T> root = solve(equation, &steps);
-    most_steps = std::max(most_steps, steps);
+    most_rounded_steps = std::max(most_rounded_steps, steps);
     const double slack = equation.k / root.s;
     if (slack > 16 * epsilon && !(load_function(law, x) < 0.0))
         wrong += "not inside the cone; ";
@@ -101,7 +101,7 @@ std::string fixed_points(const Law &law, double rounding, Random &random) {
            at_most(std::abs(moved.r[T] - R), 0.0, "changes R");
 }
 
-template <class Law> std::string check(const Law &law, Random &random) {
+template <class Law> std::string smoothed_properties(const Law &law, Random &random) {
     constexpr int T = Law::tangents;
     const double scale = random.below(4) == 0 ? random.power(-150, 150) : 1.0;
     const double rounding = random.power(-20, 3);
@@ -112,17 +112,17 @@ template <class Law> std::string check(const Law &law, Random &random) {
            derivative_properties(law, a, scale * rounding) + fixed_points(law, rounding, random);
 }
 
-std::string check_any(Random &random) {
+std::string properties_of_any_law(Random &random) {
     const int kind = random.below(5);
     if (kind == 0)
-        return check(Isotropic<1>{random.coefficients<1>()[0]}, random);
+        return smoothed_properties(Isotropic<1>{random.coefficients<1>()[0]}, random);
     if (kind == 1)
-        return check(Isotropic<2>{random.coefficients<1>()[0]}, random);
+        return smoothed_properties(Isotropic<2>{random.coefficients<1>()[0]}, random);
     const Tangent<2> mu = random.coefficients<2>();
     if (kind == 2)
-        return check(Associated<2>{mu}, random);
+        return smoothed_properties(Associated<2>{mu}, random);
     const Tangent<2> q = normalised_q<2>(mu, random.coefficients<2>());
-    return check(NonAssociated<2>{mu, q.cwiseAbs2()}, random);
+    return smoothed_properties(NonAssociated<2>{mu, q.cwiseAbs2()}, random);
 }
 } // namespace
 
@@ -132,13 +132,13 @@ TEST(SmoothedMap, properties_at_random_states) {
     Random random(1);
     int wrong = 0;
     for (int draw = 0; draw < 100000; ++draw) {
-        const std::string what = check_any(random);
+        const std::string what = properties_of_any_law(random);
         if (!what.empty() && ++wrong <= 10)
             ADD_FAILURE() << "draw " << draw << ": " << what;
     }
     EXPECT_EQ(wrong, 0);
-    std::cout << "most Newton steps at a random state: " << most_steps << "\n";
-    EXPECT_LE(most_steps, 20);
+    std::cout << "most Newton steps at a random state: " << most_rounded_steps << "\n";
+    EXPECT_LE(most_rounded_steps, 20);
 }
 
 // Newton's method ends before its bound: in the slowest case of secular.h, with any k.
