@@ -10,13 +10,14 @@ import numpy as np
 
 from dolfinx_contact.newton_krylov import NewtonKrylov
 
-# Rounding over the load displacement: at first this part of the error, below FINEST none at all.
+# Rounding over the load displacement, once a step without it is SHORT: at first this part of the error, below
+# FINEST none at all.
 START, FINEST = 0.1, 1e-11
 
 # It shrinks to a tenth where Newton's step is whole and leaves a quarter of the residual, less elsewhere.
 QUICKEST, GOOD, FAIR = 0.1, 0.25, 0.6
 
-# A step shorter than SHORT means a fold: the rounded problem has no solution nearby. Springs of DRAG
+# With rounding, a step shorter than SHORT means a fold: the rounded problem has no solution nearby. Springs of DRAG
 # times the nodal stiffness then hold the slips back; a patch of nodes moves on against them, step by
 # step, until it has slipped to where it rests, as it would in time.
 SHORT, DRAG, STIFFEST = 0.25, 0.02, 1e3
@@ -29,7 +30,7 @@ MOST = 600
 
 
 class SmoothingNewton:
-    """Newton's method with a rounded law, whose rounding shrinks as the residual does.
+    """Newton's method, from the first short step on with a rounded law, whose rounding shrinks as the residual does.
 
     Between sticking and slipping the residual has kinks, at which a line search ends.  Rounded off
     (``smoothed_map.h``) it has none, and its solution is followed as the rounding shrinks.  Where slip is far
@@ -41,7 +42,8 @@ class SmoothingNewton:
 
     def __init__(self, search):
         self._search, self._system = search, search.system
-        self._rounding, self._drag, self._shrink = None, 0.0, QUICKEST
+        self._rounding, self._drag, self._shrink = 0.0, 0.0, QUICKEST
+        self._at_kinks = False
 
     def solve(self, x: np.ndarray) -> None:
         """Search from ``x`` on, until solved or ``MOST`` iterations are done; the search keeps the best."""
@@ -52,8 +54,6 @@ class SmoothingNewton:
                 x, _ = search.residual(x)
                 if not search.goes_on:
                     break
-                if self._rounding is None:
-                    self._rounding = START * search.error
                 x = self._dragged(x) if self._drag > 0.0 else self._followed(x)
                 if self._rounding < FINEST:
                     self._rounding = 0.0
@@ -74,6 +74,10 @@ class SmoothingNewton:
         system.round_off(self._rounding)
         before = system.size(system.out_of_balance(x))
         following, length, after = self._step(x)
+        if length < SHORT and not self._at_kinks:
+            self._at_kinks, self._shrink = True, QUICKEST
+            self._rounding = START * self._search.error
+            return following
         if length < SHORT:
             self._drag = DRAG
         elif length == 1.0 and after <= GOOD * before:
