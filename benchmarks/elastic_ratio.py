@@ -82,7 +82,8 @@ def measure(
     record = dict(
         case=case, unknowns=punch.head()["unknowns"], ranks=comm.size, commit=commit(), date=now(),
         load=[os.getloadavg()[0]], elastic=[elastic_solve(body, b, repeat)], steps=[],
-    ) | {key: mesh[key] for key in ("lowest",) if mesh[key] is not None}  # fmt: skip
+        lowest=mesh["lowest"],
+    )  # fmt: skip
     iterations, solve = record["elastic"][0]["iterations"], np.median(record["elastic"][0]["seconds"])  # fmt: skip
     if comm.rank == 0:
         print(
@@ -121,7 +122,7 @@ def keep(file: Path, record: dict) -> None:
     """Write a record to the file, a line each, in place of the one of the same case, mesh and ranks."""
 
     def which(of):
-        return of["ranks"], of["unknowns"], of["case"], of.get("lowest", 0.0)
+        return of["ranks"], of["unknowns"], of["case"], of.get("lowest") or 0.0
 
     records = {which(of): of for of in (json.loads(file.read_text()) if file.exists() else [])}
     records[which(record)] = record

@@ -35,7 +35,7 @@ def row(record: dict) -> list[str]:
     mean = [f"{x.mean():.2f}" if of["whole"] else "–" for x in (cycles, times)]
     failed = " not converged" * ("failed" in record["steps"][-1])
     return [
-        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", of["case"] + FLAT * ("lowest" in of),
+        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", of["case"] + FLAT * bool(of.get("lowest")),
         f"{cycles[0]:.2f}", turn[0], f"{cycles.max():.2f}{failed}", mean[0],
         f"{times[0]:.1f}", turn[1], f"{times[1:].max(initial=0.0):.2f}", mean[1], f"{of['bytes_per_unknown']:.0f}",
     ]  # fmt: skip
@@ -45,8 +45,8 @@ def claims(records: list[dict]) -> dict[str, str]:
     """Table and numbers by key; but for the table and ``ranks``, of runs on one rank beyond 30,000 unknowns."""
     runs = [numbers(record) for record in records]
     beyond = [run for run in runs if run["unknowns"] > 30_000 and run["ranks"] == 1]
-    large = [run for run in beyond if "lowest" not in run]
-    flat = [run for run in beyond if "lowest" in run and run["whole"]]
+    large = [run for run in beyond if not run.get("lowest")]
+    flat = [run for run in beyond if run.get("lowest") and run["whole"]]
     whole = [run for run in large if run["whole"]]
     first = [run["times"][0] for run in large]
     set_up = {n: np.median([run["set_up"] for run in large if run["unknowns"] == n])
@@ -57,7 +57,6 @@ def claims(records: list[dict]) -> dict[str, str]:
         **worst([run for run in whole if run["case"] != "C"], ""),
         **worst([run for run in whole if run["case"] == "C" and run["unknowns"] < BEYOND], "C-"),
         **worst(flat, "flat-"),
-        **worst([run for run in whole if run["case"] == "C" and run["unknowns"] >= BEYOND], "beyond-"),
         "flat-lowest": "; ".join(f"{run['lowest']:g} mm with {run['unknowns']:,} unknowns" for run in flat),
         "first-step": f"{min(first):.1f} to {max(first):.1f}",
         "set-up": ", ".join(f"{ratio(value)} at {unknowns:,}" for unknowns, value in set_up.items()),
@@ -70,8 +69,6 @@ def claims(records: list[dict]) -> dict[str, str]:
 
 def worst(whole: list[dict], name: str) -> dict[str, str]:
     """The worst step but the first, and the worst mean with set-up, of whole cycles."""
-    if not whole:
-        return {}
     return {
         f"{name}worst-seconds": f"{max(run['times'][1:].max() for run in whole):.2f}",
         f"{name}worst-cycles": f"{max(run['cycles'][1:].max() for run in whole):.2f}",

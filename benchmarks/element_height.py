@@ -3,8 +3,8 @@
 """Whether sliding against a slip rule far from the normal of the cone is stable, by the height of the elements.
 
 A half-space of bricks with eight nodes, sliding everywhere in one direction: how its surface resists a wave
-of further slip along the slip rule, seen by the load function.  With the compliance of the half-space
-eliminated layer by layer (Bloch waves), the resistance to a wave is one complex number,
+of further slip along the slip rule, seen by the load function.  With the layers below the surface
+eliminated one after another (Bloch waves), the resistance to a wave is one complex number,
 ``nu . (S_tt - e S_nt) d``: d the direction of slip, nu the normal of the cone's ellipse, e = r_t / r_n, and
 S the surface stiffness while the normal displacement is held.  Where its real part is negative, slip of that wave
 grows by itself: the increment of slip is not unique.

@@ -105,23 +105,22 @@ TANGENTS = [
 ]
 
 
-def newton(name: str, **changed) -> Variant:
-    """Newton's method alone, after the first iterations, with other constants of its modules."""
-    constants = AT_ONCE | {key.replace("__", "."): value for key, value in changed.items()}
+def newton(name: str, changed: dict) -> Variant:
+    """Newton's method alone, after the first iterations, with other constants of modules."""
     name = variants_table.ALONE + name
-    return Variant(name, constants, dict(max_iterations=EVERY + 1), kind=NewtonNext)
+    return Variant(name, AT_ONCE | changed, dict(max_iterations=EVERY + 1), kind=NewtonNext)
 
 
 NEWTON = [
-    newton("law not rounded off", smoothing_newton__START=0.0),
-    newton("metric 1, 1", contact_equations__NEWTON=(1.0, 1.0)),
-    newton("metric 10, 0.3", contact_equations__NEWTON=(10.0, 0.3)),
-    newton("metric 10, 0.03", contact_equations__NEWTON=(10.0, 0.03)),
-    newton("rounding at first as large as the error", smoothing_newton__START=1.0),
-    newton("rounding at first 0.01 of the error", smoothing_newton__START=0.01),
-    newton("rounding to a third at a time", smoothing_newton__QUICKEST=0.3),
-    newton("systems to 0.01", newton_krylov__ACCURACY=0.01),
-    newton(variants_table.AS_IT_IS),
+    newton("law not rounded off", {"smoothing_newton.START": 0.0}),
+    newton("metric 1, 1", {"contact_equations.NEWTON": (1.0, 1.0)}),
+    newton("metric 10, 0.3", {"contact_equations.NEWTON": (10.0, 0.3)}),
+    newton("metric 10, 0.03", {"contact_equations.NEWTON": (10.0, 0.03)}),
+    newton("rounding at first as large as the error", {"smoothing_newton.START": 1.0}),
+    newton("rounding at first 0.01 of the error", {"smoothing_newton.START": 0.01}),
+    newton("rounding to a third at a time", {"smoothing_newton.QUICKEST": 0.3}),
+    newton("systems to 0.01", {"newton_krylov.ACCURACY": 0.01}),
+    newton(variants_table.AS_IT_IS, {}),
 ]
 
 

@@ -244,16 +244,12 @@ class Contact:
         )
         self.reaction, self.status = result[:2]
         if map == "smoothed" and self.drag is not None:
-            self._pull_back(*result[2:])
+            stiffness, home = self.drag
+            self.reaction[:, :-1] -= stiffness[:, None] * (self.slip_increment - home)
+            for by_motion in result[3:]:
+                for k in range(home.shape[1]):
+                    by_motion[:, k, k] -= stiffness
         return result[2:]
-
-    def _pull_back(self, _=None, by_motion=None) -> None:
-        """The springs of ``drag``, in the reactions and, if they are given, in their derivatives."""
-        stiffness, home = self.drag
-        self.reaction[:, :-1] -= stiffness[:, None] * (self.slip_increment - home)
-        if by_motion is not None:
-            for k in range(home.shape[1]):
-                by_motion[:, k, k] -= stiffness
 
     def take_reaction(self, forces: np.ndarray) -> None:
         """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""

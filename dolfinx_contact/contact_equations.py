@@ -83,8 +83,7 @@ class ContactEquations:
         if len(self.problem._stiffened.rigid) == 0:
             return x
         self._measured = None  # contacts will move
-        forces = self.b - self.body.multiply(x)
-        return self.problem._stiffened.rigid.balanced(x, forces, self._map)
+        return self.problem._stiffened.rigid.balanced(x, self._forces(x), self._map)
 
     def round_off(self, rounding: float, drag: float = 0.0, home=None) -> None:
         """Residuals from now on are those of a law without kink between sticking and slipping.

@@ -58,22 +58,21 @@ class SmoothingNewton:
                 if self._rounding < FINEST:
                     self._rounding = 0.0
 
-    def _step(self, x: np.ndarray) -> tuple[np.ndarray, float, float]:
-        """After one step of Newton's method: iterate, length of the step, size of the residual."""
-        system = self._system
-        residual = system.out_of_balance(x)
-        system.linearise(x)
+    def _step(self, x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """After one step of Newton's method: iterate, its residual, and the length of the step."""
+        self._system.linearise(x)
         dx, length, iterations = self._newton.step(x, residual)
         self._search.iterations += max(iterations, 1)
         x = x + length * dx
-        return x, length, system.size(system.out_of_balance(x))
+        return x, self._system.out_of_balance(x), length
 
     def _followed(self, x: np.ndarray) -> np.ndarray:
         """A step without springs; decides what the next one is like."""
         system = self._system
         system.round_off(self._rounding)
-        before = system.size(system.out_of_balance(x))
-        following, length, after = self._step(x)
+        residual = system.out_of_balance(x)
+        following, left, length = self._step(x, residual)
+        before, after = system.size(residual), system.size(left)
         if length < SHORT and not self._at_kinks:
             self._at_kinks, self._shrink = True, QUICKEST
             self._rounding = START * self._search.error
@@ -94,12 +93,12 @@ class SmoothingNewton:
     def _dragged(self, x: np.ndarray) -> np.ndarray:
         """Steps while springs pull back to ``x``; decides their stiffness and the next rounding."""
         system, home, shortest = self._system, x, 1.0
-        system.round_off(self._rounding)
-        before = system.size(system.out_of_balance(home))
         system.round_off(self._rounding, self._drag, home)
+        residual = system.out_of_balance(home)  # without springs the same: they pull back to here
+        before = system.size(residual)
         for _ in range(STEPS):
-            x, length, left = self._step(x)
-            shortest = min(shortest, length)
+            x, residual, length = self._step(x, residual)
+            left, shortest = system.size(residual), min(shortest, length)
             if left <= LEFT * before or length == 0.0:
                 break
         system.round_off(self._rounding)

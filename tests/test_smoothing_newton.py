@@ -102,4 +102,5 @@ def test_where_newtons_method_fails_the_fixed_point_goes_on(early, monkeypatch):
 
     monkeypatch.setattr(NewtonKrylov, "step", nowhere)
     pressed()
-    assert 0 < len(asked) <= 3 * -(-smoothing_newton.MOST // 7)  # three steps
+    stiffened = int(np.ceil(np.log(smoothing_newton.STIFFEST / smoothing_newton.DRAG) / np.log(4)))
+    assert len(asked) == 3 * (1 + 1 + stiffened)  # three steps: sharp, rounded off, with springs
