@@ -83,7 +83,8 @@ class ContactEquations:
         if len(self.problem._stiffened.rigid) == 0:
             return x
         self._measured = None  # contacts will move
-        return self.problem._stiffened.rigid.balanced(x, self._forces(x), self._map)
+        self._known = self.problem._stiffened.rigid.balanced(x, self._forces(x), self._map)
+        return self._known[0]
 
     def round_off(self, rounding: float, drag: float = 0.0, home=None) -> None:
         """Residuals from now on are those of a law without kink between sticking and slipping.

@@ -54,18 +54,20 @@ class RigidBalance:
         """Number of soft motions."""
         return len(self._energy)
 
-    def balanced(self, x: np.ndarray, forces: np.ndarray, map: str) -> np.ndarray:
-        """``x`` moved along the soft motions, or as it was if Newton's method finds no way down.
+    def balanced(
+        self, x: np.ndarray, forces: np.ndarray, map: str
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """``x`` and its forces, moved along the soft motions, or as they were if there is no way down.
 
         Args:
             x: Displacement of owned degrees of freedom.
             forces: ``f - K x``.
             map: Of the contacts, which have their metrics.
         """
-        start, (left, slope, size) = x, self._left(x, forces, map)
+        start, (left, slope, size) = (x, forces), self._left(x, forces, map)
         for _ in range(NEWTON):
             if np.linalg.norm(left) <= SMALL * size:
-                return x
+                return x, forces
             step = np.linalg.lstsq(slope, left, rcond=1e-13)[0]
             for halved in range(12):
                 c = 0.5**halved * step
@@ -76,7 +78,7 @@ class RigidBalance:
             else:
                 return start
             (x, forces), (left, slope, size) = trial, result
-        return x
+        return x, forces
 
     def _left(self, x, forces, map) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
