@@ -66,12 +66,12 @@ def bandwidth(comm, repeat: int = 5) -> float:
 
 
 def measure(
-    case: str, refine: int, steps: int | None, cycles: int, repeat: int, kept, **mesh
+    case: str, refine: int, lowest, steps: int | None, cycles: int, repeat: int, kept, **mesh
 ) -> dict:
     """Ratios of one run; ``kept(record)`` is called after every step, so that a run that is killed leaves them."""
     comm = MPI.COMM_WORLD
     before = peak_memory(comm)
-    punch = Punch(Parameters(case=case, cycles=cycles, refine=refine), **mesh)
+    punch = Punch(Parameters(case=case, cycles=cycles, refine=refine, lowest=lowest), **mesh)
     punch.problem.solver = dc.FixedPoint()
     body = punch.problem.body
     body._options = MULTIGRID
@@ -82,7 +82,7 @@ def measure(
     record = dict(
         case=case, unknowns=punch.head()["unknowns"], ranks=comm.size, commit=commit(), date=now(),
         load=[os.getloadavg()[0]], elastic=[elastic_solve(body, b, repeat)], steps=[],
-        lowest=mesh["lowest"],
+        lowest=lowest,
     )  # fmt: skip
     iterations, solve = record["elastic"][0]["iterations"], np.median(record["elastic"][0]["seconds"])  # fmt: skip
     if comm.rank == 0:
@@ -146,14 +146,14 @@ def main(argv=None) -> None:
     parser.add_argument("--lowest", type=float, help="height of the elements on the plane, mm; else all are equal")  # fmt: skip
     options = parser.parse_args(argv)
     CASES["frictionless"] = dict(mu=0.0)
-    mesh = dict(divisions=options.divisions, layers=options.divisions // 2, lowest=options.lowest)
+    mesh = dict(divisions=options.divisions, layers=options.divisions // 2)
     writes = options.json and MPI.COMM_WORLD.rank == 0
     results = []
     for refine in options.refine:
         for case in options.cases.split(","):
             results.append(
                 measure(
-                    case, refine, options.steps, options.cycles, options.repeat,
+                    case, refine, options.lowest, options.steps, options.cycles, options.repeat,
                     lambda record: writes and keep(options.json, record), **mesh,
                 )
             )  # fmt: skip

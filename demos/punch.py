@@ -51,6 +51,7 @@ class Parameters:
     height: float = 10.0
     young: float = 210e3
     poisson: float = 0.3
+    lowest: float | None = None  # height of the elements on the plane, mm; None: all are as high
     # Left open by the paper:
     unload_to: float | tuple[float, ...] = 0.02  # top face when unloaded; or one per cycle
     top: str = "bonded"  # "bonded": the top face does not move sideways; "free": it does
@@ -74,8 +75,8 @@ class Punch:
 
     def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, solver=None, **mesh_options):
         self.parameters, self.comm = parameters, comm
-        size = dict(radius=parameters.radius, height=parameters.height)
-        punch = punch_mesh(comm, parameters.refine, **size, **mesh_options)
+        shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
+        punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
         self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
         self.V = functionspace(self.mesh, ("Lagrange", 1, (3,)))
         self.u = fem.Function(self.V, name="displacement")

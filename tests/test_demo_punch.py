@@ -111,7 +111,8 @@ def test_mesh_geometry(radius, height):
 
 def test_layers_grow_from_the_plane():
     """The lowest layer is as high as asked for, each next one higher by the same factor, and the last one ends on top."""
-    x = owned_coordinates(punch_mesh(COMM, 1, lowest=0.1, height=5.0, divisions=2, layers=2).mesh)
+    punch = Punch(Parameters(refine=1, lowest=0.1, height=5.0), divisions=2, layers=2)
+    x = owned_coordinates(punch.mesh)
     levels = np.unique(np.concatenate(COMM.allgather(x[:, 2])).round(9))
     heights = np.diff(levels)
     assert heights[0] == pytest.approx(0.1, rel=1e-6)
