@@ -16,8 +16,9 @@ from petsc4py import PETSc
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
-from dolfinx_contact.linear_solver import LinearSolver
+from dolfinx_contact.linear_solver import LinearSolver, preconditioner
 from dolfinx_contact.rigid_motion import refuse_rigid_motion, rigid_modes
+from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
 
@@ -204,6 +205,15 @@ class ElasticBody:
     def solver(self, A) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
         return LinearSolver(A, self._options, self.prefix, self._rigid_modes)
+
+    def stiffened(self, A, S):
+        """What applies the preconditioner of ``A = K + S``, springs ``S``; GAMG's levels are those of K.
+
+        Collective.
+        """
+        if preconditioner(A, self._options, self.prefix) == "gamg":
+            return StiffenedMultigrid(self.ksp.getPC(), A, S)
+        return self.solver(A)
 
     def _rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""

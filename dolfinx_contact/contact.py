@@ -176,10 +176,13 @@ class Contact:
 
         gdim = self.frame.shape[0]
         dofs = self._global_dofs(K).reshape(-1, gdim)
-        blocks = np.einsum("ki,nk,kj->nij", self.frame, springs, self.frame)
-        for node, block in zip(dofs, blocks):
+        for node, block in zip(dofs, self.spring_blocks(springs)):
             K.setValues(node, node, block, addv=PETSc.InsertMode.ADD_VALUES)
         K.assemble()
+
+    def spring_blocks(self, springs: np.ndarray) -> np.ndarray:
+        """Springs in the local frame, ``shape=(n, gdim)``, as blocks ``shape=(n, gdim, gdim)`` in the global one."""
+        return np.einsum("ki,nk,kj->nij", self.frame, springs, self.frame)
 
     def _global_dofs(self, K) -> np.ndarray:
         return (self._dofs.ravel() + K.getOwnershipRange()[0]).astype(np.int32)

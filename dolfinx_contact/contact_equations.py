@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
 
 from dolfinx_contact.condensed import CondensedBody
 from dolfinx_contact.contact import Status
 from dolfinx_contact.error import Errors, projection_residual, relative
 from dolfinx_contact.linear_solver import LinearSolver, stage
 from dolfinx_contact.rigid_balance import RigidBalance
+from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
 from dolfinx_contact.surface_layer import SurfaceLayer
 
 # Newton's metric over the nodal stiffness, along the normal and along slip, which want their own: along slip
@@ -22,7 +25,7 @@ class _Stiffened(NamedTuple):
     """The body with the springs of one metric (map and factor) at its contact nodes."""
 
     metric: tuple[str, float]
-    solver: LinearSolver
+    solver: LinearSolver | StiffenedMultigrid
     rigid: RigidBalance
 
 
@@ -63,14 +66,28 @@ class ContactEquations:
         self._tangent, problem = None, self.problem
         if problem._stiffened is not None and problem._stiffened.metric == (map, factor):
             return
-        A = self.body.K.copy()
-        for contact in problem.contacts:
-            contact.add_springs(A, contact.springs(map))
         problem._free_springs()  # one factorisation at a time: memory counts more than time
         with stage("contact: set-up of springs"):
+            S, A = self._springs(map), self.body.K.copy()
+            A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             rigid = RigidBalance(self.body, problem.contacts, A)
-            problem._stiffened = _Stiffened((map, factor), self.body.solver(A), rigid)
+            problem._stiffened = _Stiffened((map, factor), self.body.stiffened(A, S), rigid)
         A.destroy()  # the solver has its own reference
+        S.destroy()
+
+    def _springs(self, map: str):
+        """The springs that belong to the metric, a PETSc matrix with entries at contact nodes alone."""
+        K = self.body.K
+        S = sparse.csr_matrix((self.body.size, K.getSize()[1]))
+        for contact in self.problem.contacts:
+            blocks = contact.spring_blocks(contact.springs(map))
+            i, j = (
+                np.broadcast_to(dofs, blocks.shape).ravel()
+                for dofs in (contact._dofs[:, :, None], contact._dofs[:, None, :])
+            )
+            S += sparse.csr_matrix((blocks.ravel(), (i, K.getOwnershipRange()[0] + j)), S.shape)
+        csr = (S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data)
+        return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=self.body.comm)
 
     def _set_metric(self, map: str, normal: float, tangential: float | None = None) -> None:
         self._map = map

@@ -38,6 +38,19 @@ def stage(name: str):
         log.pop()
 
 
+def preconditioner(A, options, prefix: str) -> str:
+    """PETSc's type of the preconditioner that a ``LinearSolver`` with these arguments has."""
+    default = _options(A, options).get("pc_type", "")
+    return PETSc.Options(prefix).getString("pc_type", default)
+
+
+def _options(A, options) -> dict:
+    """The options, or the default for a matrix of that size."""
+    if options is not None:
+        return options
+    return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
+
+
 class LinearSolverError(RuntimeError):
     """PETSc's linear solver did not solve; the message has its reason and options."""
 
@@ -54,9 +67,7 @@ class LinearSolver:
     """
 
     def __init__(self, A, options, prefix: str, near_nullspace):
-        if options is None:
-            options = DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
-        self._options = options
+        self._options = options = _options(A, options)
         self.ksp = PETSc.KSP().create(A.comm)
         self.ksp.setOptionsPrefix(prefix)
         if options.get("pc_type") not in ("lu", "cholesky"):

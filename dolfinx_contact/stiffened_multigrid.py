@@ -1,0 +1,61 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Multigrid for a matrix plus springs at a few nodes, on the levels of the matrix alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+
+
+class StiffenedMultigrid:
+    """PETSc's multigrid for ``A = K + S``, with the interpolations and smoothers of GAMG for ``K``.
+
+    On every level the matrix is that of ``K`` plus ``P^T S P``, whose cost is that of the few nodes with springs:
+    nothing of the body is coarsened a second time.
+
+    Args:
+        levels: The set-up preconditioner of ``K``, a PETSc PC of type GAMG.
+        A: The matrix plus springs.
+        S: The springs alone; their entries are among those of ``K``.  Collective.
+    """
+
+    def __init__(self, levels, A, S):
+        count = levels.getMGLevels()
+        self._pc = pc = PETSc.PC().create(A.comm)
+        pc.setOptionsPrefix(levels.getOptionsPrefix())
+        pc.setOperators(A, A)
+        pc.setType("mg")
+        pc.setMGLevels(count)
+        for level in reversed(range(count)):
+            smoother = pc.getMGSmoother(level)
+            smoother.setOperators(A, A)
+            if level > 0:
+                _as(levels.getMGSmoother(level), smoother)
+                P = levels.getMGInterpolation(level)
+                pc.setMGInterpolation(level, P)
+                S = S.PtAP(P)
+                A = levels.getMGSmoother(level - 1).getOperators()[1].copy()
+                A.axpy(1.0, S, SUBSET)
+        pc.setUp()
+        self._right, self._left = pc.getOperators()[1].createVecs()
+
+    def destroy(self) -> None:
+        """Free the levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
+        self._pc.destroy()
+
+    def apply(self, b: np.ndarray) -> np.ndarray:
+        """One cycle for ``A x = b``; arrays of owned degrees of freedom."""
+        self._left.array_w[:] = b
+        self._pc.apply(self._left, self._right)
+        return self._right.array_r.copy()
+
+
+def _as(known, smoother) -> None:
+    """Give a smoother the type, steps and preconditioner of another one, and what options say of it."""
+    smoother.setType(known.getType())
+    smoother.setTolerances(max_it=known.getTolerances()[3])
+    smoother.getPC().setType(known.getPC().getType())
+    smoother.setFromOptions()
