@@ -19,7 +19,7 @@ class Automatic:
     If the choice fails, the other one is tried.  ``equations.chosen`` says what was done and why.
     """
 
-    def solve(self, equations, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
+    def solve(self, equations, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
         comm = equations.body.comm
         contacts = equations.problem.contacts
         nodes = comm.allreduce(sum(len(contact.nodes) for contact in contacts))

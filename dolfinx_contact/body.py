@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 import ufl
@@ -21,6 +22,15 @@ from dolfinx_contact.rigid_motion import refuse_rigid_motion, rigid_modes
 from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
+
+
+class FreeState(NamedTuple):
+    """The displacement without contact under a load, arrays of owned degrees of freedom."""
+
+    digest: np.ndarray  # of the stiffness
+    load: np.ndarray
+    displacement: np.ndarray
+    exact: bool  # or to three digits
 
 
 class ElasticBody:
@@ -58,7 +68,7 @@ class ElasticBody:
         self._digest, self._load_digest = None, None
         self._assemblies = 0
         self.K, self._external, self._elastic = None, None, None
-        self.known = None  # digest of K, right-hand side and solution of a free state
+        self.known = None  # the last FreeState
 
     def refresh(self) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.
@@ -169,31 +179,42 @@ class ElasticBody:
 
     # -- solves --------------------------------------------------------------------------------
 
-    def solve(self, b: np.ndarray) -> np.ndarray:
+    def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
         """K^-1 b; the solver is set up at the first call and kept while K stands."""
         if self._elastic is None:
             self._elastic = self.solver(self.K)
-        return self._elastic.solve(b)
+        return self._elastic.solve(b, rough, start)
 
-    def free_state(self, b: np.ndarray) -> np.ndarray:
-        """Displacement under ``b`` alone; where ``b`` is an earlier one times a factor, so is the answer."""
-        if self.known is not None and self.known[0].tobytes() == self._digest:
-            _, known, x = self.known
-            factor = max(self.comm.allgather(_ratio(b, known)))[1]
-            sizes = np.abs([b - factor * known, b])
-            # Forces and boundary values have different units: each to its own rounding.
-            fixed = np.zeros(b.size, dtype=bool)
-            fixed[self.fixed] = True
-            largest = np.array(
-                [sizes[:, part].max(axis=1, initial=0.0) for part in (fixed, ~fixed)]
-            )
-            self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-            if (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all():
-                return factor * x
-        x = self.solve(b)
+    def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:
+        """Displacement under ``b`` alone; where ``b`` is an earlier one times a factor, so is the answer.
+
+        Args:
+            b: As ``load`` returns it.
+            rough: Three digits are enough, see ``linear_solver.ROUGH``; only where they are cheaper.
+        """
+        start = self._known_state(b)
+        if start is not None and (rough or self.known.exact):
+            return start
+        x = self.solve(b, rough, start)
         x[self.fixed] = b[self.fixed]
-        self.known = np.frombuffer(self._digest, dtype=np.uint8), b.copy(), x.copy()
+        exact = self._elastic.exact or not rough
+        digest = np.frombuffer(self._digest, dtype=np.uint8)
+        self.known = FreeState(digest, b.copy(), x.copy(), exact)
         return x
+
+    def _known_state(self, b: np.ndarray) -> np.ndarray | None:
+        """The last free state times a factor, if ``b`` is."""
+        if self.known is None or self.known.digest.tobytes() != self._digest:
+            return None
+        factor = max(self.comm.allgather(_ratio(b, self.known.load)))[1]
+        sizes = np.abs([b - factor * self.known.load, b])
+        # Forces and boundary values have different units: each to its own rounding.
+        fixed = np.zeros(b.size, dtype=bool)
+        fixed[self.fixed] = True
+        largest = np.array([sizes[:, part].max(axis=1, initial=0.0) for part in (fixed, ~fixed)])
+        self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+        same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
+        return factor * self.known.displacement if same else None
 
     @property
     def ksp(self):

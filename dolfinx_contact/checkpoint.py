@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.body import FreeState
 
 
 def save(problem, path) -> None:
@@ -24,8 +25,9 @@ def save(problem, path) -> None:
     for name, array in zip(("u", "before"), problem._states):
         mine[name] = _rows(problem, array)
     if problem.body.known:
-        digest, b, x = problem.body.known
-        mine |= {"digest": digest[None], "load": _rows(problem, b), "free": _rows(problem, x)}
+        known = problem.body.known
+        mine |= {"digest": known.digest[None], "load": _rows(problem, known.load)}
+        mine["free" if known.exact else "rough"] = _rows(problem, known.displacement)
     for k, contact in enumerate(problem.contacts):
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
     if problem._past:
@@ -83,7 +85,9 @@ def load(problem, path) -> None:
     problem._past.extend(map(tuple, past))
     problem.body.known = None
     if comm.allreduce("digest" in mine, op=MPI.LAND):
-        problem.body.known = mine["digest"], mine["load"].ravel(), mine["free"].ravel()
+        exact = "free" in mine
+        free = mine["free" if exact else "rough"].ravel()
+        problem.body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
 
 
 def _nodes(problem) -> dict[str, np.ndarray]:
@@ -103,7 +107,7 @@ def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
     part = {}
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
-        names = ["u", "before", "load", "free"] if prefix == "" else file
+        names = ["u", "before", "load", "free", "rough"] if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]
     # Of the coefficients for which the free state holds a rank knows its own share alone.

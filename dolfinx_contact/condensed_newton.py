@@ -133,7 +133,7 @@ class CondensedNewton:
             raise CondensedNotConverged(result)
         return result
 
-    def solve(self, equations, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
+    def solve(self, equations, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
         """One load step of a ``ContactProblem``.
 
         Args:
@@ -144,14 +144,14 @@ class CondensedNewton:
         Returns:
             The displacement of this rank and the number of iterations.
         """
-        body = equations.condensed()
-        q = body.free_displacement(equations.trial)
+        body, trial = equations.condensed(), equations.trial
+        q = body.free_displacement(trial)
         starts, iterations, error, rounding = body.starts(q), 0, np.inf, 0.0
         for factor in (0.1, 1e-3, 1e-3):  # this error is not quite the condensed problem's
             result = body.solve(self, q + rounding, max(factor * tol, 1e-14), starts)
             iterations += result.iterations
             equations.tried = result.tried
-            x, previous = body.displacement(equations.trial, result.reaction), error
+            x, previous = body.displacement(trial, result.reaction), error
             error = equations.measure(x)
             if error <= tol or not error < previous:
                 break

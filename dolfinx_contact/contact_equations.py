@@ -32,9 +32,8 @@ class _Stiffened(NamedTuple):
 class ContactEquations:
     """What a solver sees of a step: a residual, a correction, a metric and a sum over ranks."""
 
-    def __init__(self, problem, b, trial, load: float, load_displacement: float):
+    def __init__(self, problem, b, load: float, load_displacement: float):
         self.problem, self.body, self.b = problem, problem.body, b
-        self.trial = trial  # displacement without reactions
         self.chosen, self.tried = "none: nothing touches", ()
         self.load, self.load_displacement = load, load_displacement
         self.total = problem.body.total
@@ -43,6 +42,11 @@ class ContactEquations:
         self._evaluations = 0
         self._known = None  # a displacement, and the forces b - K x that it leaves
         self._measured = None  # displacement whose errors were measured with F
+
+    @property
+    def trial(self) -> np.ndarray:
+        """The displacement without reactions."""
+        return self.body.free_state(self.b)
 
     def guess(self) -> np.ndarray:
         """The user's ``u`` or the extrapolated last steps, whichever leaves the smaller error."""

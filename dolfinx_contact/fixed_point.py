@@ -72,20 +72,20 @@ class FixedPoint:
         self.map, self.rho, self.depth, self.max_iterations = map, rho, depth, max_iterations
         self.newton, self.max_seconds = bool(newton), max_seconds
 
-    def solve(self, system, x: np.ndarray, tol: float) -> tuple[np.ndarray, int]:
+    def solve(self, system, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
         """Iterate until ``system``'s error is at most ``tol``, or every metric has been tried.
 
         Args:
             system: Offers ``balanced(x)``, ``residual(x) -> (residual, error)``,
                 ``correction(residual)``, ``use_metric(map, factor)``, ``linearise(x)``,
-                what ``SmoothingNewton`` and ``NewtonKrylov`` need, ``trial``, ``guess()`` and ``total(array)``;
+                what ``SmoothingNewton`` and ``NewtonKrylov`` need, ``guess()`` and ``total(array)``;
                 nothing else is known of it.
-            x: Start, this rank's unknowns; for the bare ``system.trial``, ``system.guess()`` is taken.
+            x: Start, this rank's unknowns; None takes ``system.guess()``.
 
         Returns:
             The iterate of the smallest error, and the number of iterations.
         """
-        x = system.guess() if x is system.trial else x
+        x = system.guess() if x is None else x
         search = _Search(system, x, tol, self.max_seconds)
         hasty = self.newton
         for factor in METRICS[self.map] if self.rho is None else (self.rho,):

@@ -23,6 +23,9 @@ MULTIGRID = {
     "mg_levels_pc_type": "jacobi",
 }
 
+# Of a rough solve: enough to see that a body is pressed on a plane, and how hard.
+ROUGH = 1e-3
+
 # Unknowns beyond which a multigrid cycle is cheaper than a back-solve with a factorisation.
 LARGE = 50_000
 
@@ -93,14 +96,30 @@ class LinearSolver:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
         self.ksp.destroy()
 
-    def solve(self, b: np.ndarray) -> np.ndarray:
+    @property
+    def exact(self) -> bool:
+        """Whether every solve is, as with a factorisation."""
+        return self.ksp.getType() == "preonly"
+
+    def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
         """A^-1 b to the tolerance of the options; arrays of owned degrees of freedom.
+
+        Args:
+            b: Right-hand side.
+            rough: ``ROUGH`` is enough.
+            start: Where to start; None is zero.
 
         Raises:
             LinearSolverError: PETSc did not converge.
         """
         self._left.array_w[:] = b
+        if start is not None:
+            self._right.array_w[:] = start
+        self.ksp.setInitialGuessNonzero(start is not None)
+        rtol = self.ksp.getTolerances()[0]
+        self.ksp.setTolerances(rtol=max(rtol, ROUGH) if rough else rtol)
         self.ksp.solve(self._left, self._right)
+        self.ksp.setTolerances(rtol=rtol)
         if self.ksp.getConvergedReason() < 0:
             raise LinearSolverError(
                 f"PETSc's linear solver failed (KSPConvergedReason {self.ksp.getConvergedReason()}) "

@@ -69,6 +69,10 @@ class NotConverged(RuntimeError):
         self.step, self.displacement, self.reactions = step, displacement, reactions
 
 
+# Penetration over the largest displacement that three digits of it leave no doubt about.
+CERTAIN = 0.1
+
+
 class ContactProblem:
     """An elastic body pressed against rigid planes, solved load step by load step.
 
@@ -204,16 +208,27 @@ class ContactProblem:
             self._stiffness = [contact.rho for contact in self.contacts]
         b, external = body.load()
         with stage("contact: elastic solve"):
-            trial = body.free_state(b)
-        equations = ContactEquations(self, b, trial, *self._load(trial, external))
+            trial = body.free_state(b, rough=True)
+            if not self._presses(trial):  # then whether anything touches takes all digits
+                trial = body.free_state(b)
+        equations = ContactEquations(self, b, *self._load(trial, external))
         if not self._touches:
             equations.errors = equations.errors_if_open(trial)
             return trial, equations, 0
         equations.chosen = type(self.solver).__name__
         with stage("contact: iterations"):
-            x, iterations = self.solver.solve(equations, trial, self.tol)
+            x, iterations = self.solver.solve(equations, None, self.tol)
         equations.measure(x)
         return x, equations, iterations
+
+    def _presses(self, trial: np.ndarray) -> bool:
+        """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
+        deepest = 0.0
+        for contact in self.contacts:
+            contact.move(trial)
+            deepest = max(deepest, -contact.gap.min(initial=0.0))
+        deepest, largest = (self.body.largest(a) for a in (np.array([deepest]), np.abs(trial)))
+        return deepest > CERTAIN * largest
 
     def _load(self, trial: np.ndarray, external: np.ndarray) -> tuple[float, float]:
         """Load and load displacement, see ``dolfinx_contact.error``; notes whether anything touches."""

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
+from dolfinx_contact import linear_solver
 from dolfinx_contact._dolfinx import partitioner
 from dolfinx_contact.linear_solver import MULTIGRID
 
@@ -52,6 +53,40 @@ def test_ranks_change_neither_the_answer_nor_the_iterations(share):
     assert having.tolist() == expected[share]  # ranks with cells, with contact nodes
     assert np.abs(together - alone).max() <= 1e-8 * np.abs(alone).max()
     assert (np.abs(counts - counts_alone) <= np.maximum(0.25 * counts_alone, 1)).all()
+
+
+def pressed(*displacement, **options):
+    """A block after one step, with multigrid."""
+    scene = scenes.block(petsc_options=MULTIGRID, **options)
+    scene.move_top(*displacement)
+    scene.problem.solve()
+    return scene
+
+
+def test_three_digits_of_the_free_state_are_enough_where_it_presses(monkeypatch):
+    """Where contact is certain the elastic solve ends after three digits, and the answer is the same."""
+    roughly = pressed(0, 0, -0.005, solver=dc.FixedPoint())
+    iterations = roughly.problem.body.ksp.getIterationNumber()
+    monkeypatch.setattr(linear_solver, "ROUGH", 0.0)
+    exactly = pressed(0, 0, -0.005, solver=dc.FixedPoint())
+    assert iterations < 0.5 * exactly.problem.body.ksp.getIterationNumber()
+    assert not roughly.problem.body.known.exact
+    reactions, expected = (scenes.gathered(scene.contact)[1] for scene in (roughly, exactly))
+    assert np.abs(reactions - expected).max() <= 1e-8 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("height, solver", [(1e-5, None), (-1e-5, None), (-0.005, "condensed")])
+def test_all_digits_of_the_free_state_where_they_count(height, solver):
+    """Just above and just below the plane, and for the condensed operator, the free state is exact."""
+    solver = dc.CondensedNewton() if solver else dc.FixedPoint()
+    scene = pressed(0.001, 0, height, solver=solver)
+    body = scene.problem.body
+    known = body.known
+    assert known.exact
+    left = body.norm(known.load - body.multiply(known.displacement))
+    assert left <= 1e-10 * body.norm(known.load)
+    counts = scene.problem._counts()
+    assert (counts.open == sum(counts)) == (height > 0)
 
 
 def test_monitor_follows_error_and_statuses():

@@ -44,7 +44,7 @@ def equations_of(stiffness, cells, map, **options):
     problem._stiffness = [contact.rho for contact in problem.contacts]
     b, external = problem.body.load()
     trial = problem.body.free_state(b)
-    equations = ContactEquations(problem, b, trial, *problem._load(trial, external))
+    equations = ContactEquations(problem, b, *problem._load(trial, external))
     equations.use_metric(map, 1.0)
     return equations, trial
 

@@ -22,7 +22,7 @@ def linearised(map, turn=None, **options):
     problem = scene.problem
     b, external = problem.body.load()
     trial = problem.body.solve(b)
-    equations = ContactEquations(problem, b, trial, *problem._load(trial, external))
+    equations = ContactEquations(problem, b, *problem._load(trial, external))
     equations.use_metric(map, 1.0)
     x = problem._states[0] + 0.3 * (trial - problem._states[0])
     x[problem.body.fixed] = b[problem.body.fixed]
