@@ -48,7 +48,7 @@ def claims(records: list[dict]) -> dict[str, str]:
     large = [run for run in beyond if not run.get("lowest")]
     flat = [run for run in beyond if run.get("lowest") and run["whole"]]
     whole = [run for run in large if run["whole"]]
-    first = [run["times"][0] for run in large]
+    first = [run["times"][0] for run in beyond]
     set_up = {n: np.median([run["set_up"] for run in large if run["unknowns"] == n])
         for n in dict.fromkeys(run["unknowns"] for run in large)}  # fmt: skip
     return {
@@ -61,9 +61,9 @@ def claims(records: list[dict]) -> dict[str, str]:
         "first-step": f"{min(first):.1f} to {max(first):.1f}",
         "set-up": ", ".join(f"{ratio(value)} at {unknowns:,}" for unknowns, value in set_up.items()),
         "exponents": "; ".join(exponents(whole)),
-        "ranks": "; ".join(by_ranks(runs)),
-        "ranks-cycles": " and ".join(str(run["steps"][UNLOADING]["iterations"]) for run in pair(runs)),
-        "bandwidth": bandwidth(*(run["bandwidth"] for run in pair(runs))),
+        "ranks": ". ".join(by_ranks(runs)),
+        "ranks-cycles": "; ".join(counts(runs)),
+        "bandwidth": bandwidth(*(run["bandwidth"] for run in list(pairs(runs))[-1])),
     }  # fmt: skip
 
 
@@ -92,13 +92,15 @@ def exponents(runs: list[dict]):
         yield f"from {few:,} to {many:,} unknowns {', '.join(found)}"
 
 
-def pair(runs: list[dict]) -> tuple[dict, dict]:
-    """The run on two ranks, and before it the same on one."""
-    two = next(run for run in runs if run["ranks"] == 2)
-    which = two["case"], two["unknowns"]
-    return next(
-        run for run in runs if run["ranks"] == 1 and (run["case"], run["unknowns"]) == which
-    ), two
+def pairs(runs: list[dict]):
+    """Runs on two ranks, each behind the same run on one."""
+    for two in (run for run in runs if run["ranks"] == 2):
+        same = [run for run in runs if run["ranks"] == 1 and all(run.get(key) == two.get(key) for key in ("case", "unknowns", "lowest"))]  # fmt: skip
+        yield from ((one, two) for one in same)
+
+
+def named(run: dict) -> str:
+    return f"{run['unknowns']:,} unknowns, case {run['case']}{FLAT * bool(run.get('lowest'))}"
 
 
 def by_ranks(runs: list[dict]):
@@ -108,9 +110,22 @@ def by_ranks(runs: list[dict]):
         "first step with set-up": lambda run: run["seconds"][0],
         "a cycle of the first unloading": lambda run: run["seconds"][UNLOADING] / run["steps"][UNLOADING]["iterations"],
     }  # fmt: skip
-    for name, seconds in what.items():
-        one, two = map(seconds, pair(runs))
-        yield f"{name} {one:.3g} s to {two:.3g} s, {ratio(one / two)} times as fast"
+    for pair in pairs(runs):
+        gains = []
+        for name, seconds in what.items():
+            one, two = map(seconds, pair)
+            gains.append(f"{name} {one:.3g} s to {two:.3g} s, {ratio(one / two)} times as fast")
+        yield f"{named(pair[1])}: {'; '.join(gains)}"
+
+
+def counts(runs: list[dict]):
+    """Iterations of all steps that took any, on one rank and on two, and whether they are within a quarter."""
+    for pair in pairs(runs):
+        found = [[step["iterations"] for step in run["steps"]] for run in pair]
+        found = [both for both in zip(*found) if max(both) > 0]
+        apart = sum(abs(one - two) > 0.25 * one for one, two in found)
+        listed = ", ".join(f"{one}/{two}" for one, two in found)
+        yield f"{named(pair[1])}: {listed}, further apart than a quarter in {apart or 'none'} of them"
 
 
 def bandwidth(one: float, two: float) -> str:

@@ -10,7 +10,7 @@ For a displacement ``u`` and admissible nodal reactions ``r`` (in the friction c
   normal diagonal entry of the stiffness at the node, never the rho of a solver.
 - ``L`` is the load, which is not the reaction (zero when everything opens): the largest of the
   external forces, the reactions of the last step, and ``kappa`` times the penetration of the
-  contact-free trial state.  Where all three vanish nothing presses, and ``kappa |u|``, the forces
+  contact-free trial state, three digits of it where PETSc iterates.  Where all three vanish nothing presses, and ``kappa |u|``, the forces
   that hold a single node against that displacement, takes their place.
 
 The projection equation weights slip by ``Q^2`` and is blind where p is small, so a second number is kept

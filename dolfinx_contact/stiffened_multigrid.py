@@ -23,23 +23,25 @@ class StiffenedMultigrid:
     """
 
     def __init__(self, levels, A, S):
-        count = levels.getMGLevels()
+        finest, own = levels.getMGLevels() - 1, []
         self._pc = pc = PETSc.PC().create(A.comm)
         pc.setOptionsPrefix(levels.getOptionsPrefix())
         pc.setOperators(A, A)
         pc.setType("mg")
-        pc.setMGLevels(count)
-        for level in reversed(range(count)):
-            smoother = pc.getMGSmoother(level)
-            smoother.setOperators(A, A)
-            if level > 0:
-                _as(levels.getMGSmoother(level), smoother)
-                P = levels.getMGInterpolation(level)
-                pc.setMGInterpolation(level, P)
-                S = S.PtAP(P)
-                A = levels.getMGSmoother(level - 1).getOperators()[1].copy()
-                A.axpy(1.0, S, SUBSET)
+        pc.setMGLevels(finest + 1)
+        pc.getMGSmoother(finest).setOperators(A, A)
+        for level in range(finest, 0, -1):
+            _as(levels.getMGSmoother(level), pc.getMGSmoother(level))
+            P = levels.getMGInterpolation(level)
+            pc.setMGInterpolation(level, P)
+            S = S.PtAP(P)
+            A = levels.getMGSmoother(level - 1).getOperators()[1].copy()
+            A.axpy(1.0, S, SUBSET)
+            pc.getMGSmoother(level - 1).setOperators(A, A)
+            own += [S, A]
         pc.setUp()
+        for matrix in own:  # PETSc has its own references
+            matrix.destroy()
         self._right, self._left = pc.getOperators()[1].createVecs()
 
     def destroy(self) -> None:
