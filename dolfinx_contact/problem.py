@@ -209,8 +209,8 @@ class ContactProblem:
         b, external = body.load()
         with stage("contact: elastic solve"):
             trial = body.free_state(b, rough=True)
-            if not self._presses(trial):  # then whether anything touches takes all digits
-                trial = body.free_state(b)
+            if not (body.known.exact or self._presses(trial)):
+                trial = body.free_state(b)  # whether anything touches takes all digits
         equations = ContactEquations(self, b, *self._load(trial, external))
         if not self._touches:
             equations.errors = equations.errors_if_open(trial)
