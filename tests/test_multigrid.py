@@ -89,6 +89,17 @@ def test_all_digits_of_the_free_state_where_they_count(height, solver):
     assert (counts.open == sum(counts)) == (height > 0)
 
 
+@pytest.mark.parametrize("solver", [dc.FixedPoint, dc.CondensedNewton])
+def test_lifted_from_hardly_any_load(solver):
+    """The error of an open state is over the last reactions, however small beside what lifts the body off."""
+    scene = pressed(0, 0, -0.005, solver=solver())
+    for height in (-5e-6, 0.02):
+        scene.move_top(0.001, 0, height)
+        step = scene.problem.solve()
+        assert max(step.error, step.slip_error) <= scene.problem.tol
+    assert step.counts.open == sum(step.counts)
+
+
 def test_monitor_follows_error_and_statuses():
     """The monitor sees every residual, on all ranks alike; its last line is what the step says."""
     scene = scenes.block(solver=dc.FixedPoint(), petsc_options=MULTIGRID)

@@ -44,7 +44,7 @@ def test_levels_are_galerkin_products(threshold):
 
 
 def test_as_good_as_a_hierarchy_of_its_own():
-    """Conjugate gradients take as many iterations, within a tenth, as with GAMG set up for the sum."""
+    """Conjugate gradients take as many iterations, within a tenth or one, as with GAMG set up for the sum."""
     problem, pc = stiffened()
     A, body = pc.getOperators()[1], problem.body
     right, left = A.createVecs()
@@ -59,7 +59,7 @@ def test_as_good_as_a_hierarchy_of_its_own():
     difference = np.abs(own.solve(left.array_r.copy()) - right.array_r).max()
     assert difference <= 1e-8 * right.norm(PETSc.NormType.INFINITY)
     expected = own.ksp.getIterationNumber()
-    assert abs(ksp.getIterationNumber() - expected) <= 0.1 * expected
+    assert abs(ksp.getIterationNumber() - expected) <= max(0.1 * expected, 1)
     own.destroy()
 
 
