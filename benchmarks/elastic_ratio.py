@@ -66,16 +66,16 @@ def bandwidth(comm, repeat: int = 5) -> float:
 
 
 def measure(
-    case: str, refine: int, lowest, steps: int | None, cycles: int, repeat: int, kept, **mesh
+    case: str, refine: int, lowest, steps: int | None, air: bool, repeat: int, kept, **mesh
 ) -> dict:
     """Ratios of one run; ``kept(record)`` is called after every step, so that a run that is killed leaves them."""
     comm = MPI.COMM_WORLD
     before = peak_memory(comm)
-    punch = Punch(Parameters(case=case, cycles=cycles, refine=refine, lowest=lowest), **mesh)
+    punch = Punch(Parameters(case=case, refine=refine, lowest=lowest), **mesh)
     punch.problem.solver = dc.FixedPoint()
     body = punch.problem.body
     body._options = MULTIGRID
-    displacements = programme(punch.parameters)[:steps]
+    displacements = (into_the_air() if air else programme(punch.parameters))[:steps]
     punch.approach.value = -displacements[0]
     body.refresh()
     b, _ = body.load()
@@ -118,6 +118,12 @@ def measure(
     return record
 
 
+def into_the_air() -> list[float]:
+    """Pressed, raised nearly to where contact ends, into the air, pressed again, and the first step up."""
+    steps = programme(Parameters(cycles=2, unload_to=0.002))
+    return steps[:15] + [-0.01] + steps[15:21]
+
+
 def keep(file: Path, record: dict) -> None:
     """Write a record to the file, a line each, in place of the one of the same case, mesh and ranks."""
 
@@ -135,7 +141,7 @@ def main(argv=None) -> None:
     parser.add_argument("--cases", default="A,B,C,frictionless")
     parser.add_argument("--refine", type=int, nargs="*", default=[0, 1])
     parser.add_argument("--steps", type=int, help="only the first ones")
-    parser.add_argument("--cycles", type=int, default=1)
+    parser.add_argument("--air", action="store_true", help="the contact opens and closes again; into a file of its own")  # fmt: skip
     parser.add_argument("--repeat", type=int, default=3, help="elastic solves, before and after the steps")  # fmt: skip
     parser.add_argument(
         "--json", type=Path, help="where records go, each in place of its predecessor"
@@ -153,7 +159,7 @@ def main(argv=None) -> None:
         for case in options.cases.split(","):
             results.append(
                 measure(
-                    case, refine, options.lowest, options.steps, options.cycles, options.repeat,
+                    case, refine, options.lowest, options.steps, options.air, options.repeat,
                     lambda record: writes and keep(options.json, record), **mesh,
                 )
             )  # fmt: skip

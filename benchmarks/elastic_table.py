@@ -76,6 +76,19 @@ def claims(records: list[dict]) -> dict[str, str]:
     }  # fmt: skip
 
 
+def air(records: list[dict]) -> dict[str, str]:
+    """Of ``elastic_ratio.py --air``: the steps in which contact opens and closes, in elastic solves."""
+    phases = {
+        "first step": slice(0, 1), "first unloading": slice(5, 6), "to 0.002 mm, worst": slice(6, 15),
+        "into the air": slice(15, 16), "closing again": slice(16, 17), "second unloading": slice(21, 22),
+    }  # fmt: skip
+    lines = []
+    for run in map(numbers, records):
+        cells = [f"{run['cycles'][of].max():.2f}, {run['times'][of].max():.2f}" for of in phases.values()]  # fmt: skip
+        lines.append([f"{run['unknowns']:,}", run["case"] + FLAT * bool(run.get("lowest")), *cells])
+    return {"table": table(["unknowns", "case", *phases], lines), "when": measured(records)}
+
+
 def between(values) -> str:
     values = list(values)
     return f"{min(values):.1f} to {max(values):.1f}"

@@ -33,6 +33,7 @@ def texts(root: Path = ROOT) -> dict[str, str]:
 
     sources = {
         "report": report_claims.claims(read("report/report.json")["sections"]),
+        "air": elastic_table.air(read("elastic_air.json")),
         "elastic": elastic_table.claims(read("elastic_ratio.json")),
         "solvers": solvers_table.claims(read("solvers.json")),
         "variants": variants_table.claims(read("variants.json")),
