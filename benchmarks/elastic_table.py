@@ -13,13 +13,8 @@ TITLES = [
 ]  # fmt: skip
 FLAT = ", flat elements"  # at the plane, see element_height.py
 BEYOND = 500_000  # unknowns; case C with equally high elements is harder from there on
-TWICE = {
-    "f8083f5",
-    "7c640d6",
-    "4e5ac98",
-    "20ded36",
-    "0a6ac57",
-}  # libraries that set up a hierarchy for the springs, too
+# Libraries that set up a hierarchy for the springs, too.
+TWICE = {"f8083f5", "7c640d6", "4e5ac98", "20ded36", "0a6ac57"}
 UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycle
 
 
@@ -34,6 +29,10 @@ def numbers(record: dict) -> dict:
         whole=len(cycles) == CYCLE, set_up=float(np.median([run["setup"] for run in elastic])) / solve)  # fmt: skip
 
 
+def case(run: dict) -> str:
+    return run["case"] + FLAT * bool(run.get("lowest"))
+
+
 def row(record: dict) -> list[str]:
     """Ratios to the elastic solve; means are over a whole cycle, or left out."""
     of = numbers(record)
@@ -42,7 +41,7 @@ def row(record: dict) -> list[str]:
     mean = [f"{x.mean():.2f}" if of["whole"] else "–" for x in (cycles, times)]
     failed = " not converged" * ("failed" in record["steps"][-1])
     return [
-        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", of["case"] + FLAT * bool(of.get("lowest")),
+        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", case(of),
         f"{cycles[0]:.2f}", turn[0], f"{cycles.max():.2f}{failed}", mean[0],
         f"{times[0]:.1f}", turn[1], f"{times[1:].max(initial=0.0):.2f}", mean[1], f"{of['bytes_per_unknown']:.0f}",
     ]  # fmt: skip
@@ -79,13 +78,13 @@ def claims(records: list[dict]) -> dict[str, str]:
 def air(records: list[dict]) -> dict[str, str]:
     """Of ``elastic_ratio.py --air``: the steps in which contact opens and closes, in elastic solves."""
     phases = {
-        "first step": slice(0, 1), "first unloading": slice(5, 6), "to 0.002 mm, worst": slice(6, 15),
-        "into the air": slice(15, 16), "closing again": slice(16, 17), "second unloading": slice(21, 22),
+        "first step": [0], "first unloading": [UNLOADING], "to 0.002 mm, worst": range(UNLOADING + 1, CYCLE),
+        "into the air": [CYCLE], "closing again": [CYCLE + 1], "second unloading": [-1],
     }  # fmt: skip
     lines = []
     for run in map(numbers, records):
         cells = [f"{run['cycles'][of].max():.2f}, {run['times'][of].max():.2f}" for of in phases.values()]  # fmt: skip
-        lines.append([f"{run['unknowns']:,}", run["case"] + FLAT * bool(run.get("lowest")), *cells])
+        lines.append([f"{run['unknowns']:,}", case(run), *cells])
     return {"table": table(["unknowns", "case", *phases], lines), "when": measured(records)}
 
 
@@ -111,7 +110,7 @@ def exponents(runs: list[dict]):
     sizes = sorted({run["unknowns"] for run in runs})
 
     def like(run):
-        return run["case"], bool(run.get("lowest")), run["commit"] in TWICE
+        return case(run), run["commit"] in TWICE
 
     for few, many in zip(sizes, sizes[1:]):
         found = []
@@ -122,8 +121,7 @@ def exponents(runs: list[dict]):
                     large["solve"] / small["solve"],
                 )
                 power, elastic = np.log(costs) / np.log(many / few)
-                name = small["case"] + FLAT * bool(small.get("lowest"))
-                found.append(f"{name} {power:.2f} ({elastic:.2f})")
+                found.append(f"{case(small)} {power:.2f} ({elastic:.2f})")
         if found:
             yield f"from {few:,} to {many:,} unknowns {', '.join(found)}"
 
@@ -136,7 +134,7 @@ def pairs(runs: list[dict]):
 
 
 def named(run: dict) -> str:
-    return f"{run['unknowns']:,} unknowns, case {run['case']}{FLAT * bool(run.get('lowest'))}"
+    return f"{run['unknowns']:,} unknowns, case {case(run)}"
 
 
 def by_ranks(runs: list[dict]):

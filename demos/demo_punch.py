@@ -115,9 +115,7 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--point", type=float, nargs=2, metavar=("X", "Y"), help="P, mm; 3/4 R at 45 degrees")
     add("--tol", type=float, default=default.tol, help="error at which a step ends")
     add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
-    add(
-        "--lowest", type=float, help="height of the elements on the plane, mm; else all are as high"
-    )
+    add("--lowest", type=float, help="height of elements on the plane, mm; else all are as high")
     add("--solver", choices=SOLVERS, default="auto", help="paper: fixed point with its own map")
     add("--json", type=Path, metavar="FILE", help="numbers of all steps; DIR/punch.json")
     add("--output", type=Path, metavar="DIR", default=Path("results/punch"), help="what is written")

@@ -118,8 +118,11 @@ class LinearSolver:
         self.ksp.setInitialGuessNonzero(start is not None)
         rtol = self.ksp.getTolerances()[0]
         self.ksp.setTolerances(rtol=max(rtol, ROUGH) if rough else rtol)
-        self.ksp.solve(self._left, self._right)
-        self.ksp.setTolerances(rtol=rtol)
+        try:
+            self.ksp.solve(self._left, self._right)
+        finally:  # others use the KSP, too, also after a solve that was interrupted
+            self.ksp.setTolerances(rtol=rtol)
+            self.ksp.setInitialGuessNonzero(False)
         if self.ksp.getConvergedReason() < 0:
             raise LinearSolverError(
                 f"PETSc's linear solver failed (KSPConvergedReason {self.ksp.getConvergedReason()}) "

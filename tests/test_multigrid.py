@@ -89,6 +89,20 @@ def test_all_digits_of_the_free_state_where_they_count(height, solver):
     assert (counts.open == sum(counts)) == (height > 0)
 
 
+def test_an_interrupted_rough_solve_leaves_tolerance_and_start_as_they_were():
+    """Ctrl-C during a rough solve from a start: others that use the same KSP solve to all digits from zero."""
+    body = pressed(0, 0, -0.005, solver=dc.FixedPoint()).problem.body
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    body.ksp.setMonitor(interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        body.solve(body.known.load, rough=True, start=body.known.displacement)
+    assert body.ksp.getTolerances()[0] == MULTIGRID["ksp_rtol"]
+    assert not body.ksp.getInitialGuessNonzero()
+
+
 @pytest.mark.parametrize("solver", [dc.FixedPoint, dc.CondensedNewton])
 def test_lifted_from_hardly_any_load(solver):
     """The error of an open state is over the last reactions, however small beside what lifts the body off."""
