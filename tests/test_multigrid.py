@@ -97,7 +97,8 @@ def test_an_interrupted_rough_solve_leaves_tolerance_and_start_as_they_were():
         raise KeyboardInterrupt
 
     body.ksp.setMonitor(interrupt)
-    with pytest.raises(KeyboardInterrupt):
+    # PETSc 3.18 lets what a callback raises through, 3.25 raises an error of its own from it.
+    with pytest.raises((KeyboardInterrupt, PETSc.Error)):
         body.solve(body.known.load, rough=True, start=body.known.displacement)
     assert body.ksp.getTolerances()[0] == MULTIGRID["ksp_rtol"]
     assert not body.ksp.getInitialGuessNonzero()
