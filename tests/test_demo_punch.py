@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
@@ -179,6 +179,29 @@ def test_paper_cycle(case):
     if case == "A":
         unloaded = records[-1]["normal_reaction"], records[-1]["tangential_reaction_sum"]
         assert unloaded == pytest.approx((137076.4, 25818.9), rel=3e-5)
+
+
+def test_steps_start_from_the_nearer_state():
+    """Of the last state and the extrapolation of the last two, each step of case C starts from the one nearer to
+    its solution, in energy: the extrapolation in all steps but the first of loading and of unloading."""
+
+    class Noting(dc.FixedPoint):
+        def solve(self, system, x, tol):
+            self.start = system.guess()
+            return super().solve(system, self.start, tol)
+
+    solver, distances = Noting(), []
+    punch = Punch(Parameters(case="C", tol=1e-10, refine=-1), solver=solver)
+    body = punch.problem.body
+    for displacement in programme(punch.parameters):
+        last, before = punch.problem._states
+        punch.press(displacement)
+        solution = punch.problem._states[0]
+        steps = [solution - start for start in (solver.start, last, 2 * last - before)]
+        distances.append([body.total(step @ body.multiply(step)) for step in steps])
+    for index, (start, last, extrapolated) in enumerate(distances):
+        assert start <= 1.01 * min(last, extrapolated) + 1e-9 * distances[0][1]
+        assert (extrapolated < last) == (index not in (0, 5))
 
 
 @pytest.mark.skipif(COMM.size == 1, reason="compares several ranks with one")
