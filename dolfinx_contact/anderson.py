@@ -19,7 +19,7 @@ class Anderson:
     """
 
     def __init__(self, size: int, depth: int, total):
-        self._dx = np.empty((depth, size))
+        self._moves = np.empty((depth, size))  # dX + dG
         self._dg = np.empty((depth, size))
         self._gram = np.zeros((depth, depth))
         self._total = total
@@ -32,16 +32,17 @@ class Anderson:
 
     def step(self, x: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, float]:
         """The next iterate after ``x`` with the correction ``g``, and the global norm of ``g``."""
-        depth = self._dx.shape[0]
+        depth = self._dg.shape[0]
         row = None
         if self._last is not None:
             row = self._count % depth
-            np.subtract(x, self._last[0], out=self._dx[row])
             np.subtract(g, self._last[1], out=self._dg[row])
+            np.subtract(x, self._last[0], out=self._moves[row])
+            self._moves[row] += self._dg[row]
             self._count += 1
         self._last = (x, g)
         m = min(self._count, depth)
-        dx, dg = self._dx[:m], self._dg[:m]
+        dg = self._dg[:m]
         newest = np.zeros(m) if row is None else dg @ dg[row]
         sums = self._total(np.concatenate((newest, dg @ g, [g @ g])))
         norm = float(np.sqrt(sums[-1]))
@@ -49,7 +50,7 @@ class Anderson:
             return x + g, norm
         self._gram[row, :m] = self._gram[:m, row] = sums[:m]
         gamma = _solve(self._gram[:m, :m], sums[m:-1])
-        return x + g - gamma @ dx - gamma @ dg, norm
+        return x + g - gamma @ self._moves[:m], norm
 
 
 def _solve(gram: np.ndarray, rhs: np.ndarray) -> np.ndarray:

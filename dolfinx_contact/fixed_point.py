@@ -118,10 +118,13 @@ class FixedPoint:
             if search.left <= due:
                 if hasty and search.error > FALL * before[0]:
                     return before[1]
-                system.linearise(x)
-                anderson.restart()
+                # not where the end is as near as the last tangent is behind
+                if last[1] is None or search.error**2 > search.tol * last[0]:
+                    system.linearise(x)
+                    anderson.restart()
+                    smallest = np.inf
                 last, before = (search.error, x), last
-                smallest, due = np.inf, search.left - EVERY
+                due = search.left - EVERY
             following, norm = anderson.step(x, system.correction(residual))
             search.count(1)
             if norm > 1e3 * smallest:  # the differences mislead: start again from the best
@@ -135,7 +138,7 @@ class _Search:
     """The best iterate so far, and whether the search goes on."""
 
     def __init__(self, system, x: np.ndarray, tol: float, max_seconds: float):
-        self.system, self.best, self._tol = system, x, tol
+        self.system, self.best, self.tol = system, x, tol
         self.error = self._smallest = np.inf
         self.iterations = self.left = 0
         self._start, self._seconds = perf_counter(), max_seconds
@@ -162,7 +165,7 @@ class _Search:
         if self.error < self._smallest:
             self._smallest, self.best = self.error, x
         self._lost = not np.isfinite(self.error)
-        self.over = self.error <= self._tol or self._late()
+        self.over = self.error <= self.tol or self._late()
         return x, residual
 
     def _late(self) -> bool:
