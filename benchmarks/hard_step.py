@@ -179,6 +179,7 @@ class HardStep:
         problem = self.problem
         arguments = dict(rho=METRICS["return"][0], max_iterations=MOST) | variant.solver
         problem._free_solvers()
+        problem.body.forget_solver()  # the levels of K serve stiffness and springs
         problem.body._options = MULTIGRID | variant.options
         with constants(variant.constants):
             self._press(dc.FixedPoint(**arguments | dict(max_iterations=1, newton=False)))  # set-up

@@ -101,9 +101,7 @@ class ElasticBody:
                     "the stiffness contains NaN or infinity: check the material parameters in F."
                 )
         self._right, self._left = self.K.createVecs()
-        if self._elastic is not None:
-            self._elastic.destroy()
-        self._elastic = None
+        self.forget_solver()
         refuse_rigid_motion(self)
         self._digest = digest
         self._assemblies += 1
@@ -215,6 +213,12 @@ class ElasticBody:
         self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
         return factor * self.known.displacement if same else None
+
+    def forget_solver(self) -> None:
+        """Set the solver of K up anew when it is next needed.  Collective."""
+        if self._elastic is not None:
+            self._elastic.destroy()
+        self._elastic = None
 
     @property
     def ksp(self):
