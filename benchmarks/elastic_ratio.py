@@ -6,7 +6,7 @@ The punch with ``FixedPoint()``: every iteration is one residual, one return map
 cycle, and from the twentieth on one solve of the layers next to the plane.  The yardstick is
 conjugate gradients with the same preconditioner on the same body, from zero to 1e-10, in the same
 run; it is solved before and after the steps.  Seconds are processor seconds of the slowest rank.
-Runs under mpirun.
+Runs under mpirun.  ``--refine --json FILE`` measures nothing and prints the table of a file.
 """
 
 from __future__ import annotations
@@ -27,8 +27,15 @@ import numpy as np
 from mpi4py import MPI
 from punch import CASES, Parameters, Punch, programme
 from report_run import commit, now
+from tables import table
 
 from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
+
+TITLES = [
+    "unknowns", "ranks", "elastic: iterations, s", "case", "cycles: first step", "first unloading", "worst", "mean",
+    "seconds: first step, with set-up", "first unloading", "worst other", "mean, with set-up", "bytes per unknown",
+]  # fmt: skip
+UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycle
 
 
 def elastic_solve(body, b, repeat: int, clock=process_time) -> dict:
@@ -136,6 +143,31 @@ def keep(file: Path, record: dict) -> None:
     file.write_text("[" + ",\n".join(lines) + "]\n")
 
 
+def numbers(record: dict) -> dict:
+    """Cycles and seconds of the steps, and what an elastic solve of the same run takes."""
+    elastic = record["elastic"]
+    iterations = elastic[0]["iterations"]
+    solve = float(np.median([t for run in elastic for t in run["seconds"]]))
+    seconds = np.array([step["seconds"] for step in record["steps"]])
+    cycles = np.array([step["iterations"] for step in record["steps"]]) / iterations
+    return dict(record, iterations=iterations, solve=solve, cycles=cycles, times=seconds / solve, seconds=seconds,
+        whole=len(cycles) == CYCLE, set_up=float(np.median([run["setup"] for run in elastic])) / solve)  # fmt: skip
+
+
+def row(record: dict) -> list[str]:
+    """Ratios to the elastic solve; means are over a whole cycle, or left out."""
+    of = numbers(record)
+    cycles, times = of["cycles"], of["times"]
+    turn = [f"{x[UNLOADING]:.2f}" if len(x) > UNLOADING else "–" for x in (cycles, times)]
+    mean = [f"{x.mean():.2f}" if of["whole"] else "–" for x in (cycles, times)]
+    failed = " not converged" * ("failed" in record["steps"][-1])
+    return [
+        f"{of['unknowns']:,}", of["ranks"], f"{of['iterations']}, {of['solve']:.2g}", of["case"] + ", flat elements" * bool(of.get("lowest")),
+        f"{cycles[0]:.2f}", turn[0], f"{cycles.max():.2f}{failed}", mean[0],
+        f"{times[0]:.1f}", turn[1], f"{times[1:].max(initial=0.0):.2f}", mean[1], f"{of['bytes_per_unknown']:.0f}",
+    ]  # fmt: skip
+
+
 def main(argv=None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", default="A,B,C,frictionless")
@@ -144,7 +176,9 @@ def main(argv=None) -> None:
     parser.add_argument("--air", action="store_true", help="the contact opens and closes again; into a file of its own")  # fmt: skip
     parser.add_argument("--repeat", type=int, default=3, help="elastic solves, before and after the steps")  # fmt: skip
     parser.add_argument(
-        "--json", type=Path, help="where records go, each in place of its predecessor"
+        "--json",
+        type=Path,
+        help="where records go, each in place of its predecessor; the table is of all in it",
     )
     parser.add_argument(
         "--divisions", type=int, default=8, help="of a block's side; half as many layers"
@@ -164,11 +198,11 @@ def main(argv=None) -> None:
                 )
             )  # fmt: skip
     if MPI.COMM_WORLD.rank == 0:
-        # Here, because records of the report are kept as long as what they were measured with is the same.
-        from elastic_table import TITLES, row
-        from quotes import table
-
-        print(table(TITLES, map(row, results)))
+        print(
+            table(
+                TITLES, map(row, json.loads(options.json.read_text()) if options.json else results)
+            )
+        )
 
 
 if __name__ == "__main__":

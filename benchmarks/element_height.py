@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from tables import table
 
 HEIGHTS = 0.25, 0.5, 1.0, 2.0, 4.0  # of a brick over its width
 WAVES = 0.05, 0.2, 0.35, 0.5, 0.75, 1.0  # wave number times width over pi
@@ -78,13 +79,8 @@ def resistance(height: float, mu, p, poisson: float) -> list[float]:
     return rows
 
 
-def rows(poisson: float = 0.3) -> list[dict]:
-    """For case C."""
-    from punch import CASES
-
-    _, nu, d = worst_direction(**CASES["C"])
-    return [
-        dict(height=height, waves=WAVES, angle=np.degrees(np.arccos(nu @ d)),
-            resistance=resistance(height, **CASES["C"], poisson=poisson))
-        for height in HEIGHTS
-    ]  # fmt: skip
+if __name__ == "__main__":
+    case_c = dict(mu=(0.3, 0.15), p=(0.05, 0.20))
+    print(table(["height over width", *WAVES], [
+        [height, *(f"{value:.3f}" for value in resistance(height, **case_c, poisson=0.3))] for height in HEIGHTS
+    ]))  # fmt: skip

@@ -1,21 +1,25 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What docs/kernel.md quotes of kernel_bench.csv (medians of cpp/benchmarks/bench_kernel.cpp) and of docs/ferrari.json."""
+"""Tables of medians of cpp/benchmarks/bench_kernel.cpp, nanoseconds a node.
+
+python benchmarks/kernel_table.py notes/records/kernel_bench.csv
+"""
 
 from __future__ import annotations
 
 import csv
-from math import log10
+import sys
+from pathlib import Path
 
-from quotes import ratio, table
+from tables import ratio, table
 
 LAWS = ["frictionless", "isotropic", "associated", "nonassociated"]
 MAPS = ["scaled_map", "project", "bipotential_map", "return_map", "bipotential_gap"]
 BRANCHES = ["open", "stick", "slip"]
 
 
-def claims(text: str) -> dict[str, str]:
-    """Tables by key; nanoseconds a node."""
+def tables(text: str) -> list[str]:
+    """Mixes of branches, each branch alone, and what was aimed at."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     of = {
         (row["flags"], row["map"], row["law"], row["branches"], int(row["nodes"])): row
@@ -58,31 +62,14 @@ def claims(text: str) -> dict[str, str]:
         ("frictionless >= 3 times cheaper than orthotropic",
          f"{ratio(cheaper[0])} times (scaled map), {ratio(cheaper[1])} times (projection)", min(cheaper) >= 3),
     ]  # fmt: skip
-    key = "x86-64", "scaled_map", "nonassociated", "mix", 10**6
-    stream = ns(*key) * triad(*key)  # nanoseconds that the triad takes for the bytes of a node
     titles = ["map", "law"]
-    return {
-        "mix": table([*titles, "B/node", "n = 1e3", "n = 1e6", "n = 1e7", "native, 1e3", "native, 1e6"], each(mix)),
-        "branches": table([*titles, *BRANCHES, *(f"{b}, 1e6" for b in BRANCHES)], each(alone)),
-        "scaled-map": f"{plain:.0f} ns", "scaled-map-native": f"{native:.0f} ns", "half-bandwidth": f"{2 * stream:.0f}",
-        "triad": f"{float(of[key]['bytes_per_node']) / stream:.0f} GB/s",
-        "aims": table(["Aim", "Measured", ""], [(aim, found, "reached" if ok else "**not reached**") for aim, found, ok in aims]),
-    }  # fmt: skip
+    sizes = ["B/node", "n = 1e3", "n = 1e6", "n = 1e7", "native, 1e3", "native, 1e6"]
+    return [
+        table([*titles, *sizes], each(mix)),
+        table([*titles, *BRANCHES, *(f"{b}, 1e6" for b in BRANCHES)], each(alone)),
+        table(["aim", "measured", ""], [(aim, found, "reached" if ok else "not reached") for aim, found, ok in aims]),
+    ]  # fmt: skip
 
 
-def ferrari(record: dict) -> dict[str, str]:
-    """Digits that Ferrari's formula loses, of the 16 that there are, and the error of our projection in roundings."""
-    by_ratio, beside = (record[panel]["ferrari"] for panel in ("ratio", "distance"))
-    ratios = record["ratio"]["where"]
-
-    def lost(errors) -> str:
-        low, high = (f"{log10(x):.0f}" for x in (min(errors), max(errors)))
-        return low if low == high else f"{low} to {high}"
-
-    most, at = max(zip(by_ratio["worst"], ratios))
-    ours = max(max(record[panel]["project_cone"]["worst"]) for panel in ("ratio", "distance"))
-    return {
-        "outside": lost(by_ratio["median"]), "beside": lost(beside["median"]),
-        "nearly-equal": f"{log10(by_ratio['worst'][0]):.0f}", "nearly-equal-ratio": f"{ratios[0]:.1f}",
-        "most": f"{log10(most):.0f}", "most-ratio": f"{at:.0e}", "ours": f"{ours:.1f}",
-    }  # fmt: skip
+if __name__ == "__main__":
+    print("\n\n".join(tables(Path(sys.argv[1]).read_text())))

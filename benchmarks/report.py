@@ -24,7 +24,6 @@ sys.path.insert(1, str(Path(__file__).resolve().parent.parent / "tests"))
 import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
 
 # isort: split
-import quotes
 import report_algebraic
 import report_growth
 import report_ladder
@@ -123,8 +122,6 @@ def main(argv=None) -> Path:
     figures.mkdir(parents=True, exist_ok=True)
     report["figures"] = report_page.write(report, output / "report.html", figures)
     file.write_text(json.dumps(report, indent=1) + "\n")
-    if output == ROOT / "docs":
-        quotes.fill()
     print(f"page      {output / 'report.html'}\nfigures   {figures}")
     return output / "report.html"
 

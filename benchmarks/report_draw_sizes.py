@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from report_claims import last_exponent
 from report_draw import legend, panels, style
 
 NOISE = 1e-9  # relative; ten times the tolerance of the runs
@@ -242,3 +241,9 @@ def meshes_tables(data):
             }
             for row in data[family]
         ]  # fmt: skip
+
+
+def last_exponent(rows: list[dict], solver: str) -> tuple[int, float] | None:
+    """Growth of the seconds of a step over a solver's three largest sizes, and the smallest of these."""
+    of = sorted((row["unknowns"], row["step"]) for row in rows if row["solver"] == solver)[-3:]
+    return (of[0][0], float(np.polyfit(*np.log(np.transpose(of)), 1)[0])) if len(of) == 3 else None

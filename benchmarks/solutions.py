@@ -5,7 +5,8 @@
 Existence is certain for an elastic body, uniqueness is not. Every step is condensed to its contact nodes and
 solved from many random starts; each answer is judged by NumPy functions of the tests. The fixed point then
 does the step from the same history, which is Newton's; solution 0 is the one that Newton's method found there.
-Run by variants.py.
+
+    python benchmarks/solutions.py        # the block of tests/test_solutions.py, and the coarse punch
 """
 
 from __future__ import annotations
@@ -144,3 +145,10 @@ def block():
         return SimpleNamespace(problem=made.problem, contact=made.contact, move=lambda top: made.move_top(*top))  # fmt: skip
 
     return make, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)]
+
+
+if __name__ == "__main__":
+    make, steps = block()
+    examine(make, steps, [0, 200])
+    make, steps = punch("crossed", refine=-1)
+    examine(make, steps, [20] * len(steps))
