@@ -1,41 +1,87 @@
-"""Frictional contact of elastic bodies with rigid planes, for FEniCSx, by the bi-potential method."""
+"""Frictional contact of elastic bodies with rigid planes, for FEniCSx, by the bi-potential method.
 
-from dolfinx_contact import _dolfinx  # noqa: F401  (first: releases differ in what they want first)
-from dolfinx_contact.bipotential import bipotential_gap
-from dolfinx_contact.condensed_newton import (
-    CondensedNewton,
-    CondensedNotConverged,
-    CondensedResult,
-    solve_condensed,
-)
-from dolfinx_contact.contact import Contact, Status
-from dolfinx_contact.fixed_point import FixedPoint
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.friction_cone import load_function, project_cone
-from dolfinx_contact.history import History
-from dolfinx_contact.linear_solver import LinearSolverError
-from dolfinx_contact.plane import RigidPlane
-from dolfinx_contact.problem import ContactProblem, Counts, NotConverged, Step
-from dolfinx_contact.wear import Wear
+A name is imported where it is first used: those of arrays, such as ``solve_condensed``, ``project_cone`` and
+``Friction``, need NumPy alone; those of bodies, such as ``ContactProblem``, need DOLFINx and PETSc.
+"""
 
-__all__ = [
-    "CondensedNewton",
-    "CondensedNotConverged",
-    "CondensedResult",
-    "Contact",
-    "ContactProblem",
-    "Counts",
-    "FixedPoint",
-    "Friction",
-    "History",
-    "LinearSolverError",
-    "NotConverged",
-    "RigidPlane",
-    "Status",
-    "Step",
-    "Wear",
-    "bipotential_gap",
-    "load_function",
-    "project_cone",
-    "solve_condensed",
-]
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+try:  # the wheel dolfinx-solver-real wants to be imported before DOLFINx, PETSc and MPI
+    import dolfinx_solver  # noqa: F401
+except ImportError:
+    pass
+
+try:
+    from dolfinx_contact import _kernel  # noqa: F401
+except ImportError as error:
+    if error.name != __name__:  # it is there, and cannot be loaded
+        raise
+    raise ImportError(
+        f"{__path__[0]} has no compiled kernel. If this is a clone of the source, Python has found it in the "
+        "present directory, before an installed dolfinx_contact: start Python in another directory, or make the "
+        "kernel here by 'make .venv/ready' and use .venv/bin/python."
+    ) from error
+
+if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
+    from dolfinx_contact.bipotential import bipotential_gap as bipotential_gap
+    from dolfinx_contact.condensed_newton import CondensedNewton as CondensedNewton
+    from dolfinx_contact.condensed_newton import CondensedNotConverged as CondensedNotConverged
+    from dolfinx_contact.condensed_newton import CondensedResult as CondensedResult
+    from dolfinx_contact.condensed_newton import solve_condensed as solve_condensed
+    from dolfinx_contact.contact import Contact as Contact
+    from dolfinx_contact.contact import Status as Status
+    from dolfinx_contact.fixed_point import FixedPoint as FixedPoint
+    from dolfinx_contact.friction import Friction as Friction
+    from dolfinx_contact.friction_cone import load_function as load_function
+    from dolfinx_contact.friction_cone import project_cone as project_cone
+    from dolfinx_contact.history import History as History
+    from dolfinx_contact.linear_solver import LinearSolverError as LinearSolverError
+    from dolfinx_contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.problem import ContactProblem as ContactProblem
+    from dolfinx_contact.problem import Counts as Counts
+    from dolfinx_contact.problem import NotConverged as NotConverged
+    from dolfinx_contact.problem import Step as Step
+    from dolfinx_contact.wear import Wear as Wear
+
+    __version__: str
+
+_HOME = {  # the module of every name
+    "CondensedNewton": "condensed_newton",
+    "CondensedNotConverged": "condensed_newton",
+    "CondensedResult": "condensed_newton",
+    "Contact": "contact",
+    "ContactProblem": "problem",
+    "Counts": "problem",
+    "FixedPoint": "fixed_point",
+    "Friction": "friction",
+    "History": "history",
+    "LinearSolverError": "linear_solver",
+    "NotConverged": "problem",
+    "RigidPlane": "plane",
+    "Status": "contact",
+    "Step": "problem",
+    "Wear": "wear",
+    "bipotential_gap": "bipotential",
+    "load_function": "friction_cone",
+    "project_cone": "friction_cone",
+    "solve_condensed": "condensed_newton",
+}
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str):
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value = version(__name__)
+    elif name in _HOME:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME, "__version__"})

@@ -8,11 +8,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-try:  # the wheel dolfinx-solver-real wants to be imported before DOLFINx, PETSc and MPI
-    import dolfinx_solver  # noqa: F401
-except ImportError:
-    pass
-
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np

@@ -1,10 +1,14 @@
 """What the package promises before it computes anything, and what tools/probe.py refuses."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import dolfinx_contact  # before MPI, which one of DOLFINx's wheels needs
+
+# isort: split
 import pytest
 from mpi4py import MPI
 
@@ -15,22 +19,73 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def run(*arguments, **environment):
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PRTE_"))}
+def clean_environment() -> dict[str, str]:
+    """Without what an MPI launcher left, which would make a new interpreter one of its ranks."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PRTE_"))}
+
+
+def run(*arguments, cwd=None, **environment):
     return subprocess.run(
-        [sys.executable, *arguments], env=clean | environment, capture_output=True, text=True
-    )
+        [sys.executable, *arguments], cwd=cwd, env=clean_environment() | environment, capture_output=True, text=True
+    )  # fmt: skip
 
 
 def test_import_needs_no_extras():
-    """`import dolfinx_contact` imports none of the packages that only demos and tests need."""
+    """No public name imports any of the packages that only demos and tests need."""
     extras = ["gmsh", "matplotlib", "tqdm", "pytest", "hypothesis", "mpmath"]
+    code = "import sys, dolfinx_contact as dc; [getattr(dc, name) for name in dc.__all__]; "
+    result = run("-c", code + f"print([m for m in {extras} if m in sys.modules])")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip() == "[]"
+
+
+def test_arrays_need_numpy_alone(tmp_path):
+    """Without DOLFINx, PETSc, MPI and SciPy the functions of arrays work; what needs DOLFINx says so."""
+    blocked = ["dolfinx", "dolfinx_solver", "petsc4py", "mpi4py", "ufl", "basix", "ffcx", "scipy"]
     code = (
-        f"import sys, dolfinx_contact; print({extras}, [m for m in {extras} if m in sys.modules])"
+        f"import sys; sys.modules.update(dict.fromkeys({blocked}))"
+        + """
+import dolfinx_contact as dc
+import numpy as np
+
+friction = dc.Friction(mu=(0.3, 0.15), p=(0.05, 0.2))
+W, q = np.eye(6) + 0.1, np.array([[0.02, 0.0, -0.1], [0.0, 0.3, -0.1]])
+found = dc.solve_condensed(W, q, friction)
+w = q + (W @ found.reaction.ravel()).reshape(2, 3)
+assert np.abs(dc.bipotential_gap(found.reaction, w[:, 2], w[:, :2], friction)).max() < 1e-9
+assert np.abs(dc.project_cone(found.reaction, friction.mu) - found.reaction).max() < 1e-9
+assert dc.load_function(found.reaction, friction.mu).max() < 1e-9
+assert set(dc.__all__) | {"__version__"} <= set(dir(dc)) and dc.__version__
+try:
+    dc.ContactProblem
+except ImportError as error:
+    print(error.name)
+"""
     )
     result = run("-c", code)
     assert result.returncode == 0, result.stderr
-    assert result.stdout.strip().endswith("[]"), result.stdout
+    assert result.stdout.strip() in blocked
+
+
+def test_type_checkers_see_every_name():
+    """The names that type checkers read in __init__.py are those that are imported at run time."""
+    source = Path(dolfinx_contact.__file__).read_text()
+    written = re.findall(
+        r"^    from dolfinx_contact\.(\w+) import (\w+) as \2$", source, re.MULTILINE
+    )
+    assert {name: module for module, name in written} == dolfinx_contact._HOME
+
+
+def test_source_without_kernel_says_what_to_do(tmp_path):
+    """Where Python finds the source folder, which has no kernel, the error names it and what to do."""
+    folder = tmp_path / "dolfinx_contact"
+    folder.mkdir()
+    (folder / "__init__.py").write_text(Path(dolfinx_contact.__file__).read_text())
+    result = run("-S", "-c", "import dolfinx_contact", cwd=tmp_path)
+    assert result.returncode == 1
+    assert (
+        f"{folder} has no compiled kernel" in result.stderr and "make .venv/ready" in result.stderr
+    )
 
 
 def stand_in(folder, scalar="float", release="0.9.0", petsc=True):

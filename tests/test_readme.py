@@ -1,0 +1,59 @@
+"""README and docs: short, their scripts run as pasted, their links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+from test_packaging import clean_environment
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md")]
+PAGES += sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("notes/*.md")])
+SCRIPTS = [
+    (page, script)
+    for page in PAGES
+    for script in re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+]
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts interpreters")
+
+
+def test_readme_can_be_read_in_two_minutes():
+    """README has at most 450 words, one picture, and one script of at most 30 lines."""
+    text = (ROOT / "README.md").read_text()
+    assert len(text.split()) <= 450
+    assert text.count("![") == 1
+    (script,) = (script for page, script in SCRIPTS if page.name == "README.md")
+    assert len(script.splitlines()) <= 30
+
+
+@pytest.mark.parametrize("page, script", SCRIPTS, ids=[page.name for page, _ in SCRIPTS])
+def test_script_runs_as_pasted(page, script, tmp_path):
+    """Every Python script of README and docs runs by itself, in any directory, and prints something."""
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=clean_environment(), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def anchors(page: Path) -> set[str]:
+    """What a heading of the page can be linked by."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    """Every link and picture within the repository exists, with the heading it points to."""
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if "://" in link:
+            continue
+        name, _, heading = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        assert target.exists(), link
+        assert not heading or heading in anchors(target), link
