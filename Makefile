@@ -1,13 +1,15 @@
 # make punch    the paper's punch: the table, a picture and ParaView files in results/punch
 # make study    six cycles of cases A, B, C: all figures on one page, results/study/study.html;
 #               EXPLORE=1 also computes what the paper leaves open
-# make test     all tests: the C++ ones, and the Python ones on 1, 2 and 3 MPI ranks
+# make test     a test of every feature: the Python ones that are not marked slow, on 1 and 2 MPI ranks, and
+#               the kernel without Python
+# make test-all all tests: make test, the slow ones, 3 ranks, and the C++ ones
 # make stress   every solver on some 480 scenes, each answer judged by the NumPy twin; resumable
 # make report   error against run time: every solver, the peers beside it, the price of every ingredient;
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress report test test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress report test test-rest test-all test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -25,7 +27,17 @@ report: .venv/ready
 study: .venv/ready
 	.venv/bin/python demos/study_punch.py --output results/study $(if $(EXPLORE),--explore) $(ARGS)
 
-test: test-cpp test-python
+test: .venv/ready
+	for n in 1 2; do tools/mpitest .venv $$n -m "not slow" $(ARGS) || exit 1; done
+	tools/ctest example
+
+# what make test leaves out; it needs make test to come first
+test-rest: test-cpp
+	for n in 1 2; do tools/mpitest .venv $$n -m slow || exit 1; done
+	tools/mpitest .venv 3
+
+test-all: test
+	$(MAKE) test-rest
 
 test-cpp: .venv/ready
 	tools/ctest

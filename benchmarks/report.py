@@ -66,7 +66,7 @@ def run(plans: dict, directory: Path, minutes: float) -> dict:
     end = monotonic() + 60 * minutes
     records = {section: {} for section in plans}
     todo = [(section, measurement) for section, plan in plans.items() for measurement in plan]
-    with tqdm(total=len(todo), unit="measurement", smoothing=0.1) as bar:
+    with tqdm(total=len(todo), unit="measurement", smoothing=0.1, disable=None) as bar:
         for section, measurement in sorted(todo, key=lambda pair: pair[1].late):
             bar.set_description(measurement.name)
             record = stored(measurement, directory)

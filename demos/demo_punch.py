@@ -61,7 +61,8 @@ SOLVERS = {
 def run(punch: Punch) -> Iterator[dict]:
     """Compute the whole programme with a progress bar; yields the record of each step."""
     displacements = programme(punch.parameters)
-    with tqdm(displacements, f"case {punch.parameters.case}", disable=punch.comm.rank != 0) as bar:
+    hidden = True if punch.comm.rank != 0 else None  # None: where there is no terminal
+    with tqdm(displacements, f"case {punch.parameters.case}", disable=hidden) as bar:
 
         def show(iteration, error, counts):
             state = f"iteration {iteration}, error {error:.0e}"

@@ -80,7 +80,8 @@ def compute_all(runs, output: Path, points, mesh_options):
     """
     failures = []
     total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
-    with tqdm(total=total, unit="step", disable=COMM.rank != 0, smoothing=0.1) as bar:
+    hidden = True if COMM.rank != 0 else None  # None: where there is no terminal
+    with tqdm(total=total, unit="step", disable=hidden, smoothing=0.1) as bar:
         for name, cases in runs.items():
             for case, parameters in cases.items():
                 bar.set_description(f"case {case}, {name}")

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -128,3 +129,19 @@ def test_no_dolfinx_is_no_refusal():
     for arguments in (["-S", PROBE], [PROBE, sys.prefix]):
         result = run(*arguments)
         assert (result.returncode, result.stdout, result.stderr) == (1, "", "")
+
+
+def test_kernel_without_eigen_says_what_is_missing(tmp_path):
+    """Where CMake finds no Eigen, its message names Eigen and how to get it."""
+    cmake = shutil.which("cmake", path=f"{sys.prefix}/bin:{os.environ['PATH']}")
+    if cmake is None:
+        pytest.skip("no CMake here")
+    source, arguments = PROBE.parent.parent, ["-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON"]
+    found = subprocess.run(
+        [cmake, "-S", source, "-B", tmp_path, *arguments], capture_output=True, text=True
+    )
+    assert found.returncode == 1
+    assert (
+        "needs the headers of Eigen" in " ".join(found.stderr.split())
+        and "libeigen3-dev" in found.stderr
+    )

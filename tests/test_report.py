@@ -20,7 +20,10 @@ import report
 import report_run
 from report_run import Measurement, compute, current, stored
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes of its own")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes of its own"),
+]
 
 
 @pytest.fixture(scope="module")

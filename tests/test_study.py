@@ -59,6 +59,7 @@ def rows(file):
         return list(csv.DictReader(stream))
 
 
+@pytest.mark.slow
 def test_study_writes_everything(study):
     """Each figure exists as SVG and PNG with its data as CSV, and the page has all, by itself."""
     for name in FIGURES:
@@ -72,6 +73,7 @@ def test_study_writes_everything(study):
     assert '<td class="text">unload to</td><td>0.02</td>' in page
 
 
+@pytest.mark.slow
 def test_numbers_of_the_page_are_those_of_the_files(study):
     """Work per cycle is the same in history, CSV and page, and so is the worn volume."""
     page = (study / "study.html").read_text()
@@ -102,6 +104,7 @@ def closes(table, needed):
         assert (terms[name] >= -1e-9 * largest).all(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", ["base"] + ["unload_to_0_mm", "top_free"] * ALONE)
 def test_energy_balance_closes(study, variant):
     """Work of the platen = change of elastic energy + dissipation + what the scheme adds."""
@@ -123,6 +126,7 @@ def test_energy_balance_of_a_punch_that_opens_and_closes():
     closes(table, ["elastic_change", "dissipation_end", "half_du_K_du", "closing"])
 
 
+@pytest.mark.slow
 def test_every_statement_is_decided_by_the_data(study):
     """Verdicts follow from the answers of single runs, and every run was asked."""
     answers = rows(study / "figures" / "answers.csv")
@@ -244,6 +248,7 @@ def test_programme_with_an_end_per_unloading():
             programme(Parameters(cycles=3, unload_to=wrong))
 
 
+@pytest.mark.slow
 def test_other_settings_begin_anew(study):
     """A complete run costs nothing the second time; one with another number is computed again."""
     directory = study / "runs" / "again"
@@ -262,6 +267,7 @@ def test_other_settings_begin_anew(study):
 
 
 @pytest.mark.skipif(not ALONE, reason="starts processes of its own")
+@pytest.mark.slow
 def test_killed_study_continues_to_the_same_bits(tmp_path):
     """Killed at any moment, twice, and started again, it ends with the numbers of one never killed."""
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")

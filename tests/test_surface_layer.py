@@ -85,6 +85,7 @@ def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch)
     assert iterations(20) < 0.85 * iterations(10**6)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(scenes.COMM.size > 1, reason="memory of one process")
 def test_replaced_solvers_give_their_memory_back(monkeypatch):
     """A stiffness that changes in every step does not leave the factorisations of the last ones behind."""

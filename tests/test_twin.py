@@ -34,7 +34,9 @@ def dense_stiffness(scene):
 
 
 @pytest.mark.skipif(scenes.COMM.size > 1, reason="dense and slow: one rank is enough")
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [*list(CASES)[:-1], pytest.param("crossed", marks=pytest.mark.slow)]
+)
 def test_programme_agrees_with_the_twin(case):
     """Every step's reactions and error agree with the twin's to 1e-8; history goes along."""
     cells, mu, p = CASES[case]
