@@ -55,7 +55,7 @@ QUARTER = 2  # steps from the middle to the end of a stroke
 
 
 # %%
-def fret(cycles: int, wear: dc.Wear | None):
+def fret(cycles: int, wear: dc.Wear | None, quarter: int = QUARTER):
     """Press, then move the plane to and fro; the history, the load, and profiles before and after each cycle."""
     problem, held = cylinder(YOUNG, POISSON, wear)
     contact = problem.contacts[0]
@@ -69,7 +69,7 @@ def fret(cycles: int, wear: dc.Wear | None):
     stiffness = (load - low) / (0.02 * APPROACH)
     history = dc.History(problem)
     profiles = [profile(contact)]
-    ramp = np.arange(1, 4 * QUARTER + 1) / QUARTER
+    ramp = np.arange(1, 4 * quarter + 1) / quarter
     positions = STROKE * np.interp(ramp, [0, 1, 3, 4], [0, 1, -1, 0])
     for cycle in range(1, cycles + 1):
         for position in positions:
@@ -93,9 +93,10 @@ def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
 # ## Result
 #
 # Without wear the second and the third cycle are alike: that is shakedown into a steady loop.
-# There, $\oint Q \,\mathrm{d}s = D$. Both are taken by the trapezoidal rule, for which the balance
-# of energy closes by algebra; so this says that nothing is lost in between, not that the steps are
-# small enough.
+# There, $\oint Q \,\mathrm{d}s = D$ as steps become small. $Q$ is known at the ends of steps, and
+# turns around within one: the trapezoidal rule for $\oint Q \,\mathrm{d}s$ lacks 5.6 % with two steps
+# a quarter and 1.5 % with four. $D$, the sum of $\frac12 (P_0 + P_1) \mu |\Delta u_t|$ over nodes
+# and steps, changes by less than 0.1 % between the two.
 #
 # With wear, over four cycles:
 #
@@ -107,16 +108,23 @@ def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
 # %%
 def main() -> list[dict]:
     """Fret without and with wear; print and assert what is claimed above; the profiles with wear."""
-    steps = 4 * QUARTER
-    history, _, _ = fret(3, None)
-    force, position = history.column("contact0_force_x"), history.column("position")
-    dissipated = history.column("contact0_dissipation")[steps - 1 :: steps]
-    work = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(position))[steps - 2 :: steps]
-    second, third = np.diff(dissipated)
-    loop = np.diff(work)[-1]
-    if COMM.rank == 0:
-        print(f"without wear: dissipation {second:.4e}, {third:.4e} N a cycle, work {loop:.4e}")
-    assert abs(third / second - 1) < 1e-6 and abs(loop / third - 1) < 1e-6
+    found, lacking = [], []
+    for quarter in (QUARTER, 2 * QUARTER):
+        steps = 4 * quarter
+        history, _, _ = fret(3, None, quarter)
+        force, position = history.column("contact0_force_x"), history.column("position")
+        dissipated = history.column("contact0_dissipation")[steps - 1 :: steps]
+        work = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(position))[steps - 2 :: steps]
+        second, third = np.diff(dissipated)
+        loop = np.diff(work)[-1]
+        found.append(third)
+        lacking.append(1 - loop / third)
+        if COMM.rank == 0:
+            print(f"without wear, {quarter} steps a quarter: dissipation {second:.4e}", end=", ")
+            print(f"{third:.4e} N a cycle, work of the plane {loop:.4e}")
+        assert abs(third / second - 1) < 1e-6
+    assert abs(found[1] / found[0] - 1) < 1e-3
+    assert 0 < 3 * lacking[1] < lacking[0] < 0.06  # towards a quarter
 
     history, load, profiles = fret(4, dc.Wear(COEFFICIENT))
     dissipated = history.column("contact0_dissipation")

@@ -31,7 +31,7 @@ CAPTIONS = {  # in the order of the page; what to see in each figure stands in d
     "fig5": "Figure 5. Friction force at P against the programme.",
     "fig6": "Figure 6. Slip of P against the programme; shaded where P sticks.",
     "fig7": "Figure 7. Applied force against slip of P.",
-    "dissipation": "Work of friction per area by the trapezoidal rule, on one logarithmic scale; what is "
+    "dissipation": "Work of friction per area, on one logarithmic scale; what is "
     "below it has its lowest colour.",
     "wear": "Archard's worn depth: coefficient times work of friction over nodal area.",
     "cycles": "How the work of friction settles.",
@@ -46,7 +46,8 @@ reactions, the elastic energy from an integral over the body, so the sum closes 
 complementarity and the bookkeeping of slip do. It is no evidence that the increments are small enough: ½ Δu·K Δu, which forces of
 the end of the step add, is not small, most of it the bulk's compression. With means of old and new forces that term vanishes by
 algebra; the trapezoidal balance therefore closes for any increments, and its closing is no evidence either.
-The trapezoidal rule is used for dissipation because it converges: see the table of variants.</p>"""
+The work of friction of all tables is neither dissipation of a balance: it is the library's rule, never negative at
+any node and exact for rigid sliding (docs/dissipation.md); how it converges is in the table of variants.</p>"""
 
 
 def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=()) -> None:

@@ -39,7 +39,8 @@ class EnergyBalance:
     with F the force on the platen, d its displacement, W the elastic energy and ``D = - sum r_t.Delta u_t``
     the dissipation with forces of the end of the step. The last two terms are what the scheme
     adds; both are >= 0. With means of old and new forces (trapezoidal rule) the third term
-    vanishes and the last is ``half sum (r_n x_n(before) - r_n(before) x_n)``.
+    vanishes and the last is ``half sum (r_n x_n(before) - r_n(before) x_n)``. Neither D is the work of friction,
+    ``work_of_friction``, which stands beside them: docs/dissipation.md says why.
 
     F is taken from the contact law, W from the form that UFL integrates over the body, so that the
     sums close only if equilibrium, complementarity and the bookkeeping of slip do.
@@ -69,26 +70,30 @@ class EnergyBalance:
         reaction, gap, dissipation = self.before
         self.increment.x.array[:] = self.punch.u.x.array - self.u
         force, moved = contact.force()[2], self.depth - float(self.punch.approach.value)
-        work = -(contact.reaction[:, :2] * contact.slip_increment).sum()
+        end, mean = (
+            -(forces[:, :2] * contact.slip_increment).sum()
+            for forces in (contact.reaction, 0.5 * (reaction + contact.reaction))
+        )
         closing = (contact.reaction[:, 2] * gap).sum()
         opening = (reaction[:, 2] * contact.gap).sum()
-        trapezoidal = (contact.dissipation - dissipation).sum()
-        sums = np.array([work, trapezoidal, closing, opening])
+        work = (contact.dissipation - dissipation).sum()
+        sums = np.array([end, mean, work, closing, opening])
         self.punch.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-        work, trapezoidal, closing, opening = sums.tolist()
+        end, mean, work, closing, opening = sums.tolist()
         row = {
             "platen_work": force * moved,
             "elastic_change": self._integral(0) - self.energy,
-            "dissipation_end": work,
+            "dissipation_end": end,
             "half_du_K_du": self._integral(1),
             "closing": closing,
         }
         row["residual"] = row["platen_work"] - sum(list(row.values())[1:])
+        row["work_of_friction"] = work
         row["platen_work_mean"] = 0.5 * (self.force + force) * moved
-        row["dissipation_trapezoidal"] = trapezoidal
+        row["dissipation_mean"] = mean
         row["closing_mean"] = 0.5 * (closing - opening)
         row["residual_mean"] = (
-            row["platen_work_mean"] - row["elastic_change"] - trapezoidal - row["closing_mean"]
+            row["platen_work_mean"] - row["elastic_change"] - mean - row["closing_mean"]
         )
         return {name: float(value) for name, value in row.items()}
 

@@ -154,7 +154,7 @@ def tenfold_area(runs) -> float:
     area = next(iter(runs.values())).area
     works = np.array([run.dissipation(run.parameters.cycles) for run in runs.values()])
     counts = (works / area).max(axis=0) >= 0.1 * works.mean(axis=0).sum() / area.sum()
-    tenfold = works.max(axis=0) >= 10 * np.maximum(works.min(axis=0), 0.0)
+    tenfold = works.max(axis=0) >= 10 * works.min(axis=0)
     return float(area[counts & tenfold].sum() / area.sum())
 
 

@@ -15,7 +15,7 @@ TERMS = {  # column of the history: label and style
     "dissipation_end": ("dissipation $D$, end of step", "#d55e00", "-"),
     "half_du_K_du": ("$\\frac{1}{2}\\Delta u\\cdot K\\,\\Delta u$", "#009e73", "--"),
     "closing": ("closing nodes, $\\Sigma r_n x_n^{before}$", "#cc79a7", ":"),
-    "dissipation_trapezoidal": ("dissipation, trapezoidal", "#e69f00", "--"),
+    "work_of_friction": ("work of friction", "#e69f00", "--"),
 }
 
 
@@ -56,7 +56,7 @@ def energy(figures: Figures) -> None:
         )
         figures.save(figure, "energy")
     names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual",
-             "platen_work_mean", "closing_mean", "residual_mean")  # fmt: skip
+             "platen_work_mean", "dissipation_mean", "closing_mean", "residual_mean")  # fmt: skip
     rows = [
         {"case": case, **{name: float(run.table[name][k]) for name in names}}
         for case, run in runs.items()
@@ -223,7 +223,7 @@ def convergence(figures: Figures, rows: list[dict], runs) -> bool:
                 sizes = [size for size, _ in mine]
                 style = dict(color=COLOURS[case], marker="osD"["ABC".index(case)])
                 for key, dash, rule in (
-                    ("first_cycle_Nmm", "-", "trapezoidal"),
+                    ("first_cycle_Nmm", "-", "the library's rule"),
                     ("end_of_step_rule_Nmm", ":", "end of step"),
                 ):
                     work = [of[name, case][key] for _, name in mine]

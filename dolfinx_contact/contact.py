@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.dissipation import work_of_friction
 from dolfinx_contact.friction import Friction
 from dolfinx_contact.plane import RigidPlane
 from dolfinx_contact.wear import Wear
@@ -70,10 +71,10 @@ class Contact:
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``, set by
             ``ContactProblem``.  There is neither slip nor friction in them: what the support carries
             is no reaction of the plane.
-        dissipation: Work of friction since the start, ``shape=(n,)``, force times length: the sum of
-            ``-(r_t + r_t of the last step) / 2 . slip_increment``, the trapezoidal rule.
+        dissipation: Work of friction since the start, ``shape=(n,)``, force times length; it never
+            decreases, see ``work_of_friction`` in ``dissipation.py``.
         slip_path: Length of the path slipped while in contact since the start, ``shape=(n,)``.
-        wear_depth: Worn depth, ``shape=(n,)``, length; zero without ``wear``.
+        wear_depth: Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``.
     """
 
     def __init__(self, V, facets, plane: RigidPlane, friction: Friction, wear: Wear | None = None):
@@ -283,8 +284,8 @@ class Contact:
 
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
-        before = self.previous_reaction
-        work = -0.5 * (before + self.reaction)[:, :-1] * self.slip_increment
+        before, slipped = self._converged.reaction, self._converged.status == Status.SLIP
+        work = work_of_friction(self.friction, before, slipped, self.reaction, self.slip_increment)
         self.dissipation += work.sum(axis=1)
         if self.wear is not None:
             self.wear_depth += self.wear.depth(work, self.area)

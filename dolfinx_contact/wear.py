@@ -8,8 +8,8 @@ import numpy as np
 class Wear:
     """Wear that feeds back: after every step worn depth opens the gap of the next one.
 
-    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i`` the work of friction in direction i
-    during the step and ``A`` the nodal area; so the worn volume, the sum of depth times area, is
+    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the work of friction along principal
+    direction i during the step (``dissipation.py``) and ``A`` the nodal area; so the worn volume, the sum of depth times area, is
     ``sum k_i w_i`` exactly.  With one coefficient and isotropic friction ``k = K / (mu H)`` is Archard's
     law, K his coefficient and H the hardness [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 

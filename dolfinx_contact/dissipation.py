@@ -1,0 +1,73 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+r"""Work of friction of a load step, node by node: never negative, exact for rigid sliding.
+
+A node that slips along the unit vector ``e`` under the normal force N works ``N m(e)`` per way, with
+
+.. math:: m(e) = \frac{e \cdot P^2 e}{|M^{-1} P^2 e|} = \sum_i \mu_i e_i s_i, \qquad
+          s = \frac{M^{-1} P^2 e}{|M^{-1} P^2 e|},
+
+because its force is ``-N M s``.  The rule is the mean of both ends of the step times the way,
+
+    D = |du| (N0 m0 + N1 m(e1)) / 2,    e1 = du / |du|,    m0 = c m(e0) + (1 - c) m(e1),
+
+with the direction e0 in which the last step's force says that the node was slipping then, and ``c = max(e0.e1, 0)``;
+c = 0 if it did not slip.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.friction import Friction
+
+
+def work_of_friction(friction: Friction, before, slipped, reaction, slip_increment) -> np.ndarray:
+    """Work of friction of one step along the principal friction directions, all entries >= 0.
+
+    Args:
+        friction: The law.
+        before: Reactions at the end of the last step, ``shape=(n, gdim)``, local frame.
+        slipped: Nodes that slipped in the last step, ``shape=(n,)``, bool.
+        reaction: Reactions at the end of this one; of these the normal components count.
+        slip_increment: Slip during this one, ``shape=(n, gdim - 1)``, local frame.
+
+    Returns:
+        ``shape=(n, gdim - 1)``, force times length; the work of a node is the sum of its row.
+        Normal forces below zero, which only a state that is no solution has, count as none.
+    """
+    tangents = np.shape(slip_increment)[1]
+    mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
+    way, e1 = _split(_along_axes(friction, slip_increment))
+    _, s1 = _split(Q**2 * mu * e1)  # M^-1 P^2 e1
+    per_way = mu * e1 * s1
+
+    s0, e0 = _of_force(mu, Q, _along_axes(friction, before[:, :-1]))
+    c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
+    per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
+    N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
+    return 0.5 * way * (N0 * per_way_before + N1 * per_way)
+
+
+def _of_force(mu, Q, force) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors ``s`` along ``-M^-1 r_t`` and ``e`` along ``-P^-2 r_t`` of tangential forces r_t."""
+    slippery = mu == 0
+    M, P = (np.where(slippery, 1.0, a) for a in (mu, Q * mu))
+    M, P = (a / a.min(axis=-1, keepdims=True) for a in (M, P))  # directions only: no overflow
+    _, s = _split(np.where(slippery, 0.0, -force) / M)
+    _, e = _split(s * M / P**2)
+    return s, e
+
+
+def _along_axes(friction: Friction, t: np.ndarray) -> np.ndarray:
+    """Components of tangential vectors along the principal friction directions."""
+    if friction.axes is None:
+        return t
+    (x, y), (cos, sin) = t.T, friction.axes.T
+    return np.column_stack((cos * x + sin * y, cos * y - sin * x))
+
+
+def _split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero ones stay zero."""
+    length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
+    return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)
