@@ -1,0 +1,103 @@
+"""Work of friction against the increments: the punch, and one node on a spring; tables of docs/dissipation.md.
+
+    python benchmarks/work_of_friction.py [increments ...]      (default 15 30 60 120 240 480; some minutes)
+
+Four rules get the same states: the library's; `chord`, mean normal force times the work per way and force of the
+chord; `mean`, mean force times slip (trapezoidal); `end`, force of the end of the step times slip.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
+import numpy as np
+from punch import CASES, Parameters, Punch, programme
+from scipy.optimize import brentq
+
+import dolfinx_contact as dc
+from dolfinx_contact.dissipation import work_of_friction
+
+RULES = ("library", "chord", "mean", "end")
+
+
+def works(friction, before, slipped, reaction, slip) -> np.ndarray:
+    """Work of a step by the four rules, summed over the nodes."""
+    nothing = np.zeros(len(slip), dtype=bool)
+    mean, end = (-(r[:, :2] * slip).sum() for r in (0.5 * (before + reaction), reaction))
+    by = (work_of_friction(friction, before, s, reaction, slip).sum() for s in (slipped, nothing))
+    return np.array([*by, mean, end])
+
+
+def punch(case: str, increments: int):
+    """First cycle of the paper's punch: works, work of the platen with mean forces, last state."""
+    factor = increments // 15
+    parameters = Parameters(case=case, loading=5 * factor, unloading=10 * factor)
+    body = Punch(parameters)
+    contact, total, platen, depth, force = body.contact, np.zeros(4), 0.0, 0.0, 0.0
+    for displacement in programme(parameters):
+        before, slipped = contact.reaction, contact.status == dc.Status.SLIP
+        body.press(displacement)
+        total += works(contact.friction, before, slipped, contact.reaction, contact.slip_increment)
+        last, force = force, contact.force()[2]
+        platen += 0.5 * (last + force) * (displacement - depth)
+        depth = displacement
+    assert abs(total[0] / contact.dissipation.sum() - 1) < 1e-12
+    return total, platen, contact.reaction
+
+
+def node_on_a_spring(case: str, steps: int, lag: float) -> np.ndarray:
+    """Unit normal force; the spring's other end runs 1.5 times around the unit circle.
+
+    The spring yields by ``lag`` under the largest friction force. Backward Euler, step by step.
+    """
+    friction = dc.Friction(**CASES[case])
+    mu, q = friction.mu, (friction.p.max() / friction.p) ** 2
+    stiffness = mu.max() / lag
+    angle = 0.35 + 3 * np.pi * np.arange(steps + 1) / steps
+    path = np.column_stack((np.cos(angle), np.sin(angle)))
+    force, slipped, total = np.zeros(2), False, np.zeros(4)
+    for moved in np.diff(path, axis=0):
+        trial, before = force + stiffness * moved, force
+
+        def beyond(slip, trial=trial):
+            return np.linalg.norm(trial / (1 + slip * q) / mu) - 1
+
+        slip = brentq(beyond, 0, 1e6, xtol=1e-300, rtol=1e-15) if beyond(0) > 0 else 0.0
+        force = trial / (1 + slip * q)
+        r = (np.array([[*-f, 1.0]]) for f in (before, force))
+        states = next(r), np.array([slipped]), next(r)
+        total += works(friction, *states, (trial - force)[None] / stiffness)
+        slipped = slip > 0
+    return total
+
+
+def main(increments) -> None:
+    print("case increments |", *RULES, "| platen, mean | change of the last reactions")
+    for case in CASES:
+        last = None
+        for n in increments:
+            total, platen, r = punch(case, n)
+            change = np.nan if last is None else np.linalg.norm(r - last) / np.linalg.norm(r)
+            print(
+                case,
+                n,
+                "|",
+                *(f"{w:.2f}" for w in total),
+                f"| {platen:.2f} | {change:.1e}",
+                flush=True,
+            )
+            last = r
+    print("case lag steps | error in % by", *RULES)
+    for case in CASES:
+        for lag in (0.01, 0.1, 0.5):
+            half, whole = (node_on_a_spring(case, n, lag)[0] for n in (5000, 10000))
+            limit = 2 * whole - half  # the error is of first order
+            for steps in (48, 96, 192, 384):
+                errors = 100 * (node_on_a_spring(case, steps, lag) / limit - 1)
+                print(case, lag, steps, "|", *(f"{e:+.2f}" for e in errors), flush=True)
+
+
+if __name__ == "__main__":
+    main([int(n) for n in sys.argv[1:]] or [15, 30, 60, 120, 240, 480])
