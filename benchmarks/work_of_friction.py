@@ -1,3 +1,5 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Work of friction against the increments: the punch, and one node on a spring; tables of docs/dissipation.md.
 
     python benchmarks/work_of_friction.py [increments ...]      (default 15 30 60 120 240 480; some minutes)
