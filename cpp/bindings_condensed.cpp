@@ -25,13 +25,23 @@ VectorXd vector(const Array &array, Index size, const char *name) {
     return Eigen::Map<const VectorXd>(array.data(), size);
 }
 
-std::unique_ptr<Operator> make_operator(const Array &W, int dim) {
+std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied) {
     if (dim < 1 || dim > 3)
         throw py::value_error("dim must be 1, 2 or 3, not " + std::to_string(dim));
-    if (W.ndim() != 2 || W.shape(0) != W.shape(1) || W.shape(0) % dim != 0)
-        throw py::value_error("W must be square with " + std::to_string(dim) + " rows per contact");
+    if (W.ndim() != 2 || W.shape(0) != W.shape(1) || tied < 0 || W.shape(0) < tied ||
+        (W.shape(0) - tied) % dim != 0)
+        throw py::value_error("W must be square with " + std::to_string(dim) +
+                              " rows per contact and one per tied row");
     const Eigen::Map<const RowMajor> map(W.data(), W.shape(0), W.shape(1));
-    return std::make_unique<Operator>(map, dim);
+    for (Index i = dim - 1; i < W.shape(0) - tied; i += dim)
+        if (map(i, i) < 0.0)
+            throw py::value_error("W has a negative normal diagonal entry: a contact must give way "
+                                  "to its reaction");
+    return std::make_unique<Operator>(map, dim, tied);
+}
+
+VectorXd optional(const std::optional<Array> &array) {
+    return array ? Eigen::Map<const VectorXd>(array->data(), array->size()) : VectorXd();
 }
 
 template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, Index nodes) {
@@ -69,10 +79,12 @@ Solution solve_any(const Operator &op, const Array &mu, const std::optional<Arra
     return solve<2>(op, any, free, from, options);
 }
 
-py::array_t<double> per_contact(const VectorXd &v, std::size_t nodes) {
-    const auto n = static_cast<py::ssize_t>(nodes);
-    py::array_t<double> out({n, n == 0 ? 0 : static_cast<py::ssize_t>(v.size()) / n});
-    std::copy(v.begin(), v.end(), out.mutable_data());
+/// Components of contacts, (n, dim), without tied rows.
+py::array_t<double> per_contact(const Solution &s, const VectorXd &v) {
+    const auto n = static_cast<py::ssize_t>(s.status.size());
+    const auto size = static_cast<py::ssize_t>(v.size()) - s.tied;
+    py::array_t<double> out({n, n == 0 ? 0 : size / n});
+    std::copy(v.begin(), v.begin() + size, out.mutable_data());
     return out;
 }
 } // namespace
@@ -86,11 +98,17 @@ void bind_condensed(py::module_ &m) {
         .def_readonly("error", &Attempt::error)
         .def_readonly("slip_error", &Attempt::slip_error);
     py::class_<Solution>(m, "CondensedSolution")
-        .def_property_readonly(
-            "reaction", [](const Solution &s) { return per_contact(s.reaction, s.status.size()); })
-        .def_property_readonly(
-            "displacement",
-            [](const Solution &s) { return per_contact(s.displacement, s.status.size()); })
+        .def_property_readonly("reaction",
+                               [](const Solution &s) { return per_contact(s, s.reaction); })
+        .def_property_readonly("displacement",
+                               [](const Solution &s) { return per_contact(s, s.displacement); })
+        .def_property_readonly("tied",
+                               [](const Solution &s) {
+                                   py::array_t<double> out(s.tied);
+                                   std::copy(s.reaction.end() - s.tied, s.reaction.end(),
+                                             out.mutable_data());
+                                   return out;
+                               })
         .def_property_readonly(
             "status",
             [](const Solution &s) {
@@ -101,26 +119,39 @@ void bind_condensed(py::module_ &m) {
             })
         .def_readonly("error", &Solution::error)
         .def_readonly("slip_error", &Solution::slip_error)
+        .def_property_readonly(
+            "rounding", [](const Solution &s) { return std::max(s.rounding, s.slip_rounding); })
+        .def_readonly("change", &Solution::change)
         .def_readonly("iterations", &Solution::iterations)
         .def_readonly("seconds", &Solution::seconds)
         .def_readonly("converged", &Solution::converged)
         .def_readonly("branch", &Solution::branch)
         .def_readonly("tried", &Solution::tried);
     py::class_<Operator>(m, "CondensedOperator")
-        .def(py::init(&make_operator), py::arg("W"), py::arg("dim"))
+        .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0)
         .def_property_readonly("dim", &Operator::dim)
         .def_property_readonly("nodes", &Operator::nodes)
+        .def_property_readonly("tied", &Operator::tied)
         .def("prepare", &Operator::prepare, py::call_guard<py::gil_scoped_release>())
         .def(
             "solve",
             [](const Operator &op, const Array &mu, const std::optional<Array> &p, const Array &q,
-               const std::vector<Array> &starts, double tol, double slip_tol, double max_seconds,
+               const std::vector<Array> &starts, double tol, double slip_tol,
+               const std::optional<Array> &stiffness,
+               const std::optional<Array> &tangential_stiffness,
+               const std::optional<Array> &tied_stiffness, double external, double max_seconds,
                int max_iterations, int newton_iterations, bool fallbacks) {
-                return solve_any(
-                    op, mu, p, q, starts,
-                    {tol, slip_tol, max_seconds, max_iterations, newton_iterations, fallbacks});
+                const Scales scales{optional(stiffness), optional(tangential_stiffness),
+                                    optional(tied_stiffness), external};
+                return solve_any(op, mu, p, q, starts,
+                                 {tol, slip_tol, max_seconds, max_iterations, newton_iterations,
+                                  fallbacks, scales});
             },
             py::arg("mu"), py::arg("p"), py::arg("q"), py::arg("starts"), py::arg("tol"),
-            py::arg("slip_tol"), py::arg("max_seconds"), py::arg("max_iterations"),
-            py::arg("newton_iterations"), py::arg("fallbacks"));
+            py::arg("slip_tol"), py::arg("stiffness") = py::none(),
+            py::arg("tangential_stiffness") = py::none(), py::arg("tied_stiffness") = py::none(),
+            py::arg("external") = 0.0,
+            py::arg("max_seconds") = std::numeric_limits<double>::infinity(),
+            py::arg("max_iterations") = 200'000, py::arg("newton_iterations") = 60,
+            py::arg("fallbacks") = true);
 }

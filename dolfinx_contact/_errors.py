@@ -1,10 +1,16 @@
-"""A user's mistake is raised by all ranks together, so that none waits for another for ever."""
+"""What users are told: mistakes, raised by all ranks together so that none waits for another for
+ever, and what rounding does not let be reached."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
 
 from mpi4py import MPI
+
+
+class RoundingWarning(UserWarning):
+    """An answer was accepted although its error is above ``tol``: below its rounding nothing can be
+    asked in double precision."""
 
 
 @contextmanager

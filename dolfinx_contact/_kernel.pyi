@@ -353,6 +353,8 @@ class CondensedSolution:
     @property
     def branch(self) -> str: ...
     @property
+    def change(self) -> float: ...
+    @property
     def converged(self) -> bool: ...
     @property
     def displacement(self) -> numpy.typing.NDArray[numpy.float64]: ...
@@ -363,11 +365,15 @@ class CondensedSolution:
     @property
     def reaction(self) -> numpy.typing.NDArray[numpy.float64]: ...
     @property
+    def rounding(self) -> float: ...
+    @property
     def seconds(self) -> float: ...
     @property
     def slip_error(self) -> float: ...
     @property
     def status(self) -> numpy.typing.NDArray[numpy.uint8]: ...
+    @property
+    def tied(self) -> numpy.typing.NDArray[numpy.float64]: ...
     @property
     def tried(self) -> list[CondensedAttempt]: ...
 
@@ -376,6 +382,7 @@ class CondensedOperator:
         self,
         W: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         dim: typing.SupportsInt | typing.SupportsIndex,
+        tied: typing.SupportsInt | typing.SupportsIndex = 0,
     ) -> None: ...
     def prepare(self) -> bool: ...
     def solve(
@@ -386,15 +393,21 @@ class CondensedOperator:
         starts: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]],
         tol: typing.SupportsFloat | typing.SupportsIndex,
         slip_tol: typing.SupportsFloat | typing.SupportsIndex,
-        max_seconds: typing.SupportsFloat | typing.SupportsIndex,
-        max_iterations: typing.SupportsInt | typing.SupportsIndex,
-        newton_iterations: typing.SupportsInt | typing.SupportsIndex,
-        fallbacks: bool,
+        stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+        tangential_stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+        tied_stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+        external: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        max_seconds: typing.SupportsFloat | typing.SupportsIndex = ...,
+        max_iterations: typing.SupportsInt | typing.SupportsIndex = 200000,
+        newton_iterations: typing.SupportsInt | typing.SupportsIndex = 60,
+        fallbacks: bool = True,
     ) -> CondensedSolution: ...
     @property
     def dim(self) -> int: ...
     @property
     def nodes(self) -> int: ...
+    @property
+    def tied(self) -> int: ...
 
 def make_law(
     mu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],

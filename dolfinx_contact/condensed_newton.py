@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dolfinx_contact import _kernel
+from dolfinx_contact._errors import RoundingWarning
 from dolfinx_contact.friction import Friction
 
 
@@ -33,12 +35,17 @@ class CondensedResult:
         reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
         displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
         status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
-        error: ``|r - proj(r - kappa w)| / |kappa max(-q_n, 0)|``, see ``solve_condensed``.
-        slip_error: Largest defect of the slip rule over the load displacement.
+        error: ``|r - proj(r - kappa w)|`` over the forces that act, see ``solve_condensed``.
+        slip_error: Defect of the slip rule, as a force, over the same.
+        rounding: What double precision leaves of the errors; an error above ``tol`` is below it.
+        change: How much Newton's next step would still move the reactions, over the same forces:
+            an estimate of what is missing to the solution nearby, which where W is ill conditioned
+            is far more than the error.  It knows nothing of other solutions.
         iterations: Of all methods tried.
         seconds: Wall time of all methods tried.
         branch: The method of the cascade that gave the answer.
         tried: All that were tried, in order.
+        tied: Forces of the tied rows of a kernel operator, if it has any.
     """
 
     reaction: np.ndarray
@@ -46,10 +53,13 @@ class CondensedResult:
     status: np.ndarray
     error: float
     slip_error: float
+    rounding: float
+    change: float
     iterations: int
     seconds: float
     branch: str
     tried: tuple[Attempt, ...] = field(repr=False)
+    tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 class CondensedNotConverged(RuntimeError):
@@ -100,11 +110,20 @@ class CondensedNewton:
         self.max_seconds = positive("max_seconds", max_seconds)
         self.fallbacks = bool(fallbacks)
 
-    def solve_condensed(self, operator, friction: Friction, q, tol, starts=()) -> CondensedResult:
+    def solve_condensed(
+        self, operator, friction: Friction, q, tol, starts=(), **scales
+    ) -> CondensedResult:
         """Solve with a kernel operator; ``solve_condensed`` is the public entry.
 
+        Args:
+            q, starts: With the tied rows of the operator, if it has any, at the end.
+            scales: Of the errors: ``stiffness`` (n,), ``tangential_stiffness`` (n, T, T),
+                ``tied_stiffness`` (tied,), force per length, and ``external``, a force that acts
+                beside the reactions.
+
         Raises:
-            CondensedNotConverged: nothing that was tried reached ``tol``.
+            CondensedNotConverged: nothing that was tried reached ``tol`` or, if that is larger, the
+                rounding of the errors; the latter is a ``RoundingWarning``.
         """
         tangents = operator.dim - 1
         # Friction(0) has no slip rule; a frictionless node of a field gets one that does not matter.
@@ -120,6 +139,7 @@ class CondensedNewton:
             max_iterations=self.max_iterations,
             newton_iterations=self.newton_iterations,
             fallbacks=self.fallbacks,
+            **scales,
         )
         tried = tuple(
             Attempt(a.branch, a.converged, a.iterations, a.seconds, a.error, a.slip_error)
@@ -127,10 +147,18 @@ class CondensedNewton:
         )
         result = CondensedResult(
             found.reaction, found.displacement, found.status, found.error, found.slip_error,
-            found.iterations, found.seconds, found.branch, tried,
+            found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
+            found.tied,
         )  # fmt: skip
         if not found.converged:
             raise CondensedNotConverged(result)
+        if found.error > tol or found.slip_error > (self.slip_tol or tol):
+            warnings.warn(
+                f"error {found.error:.1e}, slip error {found.slip_error:.1e} instead of tol "
+                f"{tol:.1e}: limited by rounding, {found.rounding:.1e}.",
+                RoundingWarning,
+                stacklevel=2,
+            )
         return result
 
     def solve(self, equations, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
@@ -173,10 +201,15 @@ def solve_condensed(
 
     The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
 
-    - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |kappa max(-q_n, 0)|`` with
+    - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |r|`` with
       ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
-    - ``slip_error``: the largest ``|w_t + |w_t| d|`` on slipping contacts (``d`` the unit vector along
-      ``P^-2 r_t``) and ``|w_t|`` on sticking ones, over the largest ``|(q_t, min(q_n, 0))|``.
+    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector
+      along ``P^-2 r_t``), ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the
+      contact along that vector.
+
+    Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the
+    load ``|kappa (q_t, min(q_n, 0))|``, they are relative to that.  An answer whose errors are above ``tol``
+    but below ``rounding`` is returned with a ``RoundingWarning``: double precision has no better one.
 
     Args:
         W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix (made

@@ -71,35 +71,39 @@ def random_problem(
     return SimpleNamespace(W=W, q=q, mu=mu, p=p, r=r, w=w, kinds=kinds)
 
 
-def judge(W, q, mu, p, r):
-    """Error and slip error of reactions ``r``, (n, dim), as ``solve_condensed`` defines them."""
+def judge(W, q, mu, p, r, external=0.0):
+    """Error and slip error of reactions ``r``, (n, dim), as ``solve_condensed`` defines them.
+
+    In long double, so that what is judged are the reactions and not the judge's own rounding.
+    """
     mu, p = normalised(mu, p) if np.any(mu) else (np.atleast_1d(mu), None)
+    mu, r = (np.asarray(part, dtype=np.longdouble) for part in (mu, r))
     n, dim = q.shape
-    W = W.reshape(n, dim, n, dim)
+    W = W.toarray() if hasattr(W, "toarray") else W
+    W = np.asarray(W, dtype=np.longdouble).reshape(n, dim, n, dim)
     w = q + np.tensordot(W, r, 2)
-    normal = np.array([W[i, -1, i, -1] for i in range(n)])
-    kappa = 1 / np.maximum(normal, 1e-12 * normal.mean())
-    load = np.linalg.norm(kappa * np.maximum(-q[:, -1], 0))
-    length = max(np.linalg.norm(np.append(x[:-1], min(x[-1], 0))) for x in q)
-    defect, slip = [], 0.0
-    for k, ri, wi in zip(kappa, r, w):
+    own = np.array([W[i, :, i, :] for i in range(n)]).reshape(n, dim, dim)
+    floor = 1e-12 * np.abs(own[:, -1, -1]).mean()
+    defect, slip = [], []
+    for A, ri, wi in zip(own, r, w):
+        k = 1 / max(A[-1, -1], floor)
         if p is None:
             defect.append(np.append(ri[:-1], ri[-1] - max(ri[-1] - k * wi[-1], 0)))
             continue
         q2 = (p / mu) ** 2
         tau = ri - k * np.append(q2 * wi[:-1], wi[-1] + np.linalg.norm(mu * q2 * wi[:-1]))
         defect.append(ri - project_elliptic_cone(tau, mu))
-        if np.linalg.norm(mu * tau[:-1]) <= -tau[-1]:
+        if np.linalg.norm(mu * tau[:-1]) <= -tau[-1] or not np.any(ri):
             continue
-        du = wi[:-1]
-        if np.linalg.norm(tau[:-1] / mu) <= tau[-1]:
-            slip = max(slip, np.linalg.norm(du))
-        elif np.any(ri[:-1]):
-            slip = max(
-                slip, np.linalg.norm(du + np.linalg.norm(du) * direction_of_slip(ri[:-1], p))
-            )
-        else:
-            slip = max(slip, np.linalg.norm(du))
-    if load == 0:
-        return (0.0 if not np.any(defect) else np.inf), slip / length
-    return np.linalg.norm(defect) / load, slip / length
+        left = wi[:-1]
+        if np.linalg.norm(tau[:-1] / mu) > tau[-1] and np.any(ri[:-1]):
+            left = left + np.linalg.norm(left) * direction_of_slip(ri[:-1], p)
+        if length := np.linalg.norm(left):
+            compliance = left @ A[:-1, :-1] @ left / length**2
+            slip.append(length / max(compliance, floor))
+    load = np.linalg.norm(
+        [np.append(qi[:-1], min(qi[-1], 0)) / max(A[-1, -1], floor) for A, qi in zip(own, q)]
+    )
+    acting = max(min(np.linalg.norm(r), load), external)
+    errors = [float(np.linalg.norm(part)) for part in (defect, slip)]
+    return tuple(error / acting if error else 0.0 for error in errors)

@@ -47,7 +47,7 @@ def project_elliptic_cone(tau, mu):
     def excess(s):
         return np.linalg.norm(foot(s) / mu) * (1 - s) - n
 
-    low, high = 0.0, 1.0
+    low, high = np.zeros_like(n), np.ones_like(n)  # of the precision of tau
     while excess(high) > 0:
         low, high = high, 2 * high
     for _ in range(200):

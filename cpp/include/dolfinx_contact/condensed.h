@@ -6,7 +6,8 @@
 #pragma once
 
 #include "condensed_fixed_point.h"
-#include "condensed_operator.h"
+#include "condensed_judge.h"
+#include "condensed_scaling.h"
 #include "condensed_starts.h"
 #include <functional>
 
@@ -19,28 +20,30 @@ struct Options {
     int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
     int newton_iterations = 60;   ///< Newton iterations of one attempt
     bool fallbacks = true;
+    Scales scales = {};
 };
 
 /// The solver of one problem: P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Cascade {
   public:
-    static constexpr int D = T + 1;
-
     Cascade(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
-        : op_(op), q_(q), options_(options), judge_(op, law, q), coefficients_(law, op.nodes()) {
+        : op_(op), q_(q), options_(options),
+          judge_(op, law, q, options.scales, std::min(options.tol, options.slip_tol)),
+          scaling_(op, law, q) {
         budget_.max_seconds = options.max_seconds;
         budget_.max_iterations = options.max_iterations;
     }
 
     Solution run(const std::vector<VectorXd> &starts) {
         best_.reaction = VectorXd::Zero(q_.size());
+        best_.tied = op_.tied();
         judge_.judge(best_);
-        if (judge_.load() > 0.0) {
-            search(starts);
-        } else { // nothing presses: zero reactions are the answer
-            best_.error = best_.slip_error = 0.0;
+        if (best_.error <= best_.rounding) { // nothing presses: zero reactions are the answer
+            best_.change = 0.0;
             best_.converged = true;
             best_.branch = "free";
+        } else {
+            search(starts);
         }
         best_.iterations = budget_.iterations;
         best_.seconds = budget_.seconds();
@@ -49,10 +52,11 @@ template <int T, int P> class Cascade {
 
   private:
     void search(const std::vector<VectorXd> &starts) {
-        const VectorXd zero = VectorXd::Zero(D * op_.nodes()), given = nearest(starts);
+        const VectorXd given = scaling_.make_unit(nearest(starts));
+        const VectorXd zero = VectorXd::Zero(scaling_.size());
         const auto newton = [this](VectorXd r, double normal, double tangential) {
             return [this, r, normal, tangential]() mutable {
-                System<T> system = make();
+                System<T> system = scaling_.make();
                 system.set_metric(normal, tangential);
                 finish(system, r);
             };
@@ -65,22 +69,22 @@ template <int T, int P> class Cascade {
              {std::pair{1.0, 0.1}, {1.0, 1.0}, {100.0, 10.0}, {10.0, 10.0}, {0.1, 0.1}})
             if (attempt("newton, other metric", newton(given, normal, tangential)))
                 return;
-        const auto path = [this](auto change) {
-            return [this, change] {
-                VectorXd r = VectorXd::Zero(D * op_.nodes());
+        const auto path = [this, &zero](auto change) {
+            return [this, change, &zero] {
+                VectorXd r = zero;
                 if (follow(r, change)) {
-                    System<T> system = make();
+                    System<T> system = scaling_.make();
                     system.set_metric(10.0, 1.0);
                     finish(system, r);
                 }
             };
         };
-        if (T > 0 && !coefficients_.associated() &&
+        if (T > 0 && !scaling_.associated() &&
             attempt("continuation in p", path([](Path &at, double s) { at.rule = s; })))
             return;
         if (attempt("fixed point", [this, zero] {
                 VectorXd r = zero;
-                System<T> system = make();
+                System<T> system = scaling_.make();
                 system.set_metric(1.0, 1.0);
                 fixed_point(system, r, 1e-6, 400, budget_);
                 system.set_metric(10.0, 1.0);
@@ -95,80 +99,25 @@ template <int T, int P> class Cascade {
         attempt("random starts", [this, &newton] {
             // Solutions that no path leads to: from anywhere, and from near the best state so far.
             std::minstd_rand random(1);
-            const auto size = static_cast<double>(D * op_.nodes());
+            const auto size = static_cast<double>(scaling_.size());
             const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
             for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
-                newton(k % 2 == 0 ? start_near(random, scaled(best_.reaction))
-                                  : random_start<T>(random, op_.nodes()),
+                newton(k % 2 == 0 ? start_near(random, scaling_.scaled(best_.reaction))
+                                  : random_start<T>(random, op_.nodes(), op_.tied()),
                        k % 3 == 1 ? 1.0 : 10.0, k % 3 == 2 ? 0.1 : 1.0)();
         });
     }
 
-    /// Physical reactions of P + 1 components in scaled variables.
-    VectorXd scaled(const VectorXd &reaction) const {
-        VectorXd r(D * op_.nodes());
-        for (Index i = 0; i < op_.nodes(); ++i)
-            r.template segment<D>(D * i) =
-                reaction.template segment<P + 1>((P + 1) * i).template tail<D>();
-        return r.cwiseQuotient(make().right);
-    }
-
-    /// A problem on the way to the one that is asked for, all ones.
-    struct Path {
-        double rule = 1.0, load = 1.0, friction = 1.0;
-    };
-
-    /// p / mu to the power `rule`, mu times 10^(3 friction - 3), gaps raised until `load` of the
-    /// largest penetration is left.
-    System<T> make(const Path &path = {}) const {
-        System<T> system;
-        system.nodes = op_.nodes();
-        system.W = T == P ? &op_.W() : &op_.normal();
-        system.inverse = T == P ? op_.inverse() : nullptr;
-        const Index size = D * op_.nodes();
-        system.left.resize(size);
-        system.right.resize(size);
-        system.q.resize(size);
-        system.smooth.assign(static_cast<std::size_t>(op_.nodes()), T == 0);
-        const double lift = (1.0 - path.load) * deepest();
-        for (Index i = 0; i < op_.nodes(); ++i) {
-            if constexpr (T > 0) {
-                const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
-                system.smooth[static_cast<std::size_t>(i)] = smooth;
-                for (int c = 0; c < T; ++c) {
-                    const double mu =
-                        smooth ? 1.0
-                               : coefficients_.mu(i, c) * std::pow(10.0, 3.0 * path.friction - 3.0);
-                    system.right[D * i + c] = mu * judge_.force();
-                    system.left[D * i + c] =
-                        mu * std::pow(coefficients_.q2(i, c), path.rule) / judge_.length();
-                    system.q[D * i + c] = q_[(P + 1) * i + c];
-                }
-            }
-            system.right[D * i + T] = judge_.force();
-            system.left[D * i + T] = 1.0 / judge_.length();
-            system.q[D * i + T] = q_[(P + 1) * i + P] + lift;
-        }
-        return system;
-    }
-
-    double deepest() const {
-        double depth = 0.0;
-        for (Index i = 0; i < op_.nodes(); ++i)
-            depth = std::max(depth, -q_[(P + 1) * i + P]);
-        return depth;
-    }
-
     /// The start of the smallest residual, scaled; zero is always one.
     VectorXd nearest(const std::vector<VectorXd> &starts) const {
-        System<T> system = make();
+        System<T> system = scaling_.make();
         system.set_metric(10.0, 1.0);
         State<T> state;
-        VectorXd best = VectorXd::Zero(D * op_.nodes());
+        VectorXd best = VectorXd::Zero(system.size());
         state.evaluate(system, best, system.displacement(best));
         double smallest = state.merit;
         for (const VectorXd &start : starts) {
-            const VectorXd r = scaled(start);
+            const VectorXd r = scaling_.scaled(start);
             state.evaluate(system, r, system.displacement(r));
             if (state.merit < smallest) {
                 smallest = state.merit;
@@ -179,16 +128,14 @@ template <int T, int P> class Cascade {
     }
 
     /// Newton's method to the tolerance, judged on physical reactions; keeps the best state.
-    void finish(const System<T> &system, VectorXd &r) {
+    void finish(System<T> &system, VectorXd &r) {
         const auto certified = [&](const VectorXd &mapped) {
             Solution found;
-            found.reaction = VectorXd::Zero(q_.size());
-            const VectorXd scaled = system.right.cwiseProduct(mapped);
-            for (Index i = 0; i < op_.nodes(); ++i)
-                found.reaction.segment<P + 1>((P + 1) * i).template tail<D>() =
-                    scaled.template segment<D>(D * i);
+            found.reaction = scaling_.physical(system, mapped);
+            found.tied = op_.tied();
             judge_.judge(found);
-            found.converged = found.error <= options_.tol && found.slip_error <= options_.slip_tol;
+            system.accurate = found.near_rounding;
+            found.converged = Judge<P>::accepts(found, options_.tol, options_.slip_tol);
             if (found.converged || worst(found) < worst(best_)) {
                 found.tried = std::move(best_.tried);
                 best_ = std::move(found);
@@ -196,8 +143,12 @@ template <int T, int P> class Cascade {
             return best_.converged;
         };
         const double target = 1e3 * std::min(options_.tol, options_.slip_tol);
-        if (Newton<T>(system).solve(r, target, budget_, options_.newton_iterations, certified) !=
+        Newton<T> newton(system);
+        if (newton.solve(r, target, budget_, options_.newton_iterations, certified) ==
             End::converged) {
+            const VectorXd change = system.right.cwiseProduct(newton.next_change(r));
+            best_.change = scaling_.contact_part(change).norm() / best_.acting;
+        } else {
             State<T> state;
             state.evaluate(system, r, system.displacement(r));
             certified(state.mapped());
@@ -216,7 +167,7 @@ template <int T, int P> class Cascade {
             const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
             Path at;
             change(at, s);
-            System<T> system = make(at);
+            System<T> system = scaling_.make(at);
             system.set_metric(10.0, 1.0);
             VectorXd trial = r;
             if (before.size() > 0 && failures == 0)
@@ -261,7 +212,7 @@ template <int T, int P> class Cascade {
     const VectorXd &q_;
     Options options_;
     Judge<P> judge_;
-    Coefficients<P> coefficients_;
+    Scaling<T, P> scaling_;
     Budget budget_;
     Solution best_;
 };
@@ -269,11 +220,14 @@ template <int T, int P> class Cascade {
 /// Solves w = q + W r with the law between r and w at every contact.
 ///
 /// Component order per contact: T tangential, then the normal one; w_n is the gap, w_t the slip.
-/// W may be rank-deficient and slightly unsymmetric. The errors, both dimensionless:
-/// - error: |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |kappa max(-q_n, 0)|,
-/// Euclidean
-///   over all contacts, kappa = 1 / W_nn the canonical metric of a contact;
-/// - slip_error: largest slip_defect over the load displacement, the largest |(q_t, min(q_n, 0))|.
+/// W may be rank-deficient and slightly unsymmetric. Rows after those of contacts are tied: w_c =
+/// 0. The errors, with S the larger of |r|, Euclidean over all contacts, and `external` (where |r|
+/// is above the load |kappa (q_t, min(q_n, 0))|, that counts instead):
+/// - error: |(r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu), kappa_c w_c)| / S, Euclidean
+///   over all contacts and tied rows, kappa by default 1 / W_nn;
+/// - slip_error: |kappa_t (w_t + |w_t| d)| / S, Euclidean over slipping contacts, |kappa_t w_t| on
+///   sticking ones, kappa_t by default 1 / W along the defect;
+/// - rounding: eps times the size of the terms that cancel in them, over S.
 ///
 /// T = 0 is contact without friction on normal components alone.
 /// @param starts reactions to start from; the one of the smallest residual is taken

@@ -50,7 +50,7 @@ template <int T>
 void fixed_point(const System<T> &system, VectorXd &r, double target, int max_iterations,
                  Budget &budget) {
     constexpr int D = T + 1;
-    VectorXd rho(system.size());
+    VectorXd rho = VectorXd::Ones(system.size());
     for (Index i = 0; i < system.nodes; ++i) {
         rho.segment<D>(D * i).setConstant(system.rho_t[i]);
         rho[D * i + T] = system.rho_n[i];

@@ -5,12 +5,34 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <utility>
 
 namespace dolfinx_contact::condensed {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Real = long double; ///< of the judge; where it is no more than double, so much the worse
+using VectorXl = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+
+/// Sums of products of doubles, each as if in twice the precision
+/// [T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005), Algorithm 5.3, Dot2].
+class AccurateSums {
+  public:
+    explicit AccurateSums(const VectorXd &start)
+        : high_(start), low_(VectorXd::Zero(start.size())) {}
+
+    void add(Index i, double a, double b) {
+        const double product = a * b, before = high_[i], sum = before + product;
+        const double added = sum - before;
+        high_[i] = sum;
+        low_[i] += (before - (sum - added)) + (product - added) + std::fma(a, b, -product);
+    }
+    VectorXl sums() const { return high_.cast<Real>() + low_.cast<Real>(); }
+
+  private:
+    VectorXd high_, low_;
+};
 
 /// A square matrix of which all or, if it is symmetric, one triangle is stored; a view.
 class Square {
@@ -35,6 +57,40 @@ class Square {
         else
             y.noalias() += values_ * x;
         return y;
+    }
+
+    /// |A| |x|: the size of what is added up in a product.
+    VectorXd magnitudes(const VectorXd &x) const {
+        const VectorXd size_of_x = x.cwiseAbs();
+        VectorXd y = VectorXd::Zero(size());
+        for (Index j = 0; j < size(); ++j) {
+            const auto [first, last] = stored(j, size());
+            const auto column = values_.col(j).segment(first, last - first).cwiseAbs();
+            const double diagonal = std::abs(values_(j, j)) * size_of_x[j];
+            y.segment(first, last - first) += size_of_x[j] * column;
+            if (symmetric())
+                y[j] += column.dot(size_of_x.segment(first, last - first)) - diagonal;
+        }
+        return y;
+    }
+
+    /// b + A x in twice the precision; some ten times the time of a product.
+    VectorXl accurate(const VectorXd &b, const VectorXd &x) const {
+        AccurateSums y(b);
+        for (Index j = 0; j < size(); ++j) {
+            const auto [first, last] = stored(j, size());
+            for (Index i = first; i < last; ++i) {
+                y.add(i, values_(i, j), x[j]);
+                if (symmetric() && i != j)
+                    y.add(j, values_(i, j), x[i]);
+            }
+        }
+        return y.sums();
+    }
+
+    double operator()(Index i, Index j) const {
+        const bool transposed = part_ == Part::lower ? i < j : part_ == Part::upper && i > j;
+        return transposed ? values_(j, i) : values_(i, j);
     }
 
     /// All entries.
@@ -102,6 +158,29 @@ inline bool invert(Eigen::Ref<MatrixXd> A) {
     last.triangularView<Eigen::Lower>() -= X * coupling.transpose();
     if (!invert(last))
         return false;
+    coupling.noalias() = last.selfadjointView<Eigen::Lower>() * X;
+    first.triangularView<Eigen::Lower>() += X.transpose() * coupling;
+    coupling = -coupling;
+    return true;
+}
+
+/// The same, of the last `tied` rows, which may make the matrix indefinite, by their Schur
+/// complement. False if that is singular.
+inline bool invert(Eigen::Ref<MatrixXd> A, Index tied) {
+    const Index n = A.rows() - tied;
+    auto first = A.topLeftCorner(n, n), last = A.bottomRightCorner(tied, tied);
+    auto coupling = A.bottomLeftCorner(tied, n);
+    if (!invert(first))
+        return false;
+    if (tied == 0)
+        return true;
+    const MatrixXd X = coupling * first.selfadjointView<Eigen::Lower>();
+    last.triangularView<Eigen::Lower>() -= X * coupling.transpose();
+    const Eigen::FullPivLU<MatrixXd> complement(MatrixXd(last.selfadjointView<Eigen::Lower>()));
+    if (!complement.isInvertible())
+        return false;
+    const MatrixXd inverse = complement.inverse();
+    last.triangularView<Eigen::Lower>() = (inverse + inverse.transpose()) / 2.0;
     coupling.noalias() = last.selfadjointView<Eigen::Lower>() * X;
     first.triangularView<Eigen::Lower>() += X.transpose() * coupling;
     coupling = -coupling;

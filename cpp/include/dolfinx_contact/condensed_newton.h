@@ -4,6 +4,7 @@
 /// Globalised semismooth Newton method for the condensed contact problem.
 #pragma once
 
+#include "condensed_linear.h"
 #include "condensed_step.h"
 #include <chrono>
 #include <deque>
@@ -22,45 +23,6 @@ struct Budget {
     double seconds() const { return std::chrono::duration<double>(Clock::now() - start).count(); }
     bool spent() const { return iterations >= max_iterations || seconds() >= max_seconds; }
 };
-
-/// Solves J y = rhs with factors in single precision and iterative refinement; false if that does
-/// not converge, because J is too badly conditioned for it.
-inline bool solve_in_single(const MatrixXd &J, const VectorXd &rhs, VectorXd &y) {
-    constexpr double accuracy = 1e-12, contraction = 0.1;
-    const double scale = rhs.lpNorm<Eigen::Infinity>();
-    Eigen::MatrixXf single = J.cast<float>();
-    const Eigen::PartialPivLU<Eigen::Ref<Eigen::MatrixXf>> lu(single);
-    y.setZero(rhs.size());
-    VectorXd rest = rhs;
-    for (double size = scale; size > accuracy * scale;) {
-        const Eigen::VectorXf unit = (rest / size).cast<float>();
-        y += size * lu.solve(unit).cast<double>();
-        rest = rhs - J * y;
-        const double after = rest.lpNorm<Eigen::Infinity>();
-        if (!(after <= contraction * size))
-            return after <= 1e2 * accuracy * scale;
-        size = after;
-    }
-    return true;
-}
-
-/// Solves J y = rhs. J is singular where W is, with more contacts than the body has degrees of
-/// freedom; the shortest of the steps that fit best is taken then.
-inline VectorXd solve_any_rank(const MatrixXd &J, const VectorXd &rhs) {
-    constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
-    constexpr Index worth_it = 128; // below, double precision costs nothing
-    VectorXd y;
-    if (J.rows() >= worth_it && solve_in_single(J, rhs, y))
-        return y;
-    {
-        const Eigen::PartialPivLU<MatrixXd> lu(J);
-        if (lu.rcond() > smallest_rcond)
-            return lu.solve(rhs);
-    }
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition(J.rows(), J.cols());
-    decomposition.setThreshold(threshold);
-    return decomposition.compute(J).solve(rhs);
-}
 
 /// Newton's method on the residual of a System with a nonmonotone line search
 /// [L. Grippo, F. Lampariello, S. Lucidi, SIAM J. Numer. Anal. 23 (1986)].
@@ -120,12 +82,22 @@ template <int T> class Newton {
         }
     }
 
+    /// After convergence at r: by how much the next step would move what the law returned there.
+    /// With the factors of the last step where they still fit, which then costs no more than
+    /// products with W.
+    VectorXd next_change(const VectorXd &r) {
+        VectorXd dr, dw;
+        direction(r, system_.displacement(r), dr, dw, true);
+        return r + dr - state_.mapped();
+    }
+
   private:
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
 
     /// Newton's step by the smaller of the two eliminations, if there is a choice.
-    void direction(const VectorXd &r, const VectorXd &w, VectorXd &dr, VectorXd &dw) {
-        Index compliance = 0, stiffness = 0;
+    void direction(const VectorXd &r, const VectorXd &w, VectorXd &dr, VectorXd &dw,
+                   bool last = false) {
+        Index compliance = system_.tied, stiffness = 0;
         for (Index i = 0; i < system_.nodes; ++i) {
             const auto &point = state_.points[static_cast<std::size_t>(i)];
             const bool open = point.branch == Branch::open, stick = point.branch == Branch::stick;
@@ -133,6 +105,7 @@ template <int T> class Newton {
             stiffness += open ? D : (stick ? 0 : T);
         }
         const bool stiff = system_.inverse && stiffness < compliance;
+        std::vector<Branch> branches;
         steps_.clear();
         offsets_.clear();
         Index unknowns = 0;
@@ -142,21 +115,32 @@ template <int T> class Newton {
                                    : by_compliance<T>(system_, i, point, at(r, i), at(w, i)));
             offsets_.push_back(unknowns);
             unknowns += steps_.back().m;
+            branches.push_back(point.branch);
         }
+        same_factors_ = last && stiff == stiff_ && branches == branches_;
+        stiff_ = stiff;
+        branches_ = std::move(branches);
+        const VectorXd left = -w.tail(system_.tied); // of tied rows
         if (stiff) {
+            tied_ = 0; // their motion is known
             dw = eliminate(*system_.inverse, system_.right.cwiseInverse(),
-                           system_.left.cwiseInverse(), unknowns);
+                           system_.left.cwiseInverse(), unknowns, left);
             dr = system_.change_of_reaction(dw);
         } else {
-            dr = eliminate(*system_.W, system_.left, system_.right, unknowns);
-            dw = system_.change(dr);
+            tied_ = system_.tied;
+            dr = eliminate(*system_.W, system_.left, system_.right, unknowns + tied_, left);
+            if (!last)
+                dw = system_.change(dr);
         }
     }
 
-    /// c + B y with y from L A (c + B y) + G y = g, A = diag(left) matrix diag(right).
+    /// c + B y with y from L A (c + B y) + G y = g, A = diag(left) matrix diag(right). Of tied rows
+    /// y is the unknown force and A (c + B y) = `in_tied_rows`; or that is known and no unknown.
     VectorXd eliminate(const Square &matrix, const VectorXd &left, const VectorXd &right,
-                       Index unknowns) {
+                       Index unknowns, const VectorXd &in_tied_rows) {
         VectorXd found(system_.size());
+        found.tail(system_.tied) = in_tied_rows;
+        found.tail(tied_).setZero();
         active_.clear();
         for (Index i = 0; i < system_.nodes; ++i) {
             auto &step = steps_[static_cast<std::size_t>(i)];
@@ -176,14 +160,41 @@ template <int T> class Newton {
             to_.emplace_back(step.L * at(left, i).asDiagonal());
             from_.emplace_back(at(right, i).asDiagonal() * step.B);
         }
-        assemble(matrix, unknowns);
-        const VectorXd y = solve_any_rank(J_, rhs);
+        rhs.tail(tied_) = in_tied_rows.head(tied_) - known.tail(tied_);
+        if (!same_factors_) {
+            assemble(matrix, unknowns);
+            tie(matrix, left, right);
+        }
+        const VectorXd y = same_factors_ ? linear_.again(rhs) : linear_.solve(J_, rhs);
         for (const Index i : active_) {
             const auto &step = steps_[static_cast<std::size_t>(i)];
             found.template segment<D>(D * i) +=
                 step.B.leftCols(step.m) * y.segment(offset(i), step.m);
         }
+        found.tail(tied_) += y.tail(tied_);
         return found;
+    }
+
+    /// Rows and columns of J of tied rows, which are the last ones.
+    void tie(const Square &matrix, const VectorXd &left, const VectorXd &right) {
+        const Index first = J_.rows() - tied_, row = D * system_.nodes;
+        for (Index c = 0; c < tied_; ++c) {
+            for (std::size_t a = 0; a < active_.size(); ++a) {
+                const Index i = active_[a];
+                Node across, down;
+                for (int k = 0; k < D; ++k) {
+                    across[k] = matrix(row + c, D * i + k);
+                    down[k] = matrix(D * i + k, row + c);
+                }
+                const int m = in(steps_, i).m;
+                J_.block(first + c, offset(i), 1, m) =
+                    left[row + c] * (across.transpose() * from_[a]).leftCols(m);
+                J_.block(offset(i), first + c, m, 1) = (to_[a] * down).head(m) * right[row + c];
+            }
+            for (Index d = 0; d < tied_; ++d)
+                J_(first + c, first + d) =
+                    left[row + c] * matrix(row + c, row + d) * right[row + d];
+        }
     }
 
     /// J = to matrix from + G, node by node, from the entries of the matrix that are stored.
@@ -247,5 +258,9 @@ template <int T> class Newton {
     std::vector<Index> offsets_, active_;
     std::vector<Eigen::Matrix<double, D, D>> to_, from_;
     MatrixXd J_;
+    LinearSolver linear_;
+    std::vector<Branch> branches_; // with which J was made
+    bool stiff_ = false, same_factors_ = false;
+    Index tied_ = 0; // tied rows that J has
 };
 } // namespace dolfinx_contact::condensed

@@ -1,13 +1,12 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
 /// @file condensed_operator.h
-/// W with what is derived from it once, a solution, and the two errors that judge it.
+/// W with what is derived from it once, and what a solution consists of.
 #pragma once
 
-#include "bipotential.h"
 #include "condensed_system.h"
-#include "slip_rule.h"
 #include <optional>
+#include <string>
 
 namespace dolfinx_contact::condensed {
 /// One entry of the cascade that was tried.
@@ -18,12 +17,17 @@ struct Attempt {
     double seconds, error, slip_error; ///< the errors of the best state so far
 };
 
-/// Reactions and displacements, (T + 1) per node, in the units of q and W.
+/// Reactions and displacements, (T + 1) per node, then those of tied rows, in the units of q and W.
 struct Solution {
+    static constexpr double none = std::numeric_limits<double>::infinity();
     VectorXd reaction, displacement;
     std::vector<Branch> status;
-    double error = std::numeric_limits<double>::infinity();
-    double slip_error = std::numeric_limits<double>::infinity();
+    double error = none, slip_error = none;
+    double rounding = none, slip_rounding = none; ///< what double precision leaves of the errors
+    double change = none; ///< of the reactions in Newton's next step, over `acting`
+    double acting = 0.0;  ///< the force that errors are relative to
+    bool near_rounding = false;
+    Index tied = 0; ///< how many of the reactions
     int iterations = 0;
     double seconds = 0.0;
     bool converged = false;
@@ -31,16 +35,21 @@ struct Solution {
     std::vector<Attempt> tried;
 };
 
-/// W with what is derived from it once: its normal rows, and its inverse when that begins to pay.
-/// If W is symmetric to the last bit, one triangle of it is kept, and its inverse by Cholesky in
-/// the other triangle of the same array, which has one column more; else both are whole.
+/// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse when
+/// that begins to pay. If W is symmetric to the last bit, one triangle of it is kept, and its
+/// inverse by Cholesky in the other triangle of the same array, which has one column more; else
+/// both are whole.
+///
+/// The last `tied` rows are bilateral: w_c = 0, r_c of any sign. Of them W may be indefinite or
+/// zero.
 class Operator {
   public:
-    /// W (D n, D n), D = `dim`, tangential components first; copied. D = 1 is contact without
-    /// friction, of which the normal rows alone are needed.
+    /// W is copied; D = `dim` rows of a contact, tangential components first. D = 1 is contact
+    /// without friction, of which the normal rows alone are needed.
     template <class Derived>
-    Operator(const Eigen::MatrixBase<Derived> &W, int dim)
-        : size_(W.rows()), dim_(dim), symmetric_((W.array() == W.transpose().array()).all()),
+    Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0)
+        : size_(W.rows()), tied_(tied), dim_(dim),
+          symmetric_((W.array() == W.transpose().array()).all()),
           values_(size_, size_ + (symmetric_ ? 1 : 0)),
           W_(view(values_.data() + (symmetric_ ? size_ : 0), Square::Part::upper)) {
         if (symmetric_)
@@ -52,24 +61,47 @@ class Operator {
 
     const Square &W() const { return W_; }
     int dim() const { return dim_; }
-    Index nodes() const { return size_ / dim_; }
+    Index nodes() const { return (size_ - tied_) / dim_; }
+    Index tied() const { return tied_; }
 
-    /// Rows and columns of the normal components.
+    /// Rows and columns of the normal components and of tied rows.
     const Square &normal() const {
         if (!normal_) {
-            const auto rows = Eigen::seqN(dim_ - 1, nodes(), dim_);
+            std::vector<Index> rows;
+            for (Index i = 0; i < nodes(); ++i)
+                rows.push_back(dim_ * i + dim_ - 1);
+            for (Index c = 0; c < tied_; ++c)
+                rows.push_back(dim_ * nodes() + c);
             normal_values_ = W_.dense()(rows, rows);
-            normal_.emplace(normal_values_.data(), nodes(), nodes(),
+            const Index size = normal_values_.rows();
+            normal_.emplace(normal_values_.data(), size, size,
                             symmetric_ ? Square::Part::lower : Square::Part::all);
         }
         return *normal_;
+    }
+
+    /// Mean magnitude of the normal compliance of a contact.
+    double mean_normal() const {
+        double mean = 0.0;
+        for (Index i = 0; i < nodes(); ++i)
+            mean += std::abs(W_(dim_ * i + dim_ - 1, dim_ * i + dim_ - 1)) /
+                    static_cast<double>(nodes());
+        return mean;
+    }
+
+    /// Largest magnitude in a tied row; one if it is zero.
+    double largest_in_tied_row(Index c) const {
+        double largest = 0.0;
+        for (Index j = 0; j < size_; ++j)
+            largest = std::max(largest, std::abs(W_(dim_ * nodes() + c, j)));
+        return largest > 0.0 ? largest : 1.0;
     }
 
     /// The inverse of W, if prepared and if W is regular, else null.
     const Square *inverse() const { return inverse_ ? &*inverse_ : nullptr; }
 
     /// Inverts W, so that Newton's method may eliminate sticking nodes. For many solves.
-    /// Returns whether W was regular enough, and positive definite if symmetric.
+    /// Returns whether W was regular enough, and positive definite if symmetric, but for tied rows.
     bool prepare() {
         constexpr double smallest_rcond = 1e-12;
         if (inverse_ || size_ == 0)
@@ -77,7 +109,7 @@ class Operator {
         if (symmetric_) {
             auto lower = values_.leftCols(size_);
             lower.triangularView<Eigen::Lower>() = values_.rightCols(size_).transpose();
-            if (!invert(lower))
+            if (!invert(lower, tied_))
                 return false;
             inverse_.emplace(view(values_.data(), Square::Part::lower));
         } else {
@@ -94,7 +126,7 @@ class Operator {
         return {values, size_, size_, symmetric_ ? triangle : Square::Part::all};
     }
 
-    Index size_;
+    Index size_, tied_;
     int dim_;
     bool symmetric_;
     MatrixXd values_, inverse_values_;
@@ -104,67 +136,4 @@ class Operator {
     mutable std::optional<Square> normal_;
 };
 
-/// The two errors of a state, and the units in which a problem is scaled.
-template <int P> class Judge {
-  public:
-    static constexpr int D = P + 1;
-
-    Judge(const Operator &op, const AnyLaw<P> &law, const VectorXd &q) : op_(op), law_(law), q_(q) {
-        const Index n = op.nodes();
-        const VectorXd diagonal = op.W().diagonal();
-        double mean = 0.0;
-        for (Index i = 0; i < n; ++i)
-            mean += std::abs(diagonal[D * i + P]) / static_cast<double>(n);
-        kappa_.resize(n);
-        VectorXd pressed(n);
-        for (Index i = 0; i < n; ++i) {
-            kappa_[i] = 1.0 / std::max(std::abs(diagonal[D * i + P]), 1e-12 * mean);
-            pressed[i] = kappa_[i] * std::max(-q[D * i + P], 0.0);
-            Local<P> loaded = q.segment<D>(D * i);
-            loaded[P] = std::min(loaded[P], 0.0);
-            length_ = std::max(length_, loaded.stableNorm());
-        }
-        load_ = pressed.stableNorm();
-        force_ = length_ / mean;
-    }
-
-    double length() const { return length_; } ///< largest load displacement
-    double force() const { return force_; }   ///< over the mean normal compliance
-    double load() const { return load_; }
-
-    /// Displacement, status and errors of the reactions of a solution.
-    void judge(Solution &s) const {
-        s.displacement = q_ + op_.W() * s.reaction;
-        s.status.resize(static_cast<std::size_t>(op_.nodes()));
-        VectorXd defect(s.reaction.size());
-        double slip = 0.0;
-        std::visit(
-            [&](const auto &source) {
-                for (Index i = 0; i < op_.nodes(); ++i) {
-                    const auto &law = source(static_cast<std::size_t>(i));
-                    constexpr int L = std::decay_t<decltype(law)>::tangents; // 0 without friction
-                    const Local<L> r = s.reaction.segment<D>(D * i).template tail<L + 1>();
-                    const Tangent<L> du = s.displacement.segment<L>(D * i);
-                    const Reaction<L> mapped =
-                        bipotential_map(law, r, s.displacement[D * i + P], du, kappa_[i]);
-                    defect.segment<D>(D * i).setZero();
-                    defect.segment<D>(D * i).template tail<L + 1>() = r - mapped.r;
-                    s.status[static_cast<std::size_t>(i)] = mapped.branch;
-                    slip = std::max(slip, slip_defect(law, r, du, mapped.branch));
-                }
-            },
-            law_);
-        s.error = defect.stableNorm() / load_;
-        s.slip_error = slip > 0.0 ? slip / length_ : 0.0;
-        if (!std::isfinite(s.error) || !std::isfinite(s.slip_error))
-            s.error = s.slip_error = std::numeric_limits<double>::infinity();
-    }
-
-  private:
-    const Operator &op_;
-    const AnyLaw<P> &law_;
-    const VectorXd &q_;
-    VectorXd kappa_;
-    double length_ = 0.0, force_ = 0.0, load_ = 0.0;
-};
 } // namespace dolfinx_contact::condensed

@@ -13,10 +13,10 @@ inline double uniform(std::minstd_rand &random) {
            static_cast<double>(std::minstd_rand::max() - std::minstd_rand::min());
 }
 
-/// Scaled reactions in the cone, of any size about one.
-template <int T> VectorXd random_start(std::minstd_rand &random, Index nodes) {
+/// Scaled reactions in the cone, of any size about one; those of tied rows are zero.
+template <int T> VectorXd random_start(std::minstd_rand &random, Index nodes, Index tied) {
     constexpr int D = T + 1;
-    VectorXd r(D * nodes);
+    VectorXd r = VectorXd::Zero(D * nodes + tied);
     const double size = std::pow(10.0, 2.0 * uniform(random) - 1.0);
     for (Index i = 0; i < nodes; ++i) {
         const double normal = uniform(random) < 0.3 ? 0.0 : size * uniform(random);

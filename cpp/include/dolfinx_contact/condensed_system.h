@@ -47,11 +47,14 @@ template <int T> struct System {
     VectorXd left, right;
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction
-    Index nodes;
+    Index nodes, tied;        // tied rows come last: w_c = 0, r_c of any sign
+    bool accurate = false;    // displacements in twice the precision
 
-    Index size() const { return D * nodes; }
+    Index size() const { return D * nodes + tied; }
 
     VectorXd displacement(const VectorXd &r) const {
+        if (accurate)
+            return left.cwiseProduct(W->accurate(q, right.cwiseProduct(r)).template cast<double>());
         return left.cwiseProduct(q + *W * VectorXd(right.cwiseProduct(r)));
     }
     VectorXd change(const VectorXd &dr) const {
@@ -132,9 +135,11 @@ Point<T> residual(const System<T> &system, Index i, const Vector &r, const Vecto
     return point;
 }
 
-/// Residuals of all nodes, half their squared norm, and the reactions that the law returns.
+/// Residuals of all nodes, half their squared norm with that of tied rows, F = w, and the reactions
+/// that the law returns, those of tied rows as they are.
 template <int T> struct State {
     std::vector<Point<T>> points;
+    VectorXd tied;
     double merit = 0.0;
 
     void evaluate(const System<T> &system, const VectorXd &r, const VectorXd &w) {
@@ -147,11 +152,13 @@ template <int T> struct State {
                                 Eigen::Matrix<double, D, 1>(w.segment<D>(D * i)));
             sum += point.F.squaredNorm();
         }
-        merit = 0.5 * sum;
+        tied = r.tail(system.tied);
+        merit = 0.5 * (sum + w.tail(system.tied).squaredNorm());
     }
     VectorXd mapped() const {
         constexpr int D = T + 1;
-        VectorXd r(D * static_cast<Index>(points.size()));
+        VectorXd r(D * static_cast<Index>(points.size()) + tied.size());
+        r.tail(tied.size()) = tied;
         for (std::size_t i = 0; i < points.size(); ++i)
             r.segment<D>(D * static_cast<Index>(i)) = points[i].mapped;
         return r;

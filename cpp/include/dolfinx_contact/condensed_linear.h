@@ -1,0 +1,70 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_linear.h
+/// Newton's linear systems, of any rank.
+#pragma once
+
+#include "condensed_matrix.h"
+
+namespace dolfinx_contact::condensed {
+/// Solves J y = rhs and keeps the factors. J is singular where W is, with more contacts than the
+/// body has degrees of freedom; the shortest of the steps that fit best is taken then.
+class LinearSolver {
+  public:
+    VectorXd solve(const MatrixXd &J, const VectorXd &rhs) {
+        constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
+        constexpr Index worth_it = 128; // below, double precision costs nothing
+        VectorXd y;
+        kind_ = Kind::in_single;
+        if (J.rows() >= worth_it && solve_in_single(J, rhs, y))
+            return y;
+        kind_ = Kind::in_double;
+        double_.compute(J);
+        if (double_.rcond() > smallest_rcond)
+            return double_.solve(rhs);
+        kind_ = Kind::orthogonal;
+        orthogonal_.setThreshold(threshold);
+        return orthogonal_.compute(J).solve(rhs);
+    }
+
+    /// With the factors of the last matrix; those in single precision are not refined.
+    VectorXd again(const VectorXd &rhs) const {
+        if (kind_ == Kind::in_double)
+            return double_.solve(rhs);
+        if (kind_ == Kind::orthogonal)
+            return orthogonal_.solve(rhs);
+        const double scale = rhs.lpNorm<Eigen::Infinity>();
+        if (!(scale > 0.0))
+            return VectorXd::Zero(rhs.size());
+        return scale * single_.solve((rhs / scale).cast<float>()).cast<double>();
+    }
+
+  private:
+    enum class Kind { in_single, in_double, orthogonal };
+
+    /// By iterative refinement; false if that does not converge, because J is too badly
+    /// conditioned for it.
+    bool solve_in_single(const MatrixXd &J, const VectorXd &rhs, VectorXd &y) {
+        constexpr double accuracy = 1e-12, contraction = 0.1;
+        const double scale = rhs.lpNorm<Eigen::Infinity>();
+        single_.compute(J.cast<float>());
+        y.setZero(rhs.size());
+        VectorXd rest = rhs;
+        for (double size = scale; size > accuracy * scale;) {
+            const Eigen::VectorXf unit = (rest / size).cast<float>();
+            y += size * single_.solve(unit).cast<double>();
+            rest = rhs - J * y;
+            const double after = rest.lpNorm<Eigen::Infinity>();
+            if (!(after <= contraction * size))
+                return after <= 1e2 * accuracy * scale;
+            size = after;
+        }
+        return true;
+    }
+
+    Kind kind_ = Kind::in_double;
+    Eigen::PartialPivLU<Eigen::MatrixXf> single_;
+    Eigen::PartialPivLU<MatrixXd> double_;
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
+};
+} // namespace dolfinx_contact::condensed

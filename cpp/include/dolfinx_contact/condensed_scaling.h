@@ -1,0 +1,136 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_scaling.h
+/// From a problem in physical variables to a System in scaled ones, and back.
+#pragma once
+
+#include "condensed_operator.h"
+
+namespace dolfinx_contact::condensed {
+/// A problem on the way to the one that is asked for, all ones.
+struct Path {
+    double rule = 1.0, load = 1.0, friction = 1.0;
+};
+
+/// P tangential directions, T of them with friction (T = P or 0).
+template <int T, int P> class Scaling {
+  public:
+    static constexpr int D = T + 1;
+
+    Scaling(const Operator &op, const AnyLaw<P> &law, const VectorXd &q)
+        : op_(op), q_(q), coefficients_(law, op.nodes()) {
+        set_length(free_length());
+    }
+
+    bool associated() const { return coefficients_.associated(); }
+    Index nodes() const { return op_.nodes(); }
+    Index size() const { return D * op_.nodes() + op_.tied(); }
+    auto contact_part(const VectorXd &v) const { return v.head(D * op_.nodes()); }
+
+    /// Makes the largest of scaled reactions the unit of force, if it is not zero: a better one
+    /// than what the free state on a soft spring would give. Units scale variables and starts; no
+    /// error has them.
+    VectorXd make_unit(const VectorXd &r) {
+        const double largest = contact_part(r).template lpNorm<Eigen::Infinity>();
+        if (!(largest > 0.0))
+            return r;
+        set_length(length_ * largest);
+        return r / largest;
+    }
+
+    /// Physical reactions of P + 1 components in scaled variables.
+    VectorXd scaled(const VectorXd &reaction) const {
+        VectorXd r(D * op_.nodes() + op_.tied());
+        for (Index i = 0; i < op_.nodes(); ++i)
+            r.template segment<D>(D * i) =
+                reaction.template segment<P + 1>((P + 1) * i).template tail<D>();
+        r.tail(op_.tied()) = reaction.tail(op_.tied());
+        return r.cwiseQuotient(make().right);
+    }
+    VectorXd physical(const System<T> &system, const VectorXd &r) const {
+        VectorXd reaction = VectorXd::Zero(q_.size());
+        const VectorXd unscaled = system.right.cwiseProduct(r);
+        for (Index i = 0; i < op_.nodes(); ++i)
+            reaction.segment<P + 1>((P + 1) * i).template tail<D>() =
+                unscaled.template segment<D>(D * i);
+        reaction.tail(op_.tied()) = unscaled.tail(op_.tied());
+        return reaction;
+    }
+
+    /// p / mu to the power `rule`, mu times 10^(3 friction - 3), gaps raised until `load` of the
+    /// largest penetration is left.
+    System<T> make(const Path &path = {}) const {
+        System<T> system;
+        system.nodes = op_.nodes();
+        system.tied = op_.tied();
+        system.W = T == P ? &op_.W() : &op_.normal();
+        system.inverse = T == P ? op_.inverse() : nullptr;
+        const Index size = system.size();
+        system.left.resize(size);
+        system.right.resize(size);
+        system.q.resize(size);
+        system.smooth.assign(static_cast<std::size_t>(op_.nodes()), T == 0);
+        const double lift = (1.0 - path.load) * deepest();
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            if constexpr (T > 0) {
+                const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
+                system.smooth[static_cast<std::size_t>(i)] = smooth;
+                for (int c = 0; c < T; ++c) {
+                    const double mu =
+                        smooth ? 1.0
+                               : coefficients_.mu(i, c) * std::pow(10.0, 3.0 * path.friction - 3.0);
+                    system.right[D * i + c] = mu * force_;
+                    system.left[D * i + c] =
+                        mu * std::pow(coefficients_.q2(i, c), path.rule) / length_;
+                    system.q[D * i + c] = q_[(P + 1) * i + c];
+                }
+            }
+            system.right[D * i + T] = force_;
+            system.left[D * i + T] = 1.0 / length_;
+            system.q[D * i + T] = q_[(P + 1) * i + P] + lift;
+        }
+        for (Index c = 0; c < op_.tied(); ++c) {
+            system.right[D * op_.nodes() + c] = tied_scale(c) * force_;
+            system.left[D * op_.nodes() + c] = tied_scale(c) / length_;
+            system.q[D * op_.nodes() + c] = q_[(P + 1) * op_.nodes() + c];
+        }
+        return system;
+    }
+
+  private:
+    void set_length(double length) {
+        const double compliance = op_.mean_normal();
+        length_ = length > 0.0 ? length : 1.0;
+        force_ = compliance > 0.0 ? length_ / compliance : length_;
+    }
+    /// Largest load displacement.
+    double free_length() const {
+        double length = 0.0;
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            Local<P> loaded = q_.segment<P + 1>((P + 1) * i);
+            loaded[P] = std::min(loaded[P], 0.0);
+            length = std::max(length, loaded.stableNorm());
+        }
+        for (Index c = 0; c < op_.tied(); ++c)
+            length = std::max(length, std::abs(q_[(P + 1) * op_.nodes() + c]) * tied_scale(c));
+        return length;
+    }
+    /// The factor that makes rows and columns of tied rows as large as those of contacts.
+    double tied_scale(Index c) const {
+        const double compliance = op_.mean_normal();
+        return (compliance > 0.0 ? compliance : 1.0) / op_.largest_in_tied_row(c);
+    }
+
+    double deepest() const {
+        double depth = 0.0;
+        for (Index i = 0; i < op_.nodes(); ++i)
+            depth = std::max(depth, -q_[(P + 1) * i + P]);
+        return depth;
+    }
+
+    const Operator &op_;
+    const VectorXd &q_;
+    Coefficients<P> coefficients_;
+    double length_ = 1.0, force_ = 1.0;
+};
+} // namespace dolfinx_contact::condensed

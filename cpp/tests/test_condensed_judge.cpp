@@ -1,0 +1,90 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// What the condensed solver's judge is made of: products in twice the precision, the law in
+/// extended precision, inverses with tied rows.
+#include "random_states.h"
+#include <dolfinx_contact/bipotential.h>
+#include <dolfinx_contact/condensed.h>
+#include <dolfinx_contact/slip_rule.h>
+#include <gtest/gtest.h>
+
+using namespace dolfinx_contact;
+using namespace dolfinx_contact::testing;
+using dolfinx_contact::condensed::MatrixXd;
+using dolfinx_contact::condensed::Operator;
+using dolfinx_contact::condensed::VectorXd;
+
+// Products of all storages: W x, |W| |x|, W x in twice the precision where the terms cancel to
+// nothing that a plain sum would keep, single entries.
+TEST(CondensedJudge, products) {
+    Random random(23);
+    MatrixXd W = MatrixXd::NullaryExpr(40, 40, [&] { return random.normal(); });
+    W = MatrixXd(W + W.transpose());
+    MatrixXd unsymmetric = W;
+    unsymmetric(2, 5) *= 1 + 1e-14;
+    for (const auto &of : {W, unsymmetric}) {
+        const Operator op(of, 1);
+        const VectorXd x = VectorXd::NullaryExpr(40, [&] { return random.normal(); });
+        const VectorXd size = of.cwiseAbs() * x.cwiseAbs();
+        EXPECT_LE((op.W().magnitudes(x) - size).norm(), 1e-14 * size.norm());
+        const auto exact = [&](const VectorXd &start) {
+            condensed::VectorXl sum = start.cast<long double>();
+            for (int j = 0; j < 40; ++j)
+                sum += of.col(j).cast<long double>() * static_cast<long double>(x[j]);
+            return sum;
+        };
+        const VectorXd cancelled = -(of * x); // of which 1e-16 are left
+        const auto left = op.W().accurate(cancelled, x);
+        EXPECT_LE((left - exact(cancelled)).norm(), 1e-18L * size.norm());
+        EXPECT_EQ(op.W()(7, 3), of(7, 3));
+        EXPECT_EQ(op.W()(3, 7), of(3, 7));
+    }
+}
+
+// The inverse of a matrix whose last rows make it indefinite, one of them with a zero diagonal.
+TEST(CondensedJudge, inverse_with_tied_rows) {
+    Random random(29);
+    const MatrixXd B = MatrixXd::NullaryExpr(152, 152, [&] { return random.normal(); });
+    MatrixXd W = B * B.transpose() / 152 + MatrixXd::Identity(152, 152);
+    W = MatrixXd(W + W.transpose()) / 2;
+    W(150, 150) = 0.0;
+    W(151, 151) = -1e-9;
+    Operator op(W, 3, 2);
+    EXPECT_EQ(op.nodes(), 50);
+    ASSERT_TRUE(op.prepare());
+    EXPECT_LE((op.inverse()->dense() * W - MatrixXd::Identity(152, 152)).norm(), 1e-9);
+    W.bottomRows(2).setZero();
+    W.rightCols(2).setZero();
+    EXPECT_FALSE(Operator(W, 3, 2).prepare());
+}
+
+// The judge's projection, in extended precision, is the solver's to rounding, on every branch.
+TEST(CondensedJudge, judge_agrees_with_the_kernel) {
+    Random random(31);
+    int branches[3] = {0, 0, 0};
+    const NonAssociated<2> law{{0.3, 0.15}, {1.0, 0.2}};
+    for (int draw = 0; draw < 2000; ++draw) {
+        condensed::ExactState<2> at;
+        Local<2> r, w;
+        for (int c = 0; c < 3; ++c) {
+            r[c] = random.normal();
+            w[c] = random.normal() * std::pow(10.0, random.uniform(-3.0, 1.0));
+        }
+        r = project(law, r).r;
+        at.r = r.cast<long double>();
+        at.w = w.cast<long double>();
+        condensed::judge_exactly(law, 1.7L, at);
+        const Tangent<2> w_t = w.head<2>();
+        const Reaction<2> mapped = bipotential_map(law, r, w[2], w_t, 1.7);
+        const double size = r.norm() + 1.7 * w.norm();
+        EXPECT_EQ(at.branch, mapped.branch);
+        EXPECT_LE((at.defect.cast<double>() - (r - mapped.r)).norm(), 1e-15 * size);
+        const double slip = slip_defect(law, r, w_t, mapped.branch);
+        if (!r.isZero(0.0)) {
+            EXPECT_NEAR(static_cast<double>(at.slip.norm()), slip, 1e-15 * size);
+        }
+        ++branches[static_cast<int>(at.branch)];
+    }
+    for (const int count : branches)
+        EXPECT_GE(count, 100);
+}

@@ -1,0 +1,168 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What the errors of a condensed solution promise: forces that act as scale, rounding said, never less
+than true.  The judge is NumPy in long double and shares nothing with the solver."""
+
+import warnings
+
+import numpy as np
+import pytest
+from condensed_scenes import judge, random_problem
+
+from dolfinx_contact import CondensedNewton, Friction, _kernel
+from dolfinx_contact._errors import RoundingWarning
+from dolfinx_contact.condensed_newton import CondensedNotConverged, solve_condensed
+
+TOL = 1e-8
+
+
+def solved(W, q, friction, tol=TOL, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RoundingWarning)
+        return solve_condensed(W, q, friction, tol=tol, **options)
+
+
+def isotropic(mu, tangents=2):
+    return np.full(tangents, mu), np.ones(tangents)
+
+
+@pytest.mark.parametrize("unit", [1e-100, 1e-9, 1.0, 1e9, 1e100])
+@pytest.mark.parametrize("depth", [1e-9, 1e-11, 1e-12, 1e-13, 1e-14])
+def test_grazing_while_sliding(depth, unit):
+    """However light the touch of a sliding contact, its reaction is right to the rounding that is said."""
+    q = unit * np.array([[1.0, 0.5, -depth]])
+    found = solved(np.eye(3), q, Friction(0.3))
+    expected = depth * unit * np.array([-0.6 / np.sqrt(5), -0.3 / np.sqrt(5), 1.0])
+    assert np.abs(found.reaction[0] - expected).max() <= 1e-8 * depth * unit
+    errors = judge(np.eye(3), q, *isotropic(0.3), found.reaction)
+    assert max(errors) <= max(TOL, found.rounding)
+    # eps times the terms that cancel, of which |r - kappa w| has the slip and mu times the slip
+    cancelling = np.finfo(float).eps * np.linalg.norm([1, 0.5, 0.3 * np.sqrt(1.25)])
+    force = np.linalg.norm(expected) / unit
+    assert found.rounding == pytest.approx(cancelling / force, rel=1e-3)
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-17, 1e-30, -1e-17, -1.0])
+def test_nothing_acts(depth):
+    """A penetration below the rounding of the slip is no contact: no reaction, at once, no warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = solve_condensed(np.eye(6), [[1, 0.5, -depth], [0, 0, 0]], Friction(0.3))
+    assert not found.reaction.any() and found.iterations == 0
+    assert found.error <= found.rounding <= np.finfo(float).eps
+    assert found.error == found.slip_error == 0 or depth > 0
+
+
+def test_penetration_counts():
+    """No reactions where something presses is no solution, whatever slides beside it."""
+    for depth in 10.0 ** -np.arange(0, 13):
+        for mu in (1e-3, 0.3, 10.0):
+            q = np.array([[1.0, 0.5, -depth], [3.0, 0.0, 1.0]])
+            found = solved(np.eye(6), q, Friction(mu))
+            assert found.reaction[0, 2] == pytest.approx(depth, rel=1e-6)
+
+
+def test_limit_of_rounding_is_a_warning_that_names_it():
+    """An answer above tol is returned with its true error and rounding in a RoundingWarning."""
+    with pytest.warns(RoundingWarning, match="rounding"):
+        found = solve_condensed(np.eye(3), [[1, 0.5, -1e-13]], Friction(0.3), tol=1e-12)
+    assert 1e-12 < max(found.error, found.slip_error) <= found.rounding
+
+
+def test_errors_are_never_less_than_true():
+    """W of condition up to 1e14, one to three contacts: a claimed error differs from the true one by
+    less than tol/100 or rounding's tenth, and an accepted true one is within tol or rounding."""
+    rng, accepted, limited = np.random.default_rng(5), 0, 0
+    for _ in range(300):
+        n = rng.integers(1, 4)
+        B = np.linalg.qr(rng.normal(size=(3 * n, 3 * n)))[0]
+        W = (B * 10 ** rng.uniform(-14, 0, size=3 * n)) @ B.T
+        W, mu = (W + W.T) / 2, rng.uniform(0.1, 3)
+        q = rng.normal(size=(n, 3))
+        try:
+            found = solved(W, q, Friction(mu), max_seconds=2)
+        except (CondensedNotConverged, ValueError):
+            continue
+        errors = judge(W, q, *isotropic(mu), found.reaction)
+        accepted += 1
+        limited += found.rounding > TOL
+        for claimed, true in zip((found.error, found.slip_error), errors):
+            assert abs(claimed - true) <= max(TOL / 100, found.rounding / 10)
+            assert true <= 1.01 * max(TOL, found.rounding)
+    assert accepted >= 250 and limited >= 5
+
+
+@pytest.mark.parametrize("spring", [1e-2, 1e-5, 1e-8])
+def test_soft_springs_do_not_hide_errors(spring):
+    """W and q of a body on a soft spring, both of size 1 / spring: the reactions balance the load.
+
+    Rigid translations of 1 / spring are in W; the elastic part is of size one.
+    """
+    rng = np.random.default_rng(2)
+    n = 6
+    rigid = np.tile(np.eye(3), (n, 1))
+    B = rng.normal(size=(3 * n, 3 * n))
+    load = np.array([0.1, 0.05, -1.0])
+    W = B @ B.T / (3 * n) + np.eye(3 * n) + rigid @ rigid.T / spring
+    q = (rigid @ load / spring).reshape(n, 3) + 0.01 * rng.normal(size=(n, 3))
+    found = solved(W, q, Friction(0.3))
+    balance = found.reaction.sum(axis=0) + load
+    assert np.abs(balance).max() <= 2 * (spring + max(TOL, found.rounding)) * np.linalg.norm(load)
+
+
+def test_scales_of_the_caller():
+    """stiffness scales the error, tangential_stiffness the slip error, external is a force that acts."""
+    scene = random_problem(4, contacts=5, rank=15, mu_range=(0.1, 0.4), ratio=2)
+    friction, solver = Friction(scene.mu, scene.p), CondensedNewton()
+    operator = _kernel.CondensedOperator(scene.W, 3)
+    kappa = 1 / np.diag(scene.W)[2::3]
+    plain = solver.solve_condensed(operator, friction, scene.q, 1e-6)
+    given = solver.solve_condensed(operator, friction, scene.q, 1e-6, stiffness=kappa)
+    assert given.error == pytest.approx(plain.error, rel=1e-6)
+    # more digits than one step gives, so that both have the same answer
+    size = np.linalg.norm(plain.reaction)
+    relative = solver.solve_condensed(operator, friction, scene.q, 1e-6, external=1e3 * size)
+    if np.array_equal(relative.reaction, plain.reaction):
+        assert relative.error == pytest.approx(plain.error / 1e3, rel=1e-9)
+    blocks = np.tile(np.diag([2.0, 3.0]), (5, 1, 1))
+    one = solver.solve_condensed(operator, friction, scene.q, 1e-6, tangential_stiffness=blocks)
+    two = solver.solve_condensed(operator, friction, scene.q, 1e-6, tangential_stiffness=7 * blocks)
+    assert np.array_equal(one.reaction, two.reaction)
+    assert two.slip_error == pytest.approx(7 * one.slip_error, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "scales, message",
+    [
+        (dict(stiffness=[1.0, -1.0]), "stiffness must be positive"),
+        (dict(stiffness=[1.0, 0.0]), "stiffness must be positive"),
+        (dict(stiffness=[1.0, np.nan]), "stiffness must be positive"),
+        (dict(stiffness=[1.0]), "2 entries"),
+        (dict(tangential_stiffness=-np.ones((2, 2, 2))), "tangential_stiffness"),
+        (dict(tangential_stiffness=np.ones(3)), "8 entries"),
+        (dict(tied_stiffness=[1.0]), "tied_stiffness must have 0"),
+        (dict(external=-1.0), "external"),
+        (dict(external=np.inf), "external"),
+    ],
+)
+def test_scales_that_make_no_sense(scales, message):
+    """A stiffness that is none would let any penetration pass: a ValueError."""
+    operator = _kernel.CondensedOperator(np.eye(6), 3)
+    with pytest.raises(ValueError, match=message):
+        CondensedNewton().solve_condensed(operator, Friction(0.3), -np.ones((2, 3)), TOL, **scales)
+
+
+def test_change_is_what_is_missing():
+    """At tol 1e-6 `change` is the distance to the tight solution nearby, within 5 %."""
+    compared = 0
+    for seed in range(60):
+        scene = random_problem(seed, contacts=6, rank=18, mu_range=(0.05, 0.4), ratio=2)
+        law = Friction(scene.mu, scene.p)
+        loose = solve_condensed(scene.W, scene.q, law, tol=1e-6)
+        tight = solved(scene.W, scene.q, law, tol=1e-13, r0=loose.reaction)
+        distance = np.linalg.norm(loose.reaction - tight.reaction)
+        if distance > 1e-12 * np.linalg.norm(tight.reaction):  # closer is rounding
+            compared += 1
+            expected = distance / np.linalg.norm(tight.reaction)
+            assert loose.change == pytest.approx(expected, rel=0.05)
+    assert compared >= 20
