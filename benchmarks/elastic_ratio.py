@@ -42,7 +42,7 @@ def elastic_solve(body, b, repeat: int, clock=process_time) -> dict:
     """Iterations and seconds of K u = b by conjugate gradients with multigrid, to 1e-10 from zero."""
     options = MULTIGRID | {"ksp_rtol": 1e-10}
     start = clock()
-    solver = LinearSolver(body.K, options, "yardstick_", body._rigid_modes)
+    solver = LinearSolver(body.K, options, "yardstick_", body.rigid_modes)
     setup = clock() - start
     seconds = []
     for _ in range(repeat):
@@ -81,7 +81,7 @@ def measure(
     punch = Punch(Parameters(case=case, refine=refine, lowest=lowest), **mesh)
     punch.problem.solver = dc.FixedPoint()
     body = punch.problem.body
-    body._options = MULTIGRID
+    body.options = MULTIGRID
     displacements = (into_the_air() if air else programme(punch.parameters))[:steps]
     punch.approach.value = -displacements[0]
     body.refresh()

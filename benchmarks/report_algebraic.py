@@ -69,20 +69,27 @@ class Sampled:
     def __init__(self, solver):
         self.solver, self.samples = solver, []
 
-    def solve(self, equations, x, tol):
-        residual, samples, start = equations.residual, [], process_time()
+    def bind(self, *arguments):
+        self._bound = self.solver.bind(*arguments)
+        return self
 
-        def noted(x):
-            found = residual(x)
-            samples.append((process_time() - start, found[1]))
+    def destroy(self):
+        self._bound.destroy()
+
+    def solve(self, step):
+        residual, samples, start = step.residual, [], process_time()
+
+        def noted(x, maps):
+            found = residual(x, maps)
+            samples.append((process_time() - start, found[1].largest))
             return found
 
-        equations.residual, self.samples = noted, samples
+        step.residual, self.samples = noted, samples
         try:
-            return self.solver.solve(equations, x, tol)
+            return self._bound.solve(step)
         finally:
             self.seconds = process_time() - start
-            del equations.residual
+            del step.residual
 
 
 def scene(name: str, repeat: int, mesh: dict) -> dict:

@@ -54,7 +54,7 @@ def steps(name: str, divisions: int, layers: int) -> dict:
     if solver is not None:
         problem.solver = solver
     elastic = [elastic_solve(punch)]
-    problem.body.K = problem.body._digest = None  # the first step assembles for itself
+    problem.body.forget()  # the first step assembles for itself
     memory = Memory()
     seconds, iterations, said, chosen = [], [], "", ""
     for displacement in displacements:

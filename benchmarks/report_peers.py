@@ -132,7 +132,7 @@ def compared(punch, given, u, seconds, refine, increments, mesh) -> dict:
         judge.answer = answer.ravel()
         errors.append(punch.press(displacement)["error"])
         # The reactions of their displacements; those of the record would add our metric times their penetration.
-        r = problem.body.internal_force(judge.answer)[punch.contact._dofs]
+        r = problem.body.internal_force(judge.answer)[punch.contact.points.dofs]
         forces.append((r[:, 2].sum(), np.linalg.norm(r[:, :2], axis=1).sum()))
     equal = float(np.clip(max(errors, default=1e-8), 1e-12, 0.1))
     ours, exact = {}, []

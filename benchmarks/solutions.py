@@ -103,7 +103,7 @@ def examine(make, programme: list, starts: list[int], report=print) -> list[dict
             leader.move(top)
             leader.problem.solve()
             contact, by = leader.contact, {}
-            W = leader.problem._condensed.compliance() if W is None else W
+            W = leader.problem.bound().compliance() if W is None else W
             w = np.column_stack((contact.slip_increment, contact.gap))
             q = w - (W @ contact.reaction.ravel()).reshape(w.shape)
             found = solutions(W, q, friction, contact.reaction.copy(), count, seed=k)

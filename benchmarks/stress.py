@@ -117,7 +117,7 @@ def run(scene: Scene, solver) -> dict:
             friction = dc.Friction(random.mu, random.p)
             found = dc.solve_condensed(random.W, random.q, friction, solver, TOL, max_seconds=30)
             errors = judge(random.W, random.q, random.mu, random.p, found.reaction)
-            record.update(error=errors[0], slip_error=errors[1], steps=1)
+            record.update(error=float(errors[0]), slip_error=float(errors[1]), steps=1)
             record.update(iterations=found.iterations, slowest=found.seconds)
             used[found.branch] += 1
         else:

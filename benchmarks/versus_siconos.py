@@ -40,10 +40,11 @@ def make(file):
         punch.problem.solver = dc.CondensedNewton()
         for displacement in programme(punch.parameters):
             punch.press(displacement)
-        q, r = (np.array(part) for part in zip(*punch.problem._past))
+        q, r, _ = zip(*punch.problem.bound().past)
+        q, r = (np.reshape(part, (len(part), -1, 3)) for part in (q, r))
         problems |= {f"{case}q": q, f"{case}r": r}
         if case == "A":
-            problems["W"] = punch.problem._condensed.compliance()
+            problems["W"] = punch.problem.bound().compliance()
     np.savez(file, **problems)
 
 

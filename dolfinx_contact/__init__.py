@@ -25,6 +25,7 @@ except ImportError as error:
 
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
     from dolfinx_contact.bipotential import bipotential_gap as bipotential_gap
+    from dolfinx_contact.checks import RoundingWarning as RoundingWarning
     from dolfinx_contact.condensed_newton import CondensedNewton as CondensedNewton
     from dolfinx_contact.condensed_newton import CondensedNotConverged as CondensedNotConverged
     from dolfinx_contact.condensed_newton import CondensedResult as CondensedResult
@@ -59,6 +60,7 @@ _HOME = {  # the module of every name
     "LinearSolverError": "linear_solver",
     "NotConverged": "problem",
     "RigidPlane": "plane",
+    "RoundingWarning": "checks",
     "Status": "contact",
     "Step": "problem",
     "Wear": "wear",

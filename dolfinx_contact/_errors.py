@@ -8,11 +8,6 @@ from contextlib import contextmanager
 from mpi4py import MPI
 
 
-class RoundingWarning(UserWarning):
-    """An answer was accepted although its error is above ``tol``: below its rounding nothing can be
-    asked in double precision."""
-
-
 @contextmanager
 def raised_together(comm):
     """Raise on every rank of ``comm`` what the block raised on any of them.

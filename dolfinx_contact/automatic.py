@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact import condensed
+from dolfinx_contact.compliance import fits
+from dolfinx_contact.condensed import components
 from dolfinx_contact.condensed_newton import CondensedNewton
 from dolfinx_contact.fixed_point import FixedPoint
+from dolfinx_contact.solver import SolverResult
 
 CROSSOVER = 400  # contact nodes, see docs/solvers.md
 
@@ -16,39 +18,54 @@ CROSSOVER = 400  # contact nodes, see docs/solvers.md
 class Automatic:
     """Newton's method on the condensed problem for small contacts, else the fixed point.
 
-    If the choice fails, the other one is tried.  ``equations.chosen`` says what was done and why.
+    If the choice fails, the other one is tried; the result says what was done and why.
     """
 
-    def solve(self, equations, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
-        comm = equations.body.comm
-        contacts = equations.problem.contacts
-        nodes = comm.allreduce(sum(len(contact.nodes) for contact in contacts))
-        unknowns = equations.body.K.getSize()[0]
-        fits = condensed.fits(comm, nodes, condensed.components(contacts), unknowns)
-        solvers = [CondensedNewton(), FixedPoint()]
+    def bind(self, body, contacts, stiffness, memory):
+        """See ``Solver``."""
+        return BoundAutomatic(body, contacts, stiffness, memory)
+
+
+class BoundAutomatic:
+    """Both solvers for one body, each set up when it is first used."""
+
+    def __init__(self, body, contacts, stiffness, memory):
+        self._arguments, self._bound = (body, contacts, stiffness, memory), {}
+        nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
+        enough = fits(body.comm, nodes, components(contacts), body.K.getSize()[0])
+        self._solvers = [CondensedNewton(), FixedPoint()]
+        self._why = f"{nodes} contact nodes, at most {CROSSOVER}"
         if nodes > CROSSOVER:
-            why = f"{nodes} contact nodes, more than {CROSSOVER}"
-            solvers.reverse()
-        elif equations.body.ksp.getPC().getType() not in ("lu", "cholesky"):
-            why = "without a factorisation the condensed operator would cost too many solves"
-            solvers.reverse()
-        elif not fits:
-            why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
-            solvers.reverse()
-        else:
-            why = f"{nodes} contact nodes, at most {CROSSOVER}"
-        if not fits:
-            solvers = solvers[:1]
-        iterations, best, chosen = 0, (np.inf, x), ""
-        for solver in solvers:
-            x, count = solver.solve(equations, best[1], tol)
-            iterations += count
-            error = equations.measure(x)
-            chosen = f"{chosen}{type(solver).__name__} ({why})"
-            if error < best[0]:
-                best = (error, x)
-            if error <= tol:
+            self._why = f"{nodes} contact nodes, more than {CROSSOVER}"
+            self._solvers.reverse()
+        elif body.ksp.getPC().getType() not in ("lu", "cholesky"):
+            self._why = "without a factorisation the condensed operator would cost too many solves"
+            self._solvers.reverse()
+        elif not enough:
+            self._why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
+            self._solvers.reverse()
+        if not enough:
+            self._solvers = self._solvers[:1]
+
+    def destroy(self) -> None:
+        """Free both.  Collective."""
+        for bound in self._bound.values():
+            bound.destroy()
+
+    def solve(self, step) -> SolverResult:
+        """See ``BoundSolver``."""
+        iterations, smallest, best, start, said = 0, np.inf, None, None, []
+        why = self._why
+        for solver in self._solvers:
+            if solver not in self._bound:
+                self._bound[solver] = solver.bind(*self._arguments)
+            found = self._bound[solver].solve(step, start)
+            iterations += found.iterations
+            said.append(f"{found.chosen} ({why})")
+            errors = step.measure(found.x)
+            if best is None or errors.largest < smallest:
+                smallest, best, start = errors.largest, found, found.x
+            if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
                 break
-            why, chosen = f"the other one ended at {error:.1e}", chosen + ", then "
-        equations.chosen = chosen.removesuffix(", then ")
-        return best[1], iterations
+            why = f"the other one ended at {errors.largest:.1e}"
+        return best._replace(iterations=iterations, chosen=", then ".join(said))

@@ -15,10 +15,10 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from dolfinx_contact import _dolfinx
+from dolfinx_contact import _dolfinx, rigid_motion
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.anchors import Anchors
 from dolfinx_contact.linear_solver import LinearSolver, preconditioner
-from dolfinx_contact.rigid_motion import refuse_rigid_motion, rigid_modes
 from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
@@ -63,11 +63,11 @@ class ElasticBody:
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
         fixed = [_dolfinx.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
-        self._options = None if petsc_options is None else dict(petsc_options)
+        self.options = None if petsc_options is None else dict(petsc_options)
         self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
         self._assemblies = 0
-        self.K, self._external, self._elastic = None, None, None
+        self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self.known = None  # the last FreeState
 
     def refresh(self) -> int:
@@ -94,6 +94,9 @@ class ElasticBody:
         )
         self._coupling = self.K.createSubMatrix(rows, fixed)
         self._lift, self._lifted = self._coupling.createVecs()
+        # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
+        entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
+        self._row_size = np.sqrt(entries) * np.abs(self.K.getDiagonal().array_r)
         self.K.zeroRowsColumns(fixed)
         with raised_together(self.comm):
             if not np.isfinite(self.K.getDiagonal().array).all():
@@ -102,7 +105,7 @@ class ElasticBody:
                 )
         self._right, self._left = self.K.createVecs()
         self.forget_solver()
-        refuse_rigid_motion(self)
+        self.soft = rigid_motion.soft_motions(self)
         self._digest = digest
         self._assemblies += 1
         return self._assemblies
@@ -137,6 +140,19 @@ class ElasticBody:
         b[self.fixed] = lift[self.fixed]
         return b, external
 
+    def support_forces(self, x: np.ndarray) -> np.ndarray:
+        """What the supports carry at ``x``, at fixed degrees of freedom, contact reactions left out.
+
+        By K, of which one triangle beside the other is taken to be the same.
+        """
+        self._right.array_w[:] = x
+        self._coupling.multTranspose(self._right, self._lift)
+        return self._lift.array_r - self._external[self.fixed]
+
+    def cancelling(self, x: np.ndarray) -> np.ndarray:
+        """Size of the terms that cancel in ``K x``, ``shape=(owned dofs,)``, force units."""
+        return self._row_size * np.abs(x)
+
     def internal_force(self, values: np.ndarray) -> np.ndarray:
         """F assembled by DOLFINx at a displacement, owned entries; ``u`` itself is left as it was."""
         kept = self.u.x.array.copy()
@@ -147,6 +163,12 @@ class ElasticBody:
         finally:
             self.u.x.array[:] = kept
         return self._work.x.array[: self.size].copy()
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """F at a displacement of owned degrees of freedom, what supports carry included."""
+        values = self.u.x.array.copy()
+        values[: self.size] = x
+        return self.internal_force(values)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """K x; rows and columns of fixed degrees of freedom are those of the identity."""
@@ -214,11 +236,24 @@ class ElasticBody:
         same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
         return factor * self.known.displacement if same else None
 
+    def forget(self) -> None:
+        """Assemble and set up everything anew when it is next needed."""
+        self.K = self._digest = None
+
     def forget_solver(self) -> None:
         """Set the solver of K up anew when it is next needed.  Collective."""
         if self._elastic is not None:
             self._elastic.destroy()
-        self._elastic = None
+        if self._anchors is not None:
+            self._anchors.destroy()
+        self._elastic = self._anchors = None
+
+    @property
+    def anchors(self) -> Anchors | None:
+        """Springs for the soft rigid motions, None where there are none.  Collective."""
+        if self._anchors is None and self.soft.shape[1] > 0:
+            self._anchors = Anchors(self)
+        return self._anchors
 
     @property
     def ksp(self):
@@ -229,22 +264,22 @@ class ElasticBody:
 
     def solver(self, A) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
-        return LinearSolver(A, self._options, self.prefix, self._rigid_modes)
+        return LinearSolver(A, self.options, self.prefix, self.rigid_modes)
 
     def stiffened(self, A, S):
         """What applies the preconditioner of ``A = K + S``, springs ``S``; GAMG's levels are those of K.
 
         Collective.
         """
-        if preconditioner(A, self._options, self.prefix) == "gamg":
+        if preconditioner(A, self.options, self.prefix) == "gamg":
             return StiffenedMultigrid(self.ksp.getPC(), A, S)
         return self.solver(A)
 
-    def _rigid_modes(self) -> np.ndarray:
+    def rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""
         gdim = self.V.mesh.geometry.dim
         x = self.V.tabulate_dof_coordinates()[: self.size // gdim, :gdim]
-        modes = rigid_modes(x, np.ones(len(x), dtype=bool), self.comm)
+        modes = rigid_motion.rigid_modes(x, np.ones(len(x), dtype=bool), self.comm)
         modes[self.fixed] = 0.0
         lower = np.linalg.cholesky(self.total(modes.T @ modes))
         return np.linalg.solve(lower, modes.T).T

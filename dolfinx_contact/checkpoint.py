@@ -9,6 +9,7 @@ every run, so neither the ranks' shares nor their number need be those that wrot
 from __future__ import annotations
 
 import os
+from collections import deque
 
 import numpy as np
 from mpi4py import MPI
@@ -16,6 +17,7 @@ from mpi4py import MPI
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.body import FreeState
+from dolfinx_contact.condensed import KEPT
 
 
 def save(problem, path) -> None:
@@ -30,7 +32,8 @@ def save(problem, path) -> None:
         mine["free" if known.exact else "rough"] = _rows(problem, known.displacement)
     for k, contact in enumerate(problem.contacts):
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
-    if problem._past:
+    kept = problem._memory.get("past")
+    if kept:
         mine["past_nodes"] = np.concatenate([a for name, a in nodes.items() if name != "nodes"])
     everything = comm.gather(mine, root=0)
     with raised_together(comm):
@@ -40,8 +43,11 @@ def save(problem, path) -> None:
                 name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
                 for name in mine
             }
-            if problem._past:
-                file["past"] = np.array(problem._past)
+            if kept:
+                last = kept[-1]
+                alike = [past for past in kept if past[0].size == last[0].size]
+                file["past"] = np.array([past[:2] for past in alike])
+                file["past_tied"] = last[2]
             unfinished = f"{path}.unfinished"
             with open(unfinished, "wb") as stream:
                 np.savez(stream, **file)
@@ -74,20 +80,30 @@ def load(problem, path) -> None:
                 names = [f"contact{k}_nodes" for k in range(count)]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
                 at = _positions(file["past_nodes"], np.argsort(file["past_nodes"]), order)
-                past = file["past"][:, :, at]
+                past = _past(file["past"], int(file.get("past_tied", 0)), at)
     mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
     with raised_together(comm):
         for k, contact in enumerate(problem.contacts):
             prefix = f"contact{k}_"
             contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
     problem._states = [mine["u"].ravel(), mine["before"].ravel()]
-    problem._past.clear()
-    problem._past.extend(map(tuple, past))
+    kept = problem._memory.setdefault("past", deque(maxlen=KEPT))
+    kept.clear()
+    kept.extend(past)
     problem.body.known = None
     if comm.allreduce("digest" in mine, op=MPI.LAND):
         exact = "free" in mine
         free = mine["free" if exact else "rough"].ravel()
         problem.body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+
+
+def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
+    """Earlier condensed steps in another order of nodes; what belongs to anchors stays behind them."""
+    flat = saved.reshape(*saved.shape[:2], -1)
+    size = flat.shape[2] - tied
+    nodal = flat[:, :, :size].reshape(*flat.shape[:2], len(at), -1)[:, :, at]
+    ordered = np.concatenate((nodal.reshape(*flat.shape[:2], size), flat[:, :, size:]), axis=2)
+    return [(q, force, tied) for q, force in ordered]
 
 
 def _nodes(problem) -> dict[str, np.ndarray]:

@@ -4,19 +4,21 @@
 
 from __future__ import annotations
 
-import os
+import warnings
 from collections import deque
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from dolfinx_contact import _kernel
 from dolfinx_contact._errors import raised_together
+from dolfinx_contact.checks import RoundingWarning
+from dolfinx_contact.compliance import Rows, bytes_needed, check_memory, compliance
 from dolfinx_contact.condensed_newton import CondensedNotConverged, principal_axes
 from dolfinx_contact.friction import Friction
+from dolfinx_contact.solver import SolverResult
 
-_BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
+KEPT = 64  # earlier steps: more than a cycle has
 
 
 class CondensedBody:
@@ -25,76 +27,140 @@ class CondensedBody:
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
     sparse right-hand sides; it is held by rank 0 alone.  A degree of freedom fixed by a boundary
     condition neither moves nor has a reaction of friction.  Without friction at any contact there are
-    normal components alone.
+    normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
+    forces are unknowns behind the reactions, and what they move has to agree with them.
 
     Args:
+        options: ``CondensedNewton``, which solves the condensed problem.
         body: The elastic body, its stiffness assembled.
         contacts: Its contacts.
+        stiffness: ``NodalStiffness`` of each contact, in which errors are measured.
+        memory: Keeps earlier steps, from which the next ones start.
+
+    Attributes:
+        past: The last steps' q and forces, flat, and how many of these are of anchors.
 
     Raises:
         MemoryError: on all ranks, if ``W`` and what Newton's method needs beside it would not fit.
     """
 
-    def __init__(self, body, contacts):
+    def __init__(self, options, body, contacts, stiffness, memory):
+        self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
-        gdim = self._contacts[0].frame.shape[0]
-        # One row per local direction of a node: its global components, none at fixed dofs.
-        dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, self.dim, gdim))]
-        turns = [np.zeros((0, self.dim, gdim))]
-        for contact in self._contacts:
-            free = ~np.isin(contact._dofs, body.fixed)
-            dofs.append(contact._dofs)
-            turns.append(principal_axes(contact.friction, len(free), gdim)[:, -self.dim :])
-            frames.append(turns[-1] @ contact.frame * free[:, None, :])
-        self._dofs, self._frames, self._turns = map(np.concatenate, (dofs, frames, turns))
-        self._counts = self.comm.allgather(len(self._dofs))
-        self.nodes = sum(self._counts)
-        _check_memory(self.comm, memory(self.nodes, self.dim, body.K.getSize()[0]))
+        self._held_by = body.anchors or body
+        nodes, anchored = self._rows(), self._anchor_rows()
+        self._parts = [nodes, anchored]
+        self.nodes, self._tied = nodes.size // self.dim, anchored.size
+        check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
         W = self.compliance()
-        self.operator = None
+        a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
+        self.operator, size = None, nodes.size
         if self.comm.rank == 0:
             # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
-            inert = ~W.any(axis=0) & ~W.any(axis=1)
-            W[inert, inert] = np.diag(W).mean() / max(1 - inert.mean(), 1 / W.shape[0])
-            self.operator = _kernel.CondensedOperator(W, self.dim)
+            inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
+            share = 1 - len(inert) / size
+            W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
+            last = range(size, len(W))
+            W[last, last] -= 1 / a
+            self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
             del W  # copied
             self.operator.prepare()  # pays after some ten iterations
         self.friction = self._gathered_friction()
-        self.past: list | deque = []  # (q, r) of earlier steps, kept by the problem
+        self._scales = self._gathered_stiffness(stiffness) | {"tied_stiffness": a}
 
-    def gather(self, local: np.ndarray) -> np.ndarray:
-        """Rows of all nodes, in the order of ranks and contacts, on all ranks."""
-        return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
+    def destroy(self) -> None:
+        """Nothing to free: the body owns the factorisation."""
 
-    def free_displacement(self, displacement: np.ndarray) -> np.ndarray:
-        """``q``, ``shape=(nodes, dim)``: slip and gap of all nodes at a displacement of owned dofs."""
+    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+        """One load step by Newton's method on the condensed problem.
+
+        Args:
+            step: The ``LoadStep``.
+            start: Not used: reactions of earlier steps are better starts.
+        """
+        free = self._held_by.solve(step.b) if self._tied else self._body.free_state(step.b)
+        acting = self._body.norm(step.external)
+        q, anchors = self._motion(free), slice(self.dim * self.nodes, None)
+        starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
+        for factor in (0.1, 1e-2, 1e-3):  # this error is not quite the condensed problem's
+            result = self._reactions(q + rounding, factor * step.tol, starts, acting)
+            iterations += result.iterations
+            force = np.concatenate((result.reaction.ravel(), result.tied))
+            x, previous = self.displacement(free, force), error
+            error = step.measure(x).largest
+            if not error < previous:
+                break
+            best = x, force, result
+            if max(error, result.change) <= step.tol:
+                break
+            starts = [force]
+            # Of the free state, whose forces may be far larger than those that act: another digit.
+            free = free + self._held_by.solve(step.b - self._held_by.multiply(free))
+            # Of W, which a long lever or a soft support makes large: slip and gap of the body itself count.
+            moved = np.concatenate(
+                (result.displacement.ravel(), force[anchors] / self._scales["tied_stiffness"])
+            )
+            rounding = rounding + self._motion(x) - moved
+        x, force, result = best
+        self.past.append((q, force, self._tied))
+        forward = result.change + step.measure(x).largest
+        return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+
+    def compliance(self) -> np.ndarray:
+        """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
+        return compliance(self._held_by, self._parts, self._body.K.getOwnershipRange()[0])
+
+    def _rows(self) -> Rows:
+        """One row per local direction of a node: its global components, none at fixed dofs."""
+        gdim = self._contacts[0].points.dim
+        dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, gdim))]
+        turns = [np.zeros((0, self.dim, gdim))]
+        for contact in self._contacts:
+            points = contact.points
+            free = ~np.isin(points.dofs, self._body.fixed)
+            dofs.append(np.repeat(points.dofs, self.dim, axis=0))
+            turns.append(principal_axes(contact.friction, points.count, gdim)[:, -self.dim :])
+            frames.append((turns[-1] @ points.frames * free[:, None, :]).reshape(-1, gdim))
+        self._turns = np.concatenate(turns)
+        return Rows(self.comm, np.concatenate(dofs), np.concatenate(frames))
+
+    def _anchor_rows(self) -> Rows:
+        """One row per anchor, of all components of its node, as blocks of right-hand sides want them."""
+        gdim = self._contacts[0].points.dim
+        dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
+        node = gdim * (dofs // gdim)[:, None] + np.arange(gdim)
+        return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
+
+    def _motion(self, displacement: np.ndarray) -> np.ndarray:
+        """Slip and gap of all nodes, and motion of the anchors, at a displacement of owned dofs."""
         rows = [np.zeros((0, self._turns.shape[2]))]
         for contact in self._contacts:
             contact.move(displacement)
             rows.append(np.column_stack((contact.slip_increment, contact.gap)))
-        return self.gather(np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)))
+        local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
+        nodes, anchored = self._parts
+        return np.concatenate((nodes.gather(local), anchored.gather(anchored.of(displacement))))
 
-    def forces(self, reaction: np.ndarray) -> np.ndarray:
-        """Nodal forces of the reactions of all nodes, owned degrees of freedom, global frame."""
-        first = sum(self._counts[: self.comm.rank])
-        local = reaction[first : first + len(self._dofs)]
+    def displacement(self, trial: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Displacement of owned dofs at the forces of all rows, from the one without."""
         forces = np.zeros(self._body.size)
-        forces[self._dofs] = np.einsum("ni,nij->nj", local, self._frames)
-        return forces
-
-    def displacement(self, trial: np.ndarray, reaction: np.ndarray) -> np.ndarray:
-        """Displacement of owned dofs at the reactions of all nodes, from the one without."""
-        correction = self._body.solve(self.forces(reaction))
+        self._parts[0].add_forces(force[: self.dim * self.nodes], forces)
+        self._parts[1].add_forces(force[self.dim * self.nodes :], forces)
+        correction = self._held_by.solve(forces)
         correction[self._body.fixed] = 0.0
         return trial + correction
 
-    def solve(self, solver, q: np.ndarray, tol: float, starts):
-        """``solver.solve_condensed`` on rank 0; its result, the best one if it failed, on all ranks."""
+    def _reactions(self, q: np.ndarray, tol: float, starts, acting: float):
+        """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
         found, result = None, None
         if self.comm.rank == 0:
             try:
-                result = solver.solve_condensed(self.operator, self.friction, q, tol, starts)
+                with warnings.catch_warnings():  # the body's own rounding counts
+                    warnings.simplefilter("ignore", RoundingWarning)
+                    result = self._options.solve_condensed(
+                        self.operator, self.friction, q, max(tol, 1e-14), starts, external=acting, **self._scales
+                    )  # fmt: skip
             except CondensedNotConverged as failure:
                 result = failure.best
             except Exception as caught:  # the other ranks must not be left waiting
@@ -106,28 +172,40 @@ class CondensedBody:
 
     # -- starts ----------------------------------------------------------------------------------
 
-    def starts(self, q: np.ndarray) -> list[np.ndarray]:
+    def _starts(self, q: np.ndarray) -> list[np.ndarray]:
         """Reactions to start from: last step's, extrapolated, those of the most similar step, and last
         step's with the change that led to the most similar one."""
-        if not self.past:
+        past = [(a, b) for a, b, _ in self.past if a.size == q.size]
+        if not past:
             return []
-        last = self.past[-1]
+        last = past[-1]
         starts = [last[1]]
-        if len(self.past) > 1:
-            before = self.past[-2]
-            starts.append(2 * last[1] - before[1])
+        if len(past) > 1:
+            starts.append(2 * last[1] - past[-2][1])
         scale = np.abs(q).max()
-        distances = [np.abs(past[0] - q).max() for past in self.past]
+        distances = [np.abs(other[0] - q).max() for other in past]
         similar = int(np.argmin(distances))
         if distances[similar] < 0.1 * scale:
-            starts.append(self.past[similar][1])
+            starts.append(past[similar][1])
             if similar > 0:
-                starts.append(last[1] + self.past[similar][1] - self.past[similar - 1][1])
+                starts.append(last[1] + past[similar][1] - past[similar - 1][1])
         return starts
 
-    def remember(self, q: np.ndarray, reaction: np.ndarray) -> None:
-        """Keep a step among the last ones, from which the next start."""
-        self.past.append((q, reaction))
+    # -- gathered from all ranks -----------------------------------------------------------------
+
+    def gather(self, local: np.ndarray) -> np.ndarray:
+        """Rows of all nodes, in the order of ranks and contacts, on all ranks."""
+        return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
+
+    def _gathered_stiffness(self, stiffness) -> dict[str, np.ndarray]:
+        """Normal and tangential blocks of all nodes along the principal axes, for rank 0's errors."""
+        gathered = {"stiffness": self.gather(np.concatenate([k.normal for k in stiffness]))}
+        if self.dim > 1:
+            blocks = np.concatenate([k.tangential for k in stiffness])
+            turns = self._turns[:, :-1, :-1]
+            turned = np.einsum("nij,njk,nlk->nil", turns, blocks, turns)
+            gathered["tangential_stiffness"] = self.gather(turned)
+        return gathered
 
     def _gathered_friction(self) -> Friction:
         """The law of all nodes; contacts with the same coefficients stay one uniform law."""
@@ -148,125 +226,10 @@ class CondensedBody:
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
 
-    def compliance(self) -> np.ndarray:
-        """W on rank 0, ``shape=(dim nodes, dim nodes)``, symmetric; an empty array on the others."""
-        body, comm, dim = self._body, self.comm, self.dim
-        first = body.K.getOwnershipRange()[0]
-        columns = np.repeat(self._dofs, dim, axis=0) + first
-        values = self._frames.reshape(-1, self._dofs.shape[1])
-        columns, values = (self.gather(part) for part in (columns, values))
-        size = dim * self.nodes
-        W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
-        solve_block = block_solver(body.ksp)
-        for start in range(0, size, _BLOCK):
-            block = slice(start, min(start + _BLOCK, size))
-            answer = solve_block(columns[block], values[block])  # (owned dofs, right-hand sides)
-            local = np.einsum("nij,njk->nik", self._frames, answer[self._dofs])
-            rows = comm.gather(local.reshape(-1, answer.shape[1]), root=0)
-            if comm.rank == 0:
-                # W is symmetric, but not to the last bit as it is computed: the mean of both halves.
-                found = np.concatenate(rows)
-                found[block] = (found[block] + found[block].T) / 2
-                found[:start] = (found[:start] + W[block, :start].T) / 2
-                W[:, block], W[block, :start] = found, found[:start].T
-        return W
-
 
 def components(contacts) -> int:
     """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
     smooth = all(contact.friction.frictionless for contact in contacts)
     if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
         return 1
-    return contacts[0].frame.shape[0]
-
-
-def memory(nodes: int, dim: int, unknowns: int) -> int:
-    """Bytes that W and its inverse take, with what is needed beside them: an upper bound, docs/solvers.md.
-
-    W is copied once; with its inverse it then needs half of that, and a Jacobian with its factors, or
-    those of the fixed point among the fallbacks, the rest.  Beside W, solving for a block was measured
-    to take six times what its solutions take.
-    """
-    return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
-
-
-def _available() -> float:
-    """Bytes of memory that this machine has free; infinite where it does not say."""
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return np.inf
-
-
-def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
-    """Whether W would fit into half of the memory that rank 0 has free."""
-    enough = 2 * memory(nodes, dim, unknowns) <= _available() if comm.rank == 0 else None
-    return comm.bcast(enough, root=0)
-
-
-def _check_memory(comm, needed: int) -> None:
-    available = comm.bcast(_available() if comm.rank == 0 else None, root=0)
-    if needed > available:
-        raise MemoryError(
-            f"the condensed operator needs about {needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are "
-            "free: use solver=dc.FixedPoint(), which needs none of it."
-        )
-
-
-def block_solver(ksp):
-    """A function that solves for blocks of sparse right-hand sides with the solver of ``ksp``.
-
-    With MUMPS the block goes to it as it is, which leaves out the zeros of the right-hand sides in
-    the forward substitution; any other solver takes one column after another.
-
-    Returns:
-        ``solve(columns, values)``: right-hand side k has ``values[k]`` at the global dofs
-        ``columns[k]``; both are the same on all ranks.  Gives ``shape=(owned dofs, k)``.
-    """
-    A = ksp.getOperators()[0]
-    comm, (owned, size) = A.comm, A.getSizes()[0]
-    ksp.setUp()
-    mumps = ksp.getType() == "preonly" and ksp.getPC().getType() == "lu"
-    mumps = mumps and ksp.getPC().getFactorSolverType() == "mumps"
-
-    def by_block(columns, values):
-        count = len(columns)
-        # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
-        mine = comm.rank == 0
-        transposed = PETSc.Mat().createAIJ(
-            ((count if mine else 0, count), (size if mine else 0, size)),
-            csr=(
-                np.arange(count + 1 if mine else 1, dtype=np.int32) * columns.shape[1],
-                columns[: count if mine else 0].ravel().astype(np.int32),
-                values[: count if mine else 0].ravel(),
-            ),
-            comm=comm,
-        )
-        rhs = PETSc.Mat().createTranspose(transposed)
-        answer = PETSc.Mat().createDense(((owned, size), (None, count)), comm=comm)
-        answer.setUp()
-        answer.assemble()
-        ksp.getPC().getFactorMatrix().matSolve(rhs, answer)
-        result = answer.getDenseArray().copy()
-        for matrix in (rhs, transposed, answer):
-            matrix.destroy()
-        return result
-
-    def by_column(columns, values):
-        right, left = A.createVecs()
-        first, last = A.getOwnershipRange()
-        result = np.empty((owned, len(columns)))
-        for k, (column, value) in enumerate(zip(columns, values)):
-            here = (column >= first) & (column < last)
-            left.array_w[:] = 0.0
-            left.array_w[column[here] - first] = value[here]
-            ksp.solve(left, right)
-            if ksp.getConvergedReason() < 0:
-                raise RuntimeError(
-                    "PETSc's linear solver failed while W was computed (KSPConvergedReason "
-                    f"{ksp.getConvergedReason()}): use solver=dc.FixedPoint()."
-                )
-            result[:, k] = right.array_r
-        return result
-
-    return by_block if mumps else by_column
+    return contacts[0].points.dim

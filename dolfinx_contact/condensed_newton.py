@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dolfinx_contact import _kernel
-from dolfinx_contact._errors import RoundingWarning
+from dolfinx_contact.checks import RoundingWarning, finite, positive
 from dolfinx_contact.friction import Friction
 
 
@@ -161,33 +161,11 @@ class CondensedNewton:
             )
         return result
 
-    def solve(self, equations, x: np.ndarray | None, tol: float) -> tuple[np.ndarray, int]:
-        """One load step of a ``ContactProblem``.
+    def bind(self, body, contacts, stiffness, memory):
+        """See ``solver.Solver``."""
+        from dolfinx_contact.condensed import CondensedBody  # arrays alone do without DOLFINx
 
-        Args:
-            equations: Offers ``condensed()``, the condensed body, ``trial``, the displacement without
-                reactions, and ``measure(x)``, the error of a displacement.
-            x: Not used: reactions of earlier steps are better starts.
-
-        Returns:
-            The displacement of this rank and the number of iterations.
-        """
-        body, trial = equations.condensed(), equations.trial
-        q = body.free_displacement(trial)
-        starts, iterations, error, rounding = body.starts(q), 0, np.inf, 0.0
-        for factor in (0.1, 1e-3, 1e-3):  # this error is not quite the condensed problem's
-            result = body.solve(self, q + rounding, max(factor * tol, 1e-14), starts)
-            iterations += result.iterations
-            equations.tried = result.tried
-            x, previous = body.displacement(trial, result.reaction), error
-            error = equations.measure(x)
-            if error <= tol or not error < previous:
-                break
-            starts = [result.reaction]
-            # Of W, which a soft support makes large: slip and gap of the body itself count.
-            rounding = rounding + body.free_displacement(x) - result.displacement
-        body.remember(q, result.reaction)
-        return x, iterations
+        return CondensedBody(self, body, contacts, stiffness, memory)
 
 
 def solve_condensed(
@@ -292,27 +270,3 @@ def _turned_back(result: CondensedResult, turns: np.ndarray) -> CondensedResult:
         for name in ("reaction", "displacement")
     }
     return replace(result, **back)
-
-
-def finite(name: str, value) -> np.ndarray:
-    """A float64 array of finite numbers, or a ``ValueError``."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "iuf":
-            raise ValueError
-    except ValueError:
-        raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} contains NaN or infinity.")
-    return array.astype(np.float64)
-
-
-def positive(name: str, value) -> float:
-    """A positive number, or a ``ValueError``."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not number > 0:
-        raise ValueError(f"{name} must be a positive number, got {value!r}.")
-    return number

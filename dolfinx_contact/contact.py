@@ -14,7 +14,10 @@ from mpi4py import MPI
 from dolfinx_contact import _dolfinx
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.dissipation import work_of_friction
+from dolfinx_contact.error import EPSILON, NodalStiffness
 from dolfinx_contact.friction import Friction
+from dolfinx_contact.interface import ContactPoints, add_to
+from dolfinx_contact.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.plane import RigidPlane
 from dolfinx_contact.wear import Wear
 
@@ -63,14 +66,8 @@ class Contact:
         slip_increment: Slip relative to the plane since the last step, ``shape=(n, gdim - 1)``, local.
         reaction: Force of the plane on the body, ``shape=(n, gdim)``, local frame.
         status: A ``Status`` per node, ``shape=(n,)``.
-        rho: Metric of the predictor, ``shape=(n,)``, force per length; see ``set_metric``.
-        rho_t: The same for slip alone, which only the map "return" can tell apart; None is ``rho``.
-        rounding: Of the map "smoothed", length: slips far above it obey the law, see ``smoothed_map.h``.
-        drag: None, or for the map "smoothed" springs per node, force per length, and the slip increments
-            to which they pull back.
-        held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``, set by
-            ``ContactProblem``.  There is neither slip nor friction in them: what the support carries
-            is no reaction of the plane.
+        rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
+        points: The ``ContactPoints``: motion as a sparse operator, directions that supports hold.
         dissipation: Work of friction since the start, ``shape=(n,)``, force times length; it never
             decreases, see ``work_of_friction`` in ``dissipation.py``.
         slip_path: Length of the path slipped while in contact since the start, ``shape=(n,)``.
@@ -113,16 +110,15 @@ class Contact:
         self.law = friction.law(gdim)
         self.frame = plane.frame
         self.x = V.tabulate_dof_coordinates()[self.nodes]
-        self.rho = self.rho_t = None
-        self.rounding, self.drag = 0.0, None
-        self.held = np.zeros((self.nodes.size, gdim - 1), dtype=bool)
-        self._size = gdim * owned
-        self._dofs = gdim * self.nodes[:, None] + np.arange(gdim)
+        self.rho = None
+        dofs = gdim * self.nodes[:, None] + np.arange(gdim)
+        frames = np.tile(self.frame, (self.nodes.size, 1, 1))
+        self.points = ContactPoints(dofs, frames, gdim * owned)
         self.reset()
 
     def reset(self) -> None:
         """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
-        n, gdim = self._dofs.shape
+        n, gdim = self.points.count, self.points.dim
         self.dissipation, self.slip_path, self.wear_depth = np.zeros((3, n))
         self._converged = _State(
             np.tile(-self.frame @ self.plane.displacement, (n, 1)),
@@ -146,25 +142,27 @@ class Contact:
         Args:
             K: Assembled PETSc stiffness matrix on ``V``.  Collective.
         """
-        n = self.frame[-1]
-        self.rho = np.einsum("i,kij,j->k", n, self.stiffness_blocks(K), n)
+        self.rho = self.nodal_stiffness(K).normal
 
-    def stiffness_blocks(self, K) -> np.ndarray:
-        """Diagonal blocks of the contact nodes in a PETSc matrix, ``shape=(n, gdim, gdim)``, global."""
-        from petsc4py import PETSc
+    def nodal_stiffness(self, K) -> NodalStiffness:
+        """Normal and tangential blocks of the stiffness at the contact nodes, local frame.
 
-        n, gdim = self._dofs.shape
-        rows = PETSc.IS().createGeneral(self._global_dofs(K), comm=self.comm)
-        block = K.createSubMatrix(rows, rows)
-        start, columns, values = block.getValuesCSR()
-        row = np.repeat(np.arange(n * gdim), np.diff(start))
-        column = columns - block.getOwnershipRange()[0]
-        here = row // gdim == column // gdim
-        blocks = np.zeros((n, gdim, gdim))
-        blocks[row[here] // gdim, row[here] % gdim, column[here] % gdim] = values[here]
-        rows.destroy()
-        block.destroy()
-        return blocks
+        Args:
+            K: Assembled PETSc stiffness matrix on ``V``.  Collective.
+
+        Raises:
+            ValueError: on all ranks, if a node does not resist being moved along the normal.
+        """
+        stiffness = self.points.stiffness(K)
+        with raised_together(self.comm):
+            if not (stiffness.normal > 0.0).all():
+                node = int(np.argmin(stiffness.normal))
+                raise ValueError(
+                    f"the stiffness of the contact node at {self.x[node].tolist()} along the normal is "
+                    f"{stiffness.normal[node]:g}, which must be positive: check the sign of F (internal minus "
+                    "external work) and the moduli."
+                )
+        return stiffness
 
     def add_springs(self, K, springs: np.ndarray) -> None:
         """Add a spring per contact node and local direction to a PETSc matrix.  Collective.
@@ -173,20 +171,7 @@ class Contact:
             K: Assembled PETSc matrix on ``V``, changed in place.
             springs: Stiffnesses, ``shape=(n, gdim)``, local frame, force per length.
         """
-        from petsc4py import PETSc
-
-        gdim = self.frame.shape[0]
-        dofs = self._global_dofs(K).reshape(-1, gdim)
-        for node, block in zip(dofs, self.spring_blocks(springs)):
-            K.setValues(node, node, block, addv=PETSc.InsertMode.ADD_VALUES)
-        K.assemble()
-
-    def spring_blocks(self, springs: np.ndarray) -> np.ndarray:
-        """Springs in the local frame, ``shape=(n, gdim)``, as blocks ``shape=(n, gdim, gdim)`` in the global one."""
-        return np.einsum("ki,nk,kj->nij", self.frame, springs, self.frame)
-
-    def _global_dofs(self, K) -> np.ndarray:
-        return (self._dofs.ravel() + K.getOwnershipRange()[0]).astype(np.int32)
+        add_to(K, self.points.matrix(springs[:, :, None] * np.eye(self.points.dim)))
 
     def move(self, u) -> None:
         """Gaps and slip increments for a displacement, from the last converged step on.
@@ -195,18 +180,34 @@ class Contact:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
         """
         values = u.x.array if hasattr(u, "x") else u
-        self._displacement = (values[self._dofs] - self.plane.displacement) @ self.frame.T
+        moved = self.frame @ self.plane.displacement
+        self._displacement = self.points.motion(values[: self.points.size]) - moved
         self.gap = self._gap0 + self._displacement[:, -1]
         self.slip_increment = (self._displacement - self._converged.displacement)[:, :-1]
-        self.slip_increment[self.held] = 0.0
+        self.slip_increment[self.points.held] = 0.0
 
     def gap_rounding(self, u: np.ndarray) -> float:
-        """Bound of the rounding in a gap: a penetration below it is none, length units."""
-        lengths = (self.x, self.plane.point, self.plane.displacement, u[self._dofs])
+        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        lengths = (self.x, self.plane.point, self.plane.displacement, self.points.motion(u))
         return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
 
+    def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
+
+        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
+
+        Args:
+            u: Displacement of owned degrees of freedom, for which gaps and slips were computed.
+        """
+        terms = self.points.magnitudes(u) + np.abs(self.frame) @ np.abs(self.plane.displacement)
+        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.plane.point))
+        gap = terms[:, -1] + coordinates + self.wear_depth
+        slip = terms[:, :-1] + np.abs(self._converged.displacement[:, :-1])
+        slip[self.points.held] = 0.0
+        return EPSILON * gap, EPSILON * slip
+
     def update(self, u, map: str = "bipotential") -> None:
-        """One predictor and corrector for all nodes, with the metric ``rho``.
+        """One predictor and corrector for all nodes, with the augmentation parameter ``rho``.
 
         Takes ``u``, computes gaps and slip increments, and replaces ``reaction`` by its predictor's
         projection on the friction cone, and ``status`` by the branch that the projection took.
@@ -215,49 +216,12 @@ class Contact:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
             map: "bipotential" for the paper's predictor and Euclidean projection [dSFMH07, Section
                 2], "return" for a predictor without the translated normal term and a projection in
-                the metric of the slip rule.  Both have the same fixed points.  "smoothed" is the second
-                one with the corner between sticking and slipping rounded off, see ``rounding``.
+                the metric of the slip rule.  Both have the same fixed points.
 
         Raises:
             ValueError: ``rho`` has not been set; see ``set_metric``.
         """
-        self._correct(u, map, "map")
-
-    def update_with_derivatives(self, u, map: str = "bipotential") -> tuple[np.ndarray, np.ndarray]:
-        """As ``update``, and the (Clarke) derivatives of the new reactions on the branches taken.
-
-        Returns:
-            Derivatives by the reaction before, dimensionless, and by slip and gap, force per length;
-            ``shape=(n, gdim, gdim)`` each, local frame.
-        """
-        return self._correct(u, map, "jacobian")
-
-    def _correct(self, u, map: str, kind: str) -> list[np.ndarray]:
-        """Predictor and corrector by the law's ``bipotential_map``, ``return_jacobian`` and so on."""
-        if self.rho is None:
-            raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
-        self.move(u)
-        rho_t = self.rho if self.rho_t is None else self.rho_t
-        metrics = {
-            "bipotential": (self.rho,),
-            "return": (self.rho, rho_t),
-            "smoothed": (self.rho, rho_t, self.rounding),
-        }[map]
-        result = getattr(self.law, f"{map}_{kind}")(
-            self.reaction, self.gap, self.slip_increment, *metrics
-        )
-        self.reaction, self.status = result[:2]
-        if map == "smoothed" and self.drag is not None:
-            stiffness, home = self.drag
-            self.reaction[:, :-1] -= stiffness[:, None] * (self.slip_increment - home)
-            for by_motion in result[3:]:
-                for k in range(home.shape[1]):
-                    by_motion[:, k, k] -= stiffness
-        return result[2:]
-
-    def take_reaction(self, forces: np.ndarray) -> None:
-        """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
-        self.reaction = forces[self._dofs] @ self.frame.T
+        self.respond(u, self._map(map))
 
     def springs(self, map: str = "bipotential") -> np.ndarray:
         """Springs that belong to ``update``, ``shape=(n, gdim)``, local frame, force per length.
@@ -265,10 +229,33 @@ class Contact:
         ``rho diag(Q^2, 1)`` for the paper's map, ``rho`` in all directions for the return map;
         none along the plane without friction.
         """
-        Q = self.friction.Q[..., : self.frame.shape[0] - 1]
-        springs = np.ones_like(self.reaction)
-        springs[:, :-1] = Q**2 if map == "bipotential" else Q > 0
-        return springs * self.rho[:, None]
+        return self._map(map).springs(self.friction, self.points.dim)
+
+    def _map(self, name: str):
+        if self.rho is None:
+            raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
+        return BipotentialMap(self.rho) if name == "bipotential" else ReturnMap(self.rho, self.rho)
+
+    def respond(self, u, map) -> None:
+        """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
+        self.move(u)
+        self.reaction, self.status = map(self.law, self.reaction, self.gap, self.slip_increment)
+
+    def respond_with_derivatives(self, u, map) -> tuple[np.ndarray, np.ndarray]:
+        """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
+
+        Returns:
+            Derivatives by the reaction before, dimensionless, and by slip and gap, force per length;
+            ``shape=(n, gdim, gdim)`` each, local frame.
+        """
+        self.move(u)
+        state = self.reaction, self.gap, self.slip_increment
+        self.reaction, self.status, *derivatives = map.linearised(self.law, *state)
+        return tuple(derivatives)
+
+    def take_reaction(self, forces: np.ndarray) -> None:
+        """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
+        self.reaction = self.points.reactions(forces)
 
     def assemble_reaction(self, b) -> None:
         """Add the nodal reactions, forces on the body, to ``b``.
@@ -278,7 +265,7 @@ class Contact:
                 ``f - K u``: applied minus internal forces.
         """
         array = b if isinstance(b, np.ndarray) else b.array_w
-        array[self._dofs] += self.reaction @ self.frame
+        self.points.add_forces(self.reaction, array[: self.points.size])
 
     # -- history -------------------------------------------------------------------------------
 
@@ -358,9 +345,18 @@ class Contact:
         )
 
     @property
-    def slip_defect(self) -> np.ndarray:
-        """What of the slip increments the slip rule leaves unexplained, ``shape=(n,)``, length."""
-        return self.law.slip_defect(self.reaction, self.slip_increment, self.status)
+    def slip_residual(self) -> np.ndarray:
+        """What of the slip increments the slip rule leaves unexplained, ``shape=(n, gdim - 1)``, length.
+
+        ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
+        on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
+        """
+        slip, mu = self.slip_increment, self.friction.mu[..., :1]
+        against = self.friction.against_slip(self.reaction[:, :-1])
+        length = np.linalg.norm(slip, axis=1, keepdims=True)
+        slips = (self.status == Status.SLIP)[:, None]
+        bound = (self.status != Status.OPEN)[:, None] & (mu > 0)
+        return np.where(bound, slip + slips * length * against, 0.0)
 
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
@@ -381,7 +377,7 @@ class Contact:
             form = fem.form(ufl.TestFunction(self.V)[0] * ds)
             work = fem.Function(self.V)
             _dolfinx.assemble_into(work.x, form)
-            self._area = work.x.array[self._dofs[:, 0]]
+            self._area = work.x.array[self.points.dofs[:, 0]]
         return self._area
 
     @property

@@ -1,26 +1,24 @@
-r"""The error of a step: one dimensionless number, defined here and nowhere else.
+r"""The errors of a step: dimensionless numbers, defined here and nowhere else; see docs/errors.md.
 
-For a displacement ``u`` and admissible nodal reactions ``r`` (in the friction cone),
+For a displacement ``u`` with nodal reactions ``r`` in the friction cone all errors are forces that are not as they
+should be, over the forces that act in that same state,
 
-.. math:: e = \max(|f - K u + r|,\; |r - \mathrm{proj}(r - \kappa w,\, K_\mu)|) \,/\, L .
+.. math:: S = \max(|r|, |f|, |R|),
 
-- The first term is the residual of equilibrium on the free degrees of freedom, assembled by DOLFINx.
-- The second is the residual of the paper's projection equation [dSFMH07, Section 2] over all
-  contact nodes, ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``.  Its metric ``kappa`` is canonical: the
-  normal diagonal entry of the stiffness at the node, never the rho of a solver.
-- ``L`` is the load, which is not the reaction (zero when everything opens): the largest of the
-  external forces, the reactions of the last step, and ``kappa`` times the penetration of the
-  contact-free trial state, three digits of it where PETSc iterates.  Where all three vanish nothing presses, and ``kappa |u|``, the forces
-  that hold a single node against that displacement, takes their place.
+Euclidean over nodes: reactions, external forces, and what the supports carry.
 
-The projection equation weights slip by ``Q^2`` and is blind where p is small, so a second number is kept
-beside it: the slip error, the largest ``|Delta u_t + |Delta u_t| d|`` over slipping nodes, d the unit
-vector along ``P^-2 r_t``, and ``|Delta u_t|`` over sticking ones (nothing where mu = 0), over the load
-displacement, which is the largest penetration or slip increment of a contact node in the trial
-state.  A step has converged when both are at most ``tol``.
+- ``error``: the largest of three. Equilibrium, ``|f - F(u) + r| / S`` on free degrees of freedom, F assembled by
+  DOLFINx. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the paper's projection equation [dSFMH07,
+  Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration, ``|kappa max(-x_n, 0)| / S``. The metric
+  ``kappa`` is the normal diagonal entry of the stiffness at the node, never the rho of a solver.
+- ``slip_error``: ``|K_t (Delta u_t + |Delta u_t| d)| / S`` over slipping nodes, ``d`` the unit vector along
+  ``P^-2 r_t``, and ``|K_t Delta u_t|`` over sticking ones; none where mu = 0. ``K_t`` is the tangential block of the
+  stiffness at the node. The projection equation weights slip by ``Q^2`` and does not see it where p is small.
+- ``rounding``: what double precision leaves of the above, estimated from the size of the terms that cancel in
+  ``f - K u + r``, in the gaps and in the slips. No smaller error can be asked for.
 
-All norms are Euclidean over the nodal vectors of all ranks, so the number depends neither on the
-frame nor on the units.
+Where nothing acts, ``S`` is no larger than rounding. The state is then right if what is left is below rounding, and
+the numbers are relative to the terms that cancel instead.
 """
 
 from __future__ import annotations
@@ -29,32 +27,84 @@ from typing import NamedTuple
 
 import numpy as np
 
+EPSILON = np.finfo(float).eps / 2  # of one operation
+
+
+class NodalStiffness(NamedTuple):
+    """Blocks of the stiffness at the contact nodes, local frame, force per length."""
+
+    normal: np.ndarray  # kappa, (n,)
+    tangential: np.ndarray  # (n, gdim - 1, gdim - 1)
+
 
 class Errors(NamedTuple):
-    """Both errors of a state, dimensionless."""
+    """Errors of a state, dimensionless; ``change`` is that of the reactions since the state before, over S."""
 
     error: float
     slip_error: float
+    rounding: float
+    change: float = np.inf
+    acts: bool = True  # forces above rounding do
 
     @property
     def largest(self) -> float:
-        """The larger one; NaN if either is."""
-        return float(np.maximum(*self))
+        """The larger one of both errors; NaN if either is."""
+        return float(np.maximum(self.error, self.slip_error))
+
+    def within(self, tol: float) -> bool:
+        """Whether both are at most ``tol``, or as small as double precision allows."""
+        return self.largest <= (max(tol, self.rounding) if self.acts else self.rounding)
 
 
-def projection_residual(contact, stiffness: np.ndarray) -> np.ndarray:
-    """``r - proj(r - kappa w, K_mu)``, ``shape=(n, gdim)``, local frame, force units.
+def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
+    """Residual of the projection equation, penetration and defect of the slip rule, as forces.
 
     Args:
         contact: Contact with its present reaction, gap and slip increment.
-        stiffness: Canonical metric ``kappa``, ``shape=(n,)``, force per length.
+        stiffness: Of its nodes.
+
+    Returns:
+        ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
     """
     projected, _ = contact.law.bipotential_map(
-        contact.reaction, contact.gap, contact.slip_increment, stiffness
+        contact.reaction, contact.gap, contact.slip_increment, stiffness.normal
     )
-    return contact.reaction - projected
+    penetration = stiffness.normal * np.maximum(-contact.gap, 0.0)
+    slip = np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_residual)
+    return contact.reaction - projected, penetration, slip
 
 
-def relative(values: np.ndarray, load: float) -> np.ndarray:
-    """``values / load``; without any load what is zero is no error, and anything else an infinite one."""
-    return values / load if load > 0.0 else np.where(values == 0.0, 0.0, np.inf)
+def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
+    """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
+
+    Args:
+        contact: Contact that has been moved to ``u``.
+        stiffness: Of its nodes.
+        u: Displacement of owned degrees of freedom, length units.
+    """
+    normal, tangential = contact.motion_rounding(u)
+    stiff = np.abs(stiffness.tangential).sum(axis=2)
+    return np.column_stack((stiff * tangential, stiffness.normal * normal))
+
+
+def as_errors(sums: np.ndarray) -> Errors:
+    """Errors from squares of norms, in any unit of force.
+
+    Args:
+        sums: Of equilibrium, law, penetration, slip rule, reactions, external forces, supports, rounding of
+            the body, rounding at the contacts, and change of the reactions.
+    """
+    equilibrium, law, penetration, slip, r, f, R, body, contact, change = np.sqrt(sums)
+    rounding, acting = max(body, contact), max(r, f, R)
+    acts = bool(acting > rounding)
+    if not acts:
+        acting = rounding / EPSILON
+    left = np.array([max(equilibrium, law, penetration), slip, rounding, change])
+    if acting > 0.0:
+        left /= acting
+    elif not np.isnan(left).any():
+        left = np.where(left > 0.0, np.inf, 0.0)
+    error, slip_error, rounding, change = map(float, left)
+    if np.isnan([equilibrium, law, penetration]).any():
+        error = np.nan
+    return Errors(error, slip_error, rounding, change, acts)

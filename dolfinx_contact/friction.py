@@ -147,6 +147,29 @@ class Friction:
         """Diagonal of Q = P M^-1, largest entry 1, same shape as ``mu``; zero where ``mu`` is."""
         return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
 
+    def against_slip(self, r_t: np.ndarray) -> np.ndarray:
+        """Unit vectors along ``P^-2 r_t``, against which nodes slip [dSFMH07, Section 1].
+
+        Args:
+            r_t: Tangential reactions, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions, local frame.
+
+        Returns:
+            The same shape, dimensionless; zero where ``r_t`` or ``mu`` is.
+        """
+        p = self.p[..., : r_t.shape[1]]
+        largest = np.abs(r_t).max(axis=1, keepdims=True, initial=0.0)
+        unit = np.divide(r_t, largest, out=np.zeros_like(r_t), where=largest > 0)
+        if self.axes is not None:
+            cos, sin = self.axes.T
+            unit = np.stack((cos * unit[:, 0] + sin * unit[:, 1], cos * unit[:, 1] - sin * unit[:, 0]), axis=1)  # fmt: skip
+        smallest = p.min(axis=-1, keepdims=True)
+        softness = np.divide(smallest, p, out=np.zeros_like(p), where=p > 0) ** 2
+        along = softness * unit
+        if self.axes is not None:
+            along = np.stack((cos * along[:, 0] - sin * along[:, 1], sin * along[:, 0] + cos * along[:, 1]), axis=1)  # fmt: skip
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        return np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+
     def law(self, dim: int):
         """The kernel's law in ``dim`` = 2 or 3 dimensions.
 

@@ -38,7 +38,7 @@ class History:
         self.problem, self.path = problem, None if path is None else Path(path)
         self.comm = problem.body.comm
         self._tracked = problem.contacts[contact]
-        points, gdim = np.asarray(points, dtype=float), self._tracked.plane.point.size
+        points, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
         if points.size and (points.ndim != 2 or points.shape[1] != gdim):
             raise ValueError(f"points must have shape (m, {gdim}), got {points.shape}.")
         self._nodes = [self._nearest(point) for point in points]
@@ -78,7 +78,7 @@ class History:
 
     def _state(self, node):
         contact = self._tracked
-        directions = ("t1", "t2", "n") if contact.frame.shape[0] == 3 else ("t", "n")
+        directions = ("t1", "t2", "n") if contact.points.dim == 3 else ("t", "n")
         for quantity in ("reaction", "displacement"):
             for direction, value in zip(directions, self._at(node, getattr(contact, quantity))):
                 yield f"{quantity}_{direction}", value

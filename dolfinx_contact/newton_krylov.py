@@ -4,32 +4,65 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from itertools import cycle
+
 import numpy as np
 from petsc4py import PETSc
 
-# Iterations of GMRES for one step of Newton's method at most, each of which keeps a vector.
-INNER = 20
+from dolfinx_contact.maps import ReturnMap
 
-# The linear systems are solved to this; to a hundredth takes half as many iterations again.
-ACCURACY = 0.1
+# Augmentation parameters over the nodal stiffness, along the normal and along slip. The latter weights errors of slip
+# against errors of reaction; the next one is taken where a step gets SHORT.
+NORMAL, TANGENTIAL, SHORT = 10.0, (0.1, 0.3, 0.03, 1.0), 0.25
+
+# Iterations at most.
+MOST = 600
+
+# Iterations of GMRES for one step at most, each of which keeps a vector, and the part of the residual it may leave.
+INNER, ACCURACY = 20, 0.1
 
 # Of a step is taken the largest half, quarter, ... that makes the residual smaller; below it there is none.
 SHORTEST = 2.0**-9
+
+
+def search_by_newton(search, preconditioner, x: np.ndarray) -> None:
+    """Steps of Newton's method from ``x`` until the search is over, or the error no longer halves.
+
+    Args:
+        search: The ``Search`` of the fixed point, which keeps the best iterate.
+        preconditioner: Its ``ContactPreconditioner``.
+        x: Displacement of owned degrees of freedom.
+    """
+    step = search.step
+    search.begin(MOST)
+    with closing(NewtonKrylov(step, preconditioner)) as newton:
+        for tangential in cycle(TANGENTIAL):
+            maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
+            length = 1.0
+            while length >= SHORT:
+                x, residual = search.residual(x, maps)
+                if not search.goes_on:
+                    return
+                preconditioner.linearise(step.derivatives(x, maps))
+                dx, length, iterations = newton.step(x, residual, maps)
+                search.count(max(iterations, 1))
+                x = x + length * dx
 
 
 class NewtonKrylov:
     """Steps of Newton's method for the contact residual of a body, each no longer than it helps.
 
     The linear system is ``J dx = F``, ``J`` as in ``SurfaceLayer``, ``F`` the forces out of balance.  GMRES is
-    preconditioned by the correction of the fixed point: the layers next to the plane, then one application
-    of the preconditioner of stiffness and springs.  No matrix but these is set up.
+    preconditioned by the correction of the fixed point.  No matrix but the preconditioner's is set up.
 
     Args:
-        system: Offers ``body``, ``correction(residual)``, ``tangent(x)``, ``size(residual)`` and ``along(x, dx)``.
+        step: The ``LoadStep``.
+        preconditioner: The ``ContactPreconditioner``, linearised before every step.
     """
 
-    def __init__(self, system):
-        self._system, body = system, system.body
+    def __init__(self, step, preconditioner):
+        self._step, self._preconditioner, body = step, preconditioner, step.body
         right, left = body.K.createVecs()
         size = (body.K.getSizes()[0],) * 2
         self._solver = ksp = PETSc.KSP().create(body.comm)
@@ -42,7 +75,7 @@ class NewtonKrylov:
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self)
         ksp.setFromOptions()
-        self._step, self._residual = right, left
+        self._direction, self._residual = right, left
 
     def close(self) -> None:
         """Free the vectors of GMRES.  Collective."""
@@ -50,27 +83,27 @@ class NewtonKrylov:
 
     def mult(self, _, x, y) -> None:
         """PETSc's product with J."""
-        y.array_w[:] = self._system.tangent(x.array_r.copy())
+        y.array_w[:] = self._preconditioner.tangent(x.array_r.copy())
 
     def apply(self, _, x, y) -> None:
         """PETSc's preconditioner."""
-        y.array_w[:] = self._system.correction(x.array_r)
+        y.array_w[:] = self._preconditioner.correct(x.array_r)
 
-    def step(self, x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, float, int]:
+    def step(self, x: np.ndarray, residual: np.ndarray, maps) -> tuple[np.ndarray, float, int]:
         """Direction of Newton's step, how much of it makes the residual smaller, and iterations of GMRES.
 
         Args:
             x: Displacement at which the system was linearised, owned degrees of freedom.
             residual: Forces out of balance there.
+            maps: Of the contacts.
 
         Returns:
             Direction, length (1 for the whole step, 0 if none is short enough), iterations.
         """
-        self._residual.array_w[:] = residual
-        self._residual.array_w[self._system.body.fixed] = 0.0
-        self._solver.solve(self._residual, self._step)
-        dx, iterations = self._step.array_r.copy(), self._solver.getIterationNumber()
-        size, before, length = self._system.along(x, dx), self._system.size(residual), 1.0
+        self._residual.array_w[:] = self._step.free(residual)
+        self._solver.solve(self._residual, self._direction)
+        dx, iterations = self._direction.array_r.copy(), self._solver.getIterationNumber()
+        size, before, length = self._step.along(x, dx, maps), self._step.size(residual), 1.0
         while not size(length) <= (1 - 1e-4 * length) * before:
             length /= 2
             if length < SHORTEST:

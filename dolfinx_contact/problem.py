@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+import warnings
 from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
@@ -15,9 +15,11 @@ from dolfinx_contact import checkpoint
 from dolfinx_contact._errors import raised_together
 from dolfinx_contact.automatic import Automatic
 from dolfinx_contact.body import ElasticBody
+from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.contact import Contact
-from dolfinx_contact.contact_equations import ContactEquations
 from dolfinx_contact.linear_solver import stage
+from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.step import LoadStep
 
 
 class Counts(NamedTuple):
@@ -33,8 +35,12 @@ class Step:
     """Record of a load step, the same on all ranks.
 
     Attributes:
-        error: Dimensionless, see ``dolfinx_contact.error``.
-        slip_error: Largest defect of the slip rule over the load displacement, see the same place.
+        error: What is out of balance, off the law or penetrates, over the forces that act; see
+            ``dolfinx_contact.error``.
+        slip_error: Defect of the slip rule, as a force over the forces that act; see the same place.
+        rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
+        forward_error: How far the reactions may still be from the exact ones, over the same forces: an
+            estimate from the solver's last correction.
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
         penetration: Largest penetration, >= 0, length.
         iterations: Iterations of the solver; 0 if the contact-free state already was the solution.
@@ -46,6 +52,8 @@ class Step:
 
     error: float
     slip_error: float
+    rounding: float
+    forward_error: float
     bipotential_gap: float
     penetration: float
     iterations: int
@@ -69,6 +77,8 @@ class NotConverged(RuntimeError):
         self.step, self.displacement, self.reactions = step, displacement, reactions
 
 
+NOTHING = "none: nothing touches"
+
 # Penetration over the largest displacement that three digits of it leave no doubt about.
 CERTAIN = 0.1
 
@@ -85,7 +95,7 @@ class ContactProblem:
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
         solver: ``CondensedNewton(...)`` or ``FixedPoint(...)``; None takes the first for small
             contacts and the second for large ones, and says so in ``step.solver``.
-        tol: Largest error of a converged step, see ``dolfinx_contact.error``.
+        tol: Largest error, slip error and forward error of a converged step, see ``dolfinx_contact.error``.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
         petsc_options_prefix: Their prefix.
 
@@ -116,7 +126,7 @@ class ContactProblem:
         with raised_together(u.function_space.mesh.comm):
             self.contacts = _checked_contacts(contacts, u)
             self.solver = Automatic() if solver is None else solver
-            if not callable(getattr(self.solver, "solve", None)):
+            if not callable(getattr(self.solver, "bind", None)) or isinstance(self.solver, type):
                 raise ValueError(
                     f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
                 )
@@ -125,16 +135,16 @@ class ContactProblem:
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
         with raised_together(self.body.comm):
             for contact in self.contacts:
-                contact.held = _held_directions(contact, self.body.fixed)
-        self._condensed = self._layer = self._stiffened = None
-        self._assembled = 0
+                contact.points.held = _held_directions(contact, self.body.fixed)
+        self._bound = self._bound_to = None
+        self._assembled, self._memory = 0, {}
         self.reset()
 
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
         self._states = [np.zeros(self.body.size)] * 2
         self.body.known = None
-        self._past = deque(maxlen=64)  # condensed steps to start from: more than a cycle has
+        self._memory.clear()
         for contact in self.contacts:
             contact.reset()
         self._restore()
@@ -153,26 +163,33 @@ class ContactProblem:
         start = perf_counter()
         try:
             self._check_input()
-            x, equations, iterations = self._solve()
-            errors = equations.errors
-            step = self._record(equations, iterations, perf_counter() - start)
-            if not errors.largest <= self.tol:
+            step, found = self._search()
+            record = self._record(step, found, perf_counter() - start)
+            if not step.errors.within(self.tol):
                 raise NotConverged(
-                    f"not converged: error {step.error:.3e}, slip error {step.slip_error:.3e}, tol "
-                    f"{self.tol:.1e}, after {iterations} iterations ({step.counts.open} open, {step.counts.stick} sticking, "
-                    f"{step.counts.slip} slipping nodes). Smaller load steps help most often.",
-                    step,
-                    x,
+                    f"not converged: error {record.error:.3e}, slip error {record.slip_error:.3e}, tol "
+                    f"{self.tol:.1e}, rounding {record.rounding:.1e}, after {record.iterations} iterations "
+                    f"({record.counts.open} open, {record.counts.stick} sticking, {record.counts.slip} slipping nodes). "
+                    "Smaller load steps help most often.",
+                    record,
+                    found.x,
                     [contact.reaction for contact in self.contacts],
                 )
         except BaseException:
             self._restore()
             raise
-        self._states = [x, self._states[0]]
-        self._show(x)
+        self._states = [found.x, self._states[0]]
+        self._show(found.x)
         for contact in self.contacts:
             contact.advance()
-        return step
+        if max(record.error, record.slip_error) > self.tol:
+            warnings.warn(
+                f"double precision allows no smaller error here: error {record.error:.1e}, slip error "
+                f"{record.slip_error:.1e}, rounding {record.rounding:.1e}, tol {self.tol:.1e}.",
+                RoundingWarning,
+                stacklevel=2,
+            )
+        return record
 
     def save(self, path) -> None:
         """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
@@ -196,33 +213,71 @@ class ContactProblem:
         checkpoint.load(self, path)
         self._restore()
 
-    def _solve(self) -> tuple[np.ndarray, ContactEquations, int]:
+    def load_step(self) -> LoadStep:
+        """The next step as solvers see it: present loads, boundary values and planes.  Collective.
+
+        For solvers of one's own and for measurements; ``solve`` makes it for itself.
+        """
         body = self.body
         assembled = body.refresh()
         if assembled != self._assembled:
             self._assembled = assembled
-            self._free_solvers()
-            self._condensed = None
-            for contact in self.contacts:
-                contact.set_metric(body.K)
-            self._stiffness = [contact.rho for contact in self.contacts]
+            self._unbind()
+            self._set_stiffness()
         b, external = body.load()
+        last, before = self._states
+        starts = [self.u.x.array[: body.size].copy(), 2 * last - before]
+        return LoadStep(
+            body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self._watch
+        )  # fmt: skip
+
+    def bound(self):
+        """The solver, bound to the body as it is now, see ``solver.py``.  Collective."""
+        if self._bound_to is not self.solver:
+            self._unbind()
+            self._bound = self.solver.bind(self.body, self.contacts, self._stiffness, self._memory)
+            self._bound_to = self.solver
+        return self._bound
+
+    def _search(self) -> tuple[LoadStep, SolverResult]:
+        """A displacement that the solver takes for the solution, and the step that has judged it."""
+        step = self.load_step()
         with stage("contact: elastic solve"):
-            trial = body.free_state(b, rough=True)
-            if not (body.known.exact or self._presses(trial)):
-                trial = body.free_state(b)  # whether anything touches takes all digits
-        equations = ContactEquations(self, b, *self._load(trial, external))
-        if not self._touches:
-            equations.errors = equations.errors_if_open(trial)
-            if not equations.errors.largest <= self.tol:  # the last reactions were small beside b
-                trial = trial + body.solve(b - body.multiply(trial))
-                equations.errors = equations.errors_if_open(trial)
-            return trial, equations, 0
-        equations.chosen = type(self.solver).__name__
+            trial = self.body.free_state(step.b, rough=True)
+            if not (self.body.known.exact or self._presses(trial)):
+                trial = self.body.free_state(step.b)  # whether anything touches takes all digits
+        if not self._may_touch(trial):
+            trial = self._refined(step, trial)
+            if step.errors.within(self.tol):
+                return step, SolverResult(trial, 0, 0.0, NOTHING)
         with stage("contact: iterations"):
-            x, iterations = self.solver.solve(equations, None, self.tol)
-        equations.measure(x)
-        return x, equations, iterations
+            found = self.bound().solve(step)
+        step.measure(found.x)
+        return step, found
+
+    def _refined(self, step: LoadStep, x: np.ndarray) -> np.ndarray:
+        """The displacement without reactions, with another digit where what is left of ``b`` counts."""
+        errors = step.measure_open(x)
+        if errors.largest <= self.tol:
+            return x
+        finer = x + self.body.solve(step.b - self.body.multiply(x))
+        if step.measure_open(finer).largest < errors.largest:
+            return finer
+        step.measure_open(x)
+        return x
+
+    def _unbind(self) -> None:
+        """Forget what was set up for a stiffness that has changed.  Collective."""
+        if self._bound is not None:
+            self._bound.destroy()
+        self._bound = self._bound_to = None
+
+    @property
+    def _watch(self):
+        """The user's monitor with the statuses of all nodes; None costs nothing."""
+        if self.monitor is None:
+            return None
+        return lambda iteration, error: self.monitor(iteration, error, self.counts())
 
     def _presses(self, trial: np.ndarray) -> bool:
         """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
@@ -233,26 +288,23 @@ class ContactProblem:
         deepest, largest = (self.body.largest(a) for a in (np.array([deepest]), np.abs(trial)))
         return deepest > CERTAIN * largest
 
-    def _load(self, trial: np.ndarray, external: np.ndarray) -> tuple[float, float]:
-        """Load and load displacement, see ``dolfinx_contact.error``; notes whether anything touches."""
-        body = self.body
-        previous, pressed, deepest, farthest = [], [], 0.0, 0.0
-        for contact, stiffness in zip(self.contacts, self._stiffness):
+    def _may_touch(self, trial: np.ndarray) -> bool:
+        """Whether a displacement without reactions penetrates a plane by more than rounding."""
+        deepest = 0.0
+        for contact in self.contacts:
             contact.move(trial)
-            previous.append(contact.previous_reaction.ravel())
-            pressed.append(stiffness * np.maximum(-contact.gap, 0.0))
             deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
-            slip = np.abs(contact.slip_increment).max(initial=0.0)
-            farthest = max(farthest, slip, -contact.gap.min(initial=0.0))
-        empty = [np.zeros(0)]
-        penetration = body.norm(np.concatenate(pressed + empty))
-        self._touches = body.largest(np.array([deepest])) > 1.0
-        if not self._touches:
-            penetration = 0.0
-        load = max(body.norm(external), body.norm(np.concatenate(previous + empty)), penetration)
-        if load == 0.0:
-            load = body.norm(trial) * body.largest(np.concatenate(self._stiffness + empty))
-        return load, body.largest(np.array([farthest]))
+        return self.body.largest(np.array([deepest])) > 1.0
+
+    def _set_stiffness(self) -> None:
+        """Take what errors and solvers want to know of the stiffness at the contact nodes."""
+        body = self.body
+        self._stiffness = [contact.nodal_stiffness(body.K) for contact in self.contacts]
+        for contact, stiffness in zip(self.contacts, self._stiffness):
+            contact.rho = stiffness.normal
+        size = body.largest(np.abs(body.V.tabulate_dof_coordinates()))
+        # Any unit of force that keeps squares within the range of double precision.
+        self._unit = body.largest(body.cancelling(np.full(body.size, size))) or 1.0
 
     # -- helpers -------------------------------------------------------------------------------
 
@@ -270,38 +322,29 @@ class ContactProblem:
             if (extremes[: moved.size] != -extremes[moved.size :]).any():
                 raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
 
-    def _record(self, equations: ContactEquations, iterations: int, seconds: float) -> Step:
+    def _record(self, step: LoadStep, found: SolverResult, seconds: float) -> Step:
         gap, penetration = 0.0, 0.0
         for contact in self.contacts:
             gap += contact.bipotential_gap.sum()
             penetration = max(penetration, -contact.gap.min(initial=0.0))
         return Step(
-            error=equations.errors.error,
-            slip_error=equations.errors.slip_error,
+            error=step.errors.error,
+            slip_error=step.errors.slip_error,
+            rounding=step.errors.rounding,
+            forward_error=found.forward_error,
             bipotential_gap=float(self.body.total(gap)),
             penetration=self.body.largest(np.array([penetration])),
-            iterations=iterations,
+            iterations=found.iterations,
             seconds=self.body.largest(np.array([seconds])),
-            counts=self._counts(),
-            solver=equations.chosen,
-            tried=equations.tried,
+            counts=self.counts(),
+            solver=found.chosen,
+            tried=found.tried,
         )
 
-    def _counts(self) -> Counts:
+    def counts(self) -> Counts:
+        """Contact nodes open, sticking and slipping in the present state.  Collective."""
         counts = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
         return Counts(*(int(count) for count in self.body.total(counts + np.zeros(3))))
-
-    def _free_solvers(self) -> None:
-        """Forget what was set up for a matrix that has changed.  Collective."""
-        self._free_springs()
-        if self._layer is not None:
-            self._layer.destroy()
-        self._layer = None
-
-    def _free_springs(self) -> None:
-        if self._stiffened is not None:
-            self._stiffened.solver.destroy()
-        self._stiffened = None
 
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x
@@ -349,16 +392,14 @@ def _checked_tolerance(tol) -> float:
 
 def _held_directions(contact: Contact, fixed: np.ndarray) -> np.ndarray:
     """Tangential directions of the contact nodes that boundary conditions fix, ``shape=(n, gdim - 1)``."""
-    free = ~np.isin(contact._dofs, fixed)
-    along_normal = np.linalg.norm(free * contact.plane.normal, axis=1)
-    if (along_normal < 1e-12).any():
-        node = np.argmin(along_normal)
+    left = contact.points.free_of(fixed)
+    if (left[:, -1] < 1e-12).any():
+        node = np.argmin(left[:, -1])
         raise ValueError(
             f"the normal displacement of the contact node at {contact.x[node].tolist()} is fixed by a "
             "boundary condition: contact and condition contradict each other, take the node out of one."
         )
     # What is left of each local direction without its fixed components: all, nothing, or a part.
-    left = np.linalg.norm(contact.frame[None] * free[:, None, :], axis=2)
     partly = (left > 1e-12) & (left < 1 - 1e-12)
     if partly.any():
         node = np.argmax(partly.any(axis=1))

@@ -27,11 +27,15 @@ class RigidBalance:
         body: The elastic body, its stiffness assembled.
         contacts: Its contacts.
         A: The stiffness plus springs of the preconditioner, a PETSc matrix.  Collective.
+
+    Attributes:
+        modes: The soft motions ``Z``, ``shape=(owned dofs, m)``.
+        forces: ``K Z``, of the same shape.
     """
 
     def __init__(self, body, contacts, A):
         self._body, self._contacts = body, contacts
-        modes = body._rigid_modes()
+        modes = body.rigid_modes()
         forces = np.array([body.multiply(z) for z in modes.T]).T
         right, left = A.createVecs()
         stiffened = np.empty_like(modes)
@@ -44,7 +48,7 @@ class RigidBalance:
         root = np.linalg.inv(np.linalg.cholesky(all_energy)).T
         share, vectors = np.linalg.eigh(root.T @ (energy + energy.T) @ root / 2)
         soft = root @ vectors[:, share < 1 / STIFFENED]
-        self._modes, self._forces, self._energy = (
+        self.modes, self.forces, self._energy = (
             modes @ soft,
             forces @ soft,
             soft.T @ energy @ soft,
@@ -55,47 +59,49 @@ class RigidBalance:
         """Number of soft motions."""
         return len(self._energy)
 
-    def balanced(
-        self, x: np.ndarray, forces: np.ndarray, map: str
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """``x`` and its forces, moved along the soft motions, or as they were if there is no way down.
+    def balanced(self, x: np.ndarray, step, maps) -> np.ndarray:
+        """``x``, moved along the soft motions, or as it was if there is no way down.
 
         Args:
             x: Displacement of owned degrees of freedom.
-            forces: ``f - K x``.
-            map: Of the contacts, which have their metrics.
+            step: The ``LoadStep``; knows the forces at the result.
+            maps: Of the contacts.
         """
-        start, (left, slope, size) = (x, forces), self._left(x, forces, map)
+        if len(self) == 0:
+            return x
+        start = (x, step.forces(x))
+        (x, forces), (left, slope, size) = start, self.left(*start, step, maps)
         for _ in range(NEWTON):
             if np.linalg.norm(left) <= SMALL * size:
-                return x, forces
-            step = np.linalg.lstsq(slope, left, rcond=1e-13)[0]
+                break
+            direction = np.linalg.lstsq(slope, left, rcond=1e-13)[0]
             for halved in range(12):
-                c = 0.5**halved * step
-                trial = x + self._modes @ c, forces - self._forces @ c
-                result = self._left(*trial, map)
+                c = 0.5**halved * direction
+                trial = x + self.modes @ c, forces - self.forces @ c
+                result = self.left(*trial, step, maps)
                 if np.linalg.norm(result[0]) < np.linalg.norm(left):
                     break
             else:
-                return start
+                x, forces = start
+                break
             (x, forces), (left, slope, size) = trial, result
-        return x, forces
+        step.know(x, forces)
+        return x
 
-    def _left(self, x, forces, map) -> tuple[np.ndarray, np.ndarray, float]:
+    def left(self, x, forces, step, maps) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
 
         All in roots of energy: each force over the root of its node's stiffness in A.
         """
-        n, all_forces = len(self), forces.copy()
+        n = len(self)
         slope = np.zeros((n, n))
-        for contact in self._contacts:
-            contact.take_reaction(-forces)
-            by_reaction, by_motion = contact.update_with_derivatives(x, map)
-            contact.assemble_reaction(all_forces)
-            Z, KZ = (contact.frame @ part[contact._dofs] for part in (self._modes, self._forces))
-            slope -= np.tensordot(Z, by_reaction @ KZ + by_motion @ Z, ((0, 1), (0, 1)))
-        all_forces[self._body.fixed] = 0.0
-        scaled = self._scale * all_forces
-        sums = np.concatenate((self._modes.T @ all_forces, slope.ravel(), [scaled @ scaled]))
+        step.know(x, forces)
+        for contact, both in zip(self._contacts, step.derivatives(x, maps)):
+            shape = contact.points.count, contact.points.dim, n
+            Z, KZ = ((contact.points.B @ part).reshape(shape) for part in (self.modes, self.forces))
+            slope -= np.tensordot(Z, both[0] @ KZ + both[1] @ Z, ((0, 1), (0, 1)))
+        left = step.free(step.with_reactions(forces))
+        scaled = self._scale * left
+        sums = np.concatenate((self.modes.T @ left, slope.ravel(), [scaled @ scaled]))
         sums = self._body.total(sums)  # one reduction
         return sums[:n], self._energy + sums[n:-1].reshape(n, n), np.sqrt(sums[-1])

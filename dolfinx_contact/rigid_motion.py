@@ -1,4 +1,4 @@
-"""Rigid motions that nothing holds: a factorisation does not notice them, so they are looked for."""
+"""Rigid motions that nothing or only a soft spring holds: a factorisation does not notice them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from dolfinx_contact import _dolfinx
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
 
+# Below this a motion is so soft that solving with the stiffness loses digits which contact needs.
+SOFT = 1e-4
 
-def refuse_rigid_motion(body) -> None:
-    """Raise if a part of the body can move rigidly at no cost of energy.
+
+def soft_motions(body) -> np.ndarray:
+    """Rigid motions of a part of the body that cost next to no energy.
 
     Every connected part of the mesh is tried: the rigid motions that the boundary conditions
     leave free must cost energy, which a spring in F gives them.
@@ -21,13 +24,17 @@ def refuse_rigid_motion(body) -> None:
     Args:
         body: ElasticBody with its assembled stiffness.  Collective.
 
+    Returns:
+        ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.
+
     Raises:
-        ValueError: on all ranks, with the number of free motions and where the part is.
+        ValueError: on all ranks, if a motion costs nothing, with the number of free motions and where
+            the part is.
     """
     gdim = body.V.mesh.geometry.dim
     x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
     part, parts = _connected_parts(body.V, body.comm)
-    diagonal = body.K.getDiagonal().array.copy()
+    diagonal, soft = body.K.getDiagonal().array.copy(), [np.zeros((body.size, 0))]
     for k in range(parts):
         modes = rigid_modes(x, part[: x.shape[0]] == k, body.comm)
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
@@ -39,7 +46,7 @@ def refuse_rigid_motion(body) -> None:
         energy = body.total(free.T @ np.array([body.multiply(z) for z in free.T]).T)
         scale = body.total(free.T @ (diagonal[:, None] * free))
         root = np.linalg.inv(np.linalg.cholesky(scale))
-        relative = np.linalg.eigvalsh(root @ (energy + energy.T) / 2 @ root.T)
+        relative, vectors = np.linalg.eigh(root @ (energy + energy.T) / 2 @ root.T)
         if relative[0] < ROUNDING:
             where = f"one of its {parts} separate parts" if parts > 1 else "the body"
             raise ValueError(
@@ -47,6 +54,8 @@ def refuse_rigid_motion(body) -> None:
                 "free by the boundary conditions and cost no energy. Contact alone does not hold it "
                 "here: fix it by Dirichlet conditions, or add a soft spring to F."
             )
+        soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
+    return np.concatenate(soft, axis=1)
 
 
 def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:

@@ -20,11 +20,14 @@ class StiffenedMultigrid:
         levels: The set-up preconditioner of ``K``, a PETSc PC of type GAMG.
         A: The matrix plus springs.
         S: The springs alone; their entries are among those of ``K``.  Collective.
+
+    Attributes:
+        pc: The PETSc PC.
     """
 
     def __init__(self, levels, A, S):
         finest, own = levels.getMGLevels() - 1, []
-        self._pc = pc = PETSc.PC().create(A.comm)
+        self.pc = pc = PETSc.PC().create(A.comm)
         pc.setOptionsPrefix(levels.getOptionsPrefix())
         pc.setOperators(A, A)
         pc.setType("mg")
@@ -46,12 +49,12 @@ class StiffenedMultigrid:
 
     def destroy(self) -> None:
         """Free the levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
-        self._pc.destroy()
+        self.pc.destroy()
 
     def apply(self, b: np.ndarray) -> np.ndarray:
         """One cycle for ``A x = b``; arrays of owned degrees of freedom."""
         self._left.array_w[:] = b
-        self._pc.apply(self._left, self._right)
+        self.pc.apply(self._left, self._right)
         return self._right.array_r.copy()
 
 

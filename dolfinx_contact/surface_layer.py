@@ -25,15 +25,18 @@ class SurfaceLayer:
         body: The elastic body, its stiffness assembled.
         contacts: Its contacts.
         prefix: Of the PETSc options of the factorisation, MUMPS by default.
+
+    Attributes:
+        dofs: Owned free degrees of freedom of the layers.
     """
 
     def __init__(self, body, contacts, prefix: str):
         self._body, self._contacts, self._prefix = body, contacts, prefix
-        self._dofs = _near(body, contacts)
+        self.dofs = _near(body, contacts)
         first, last = body.K.getOwnershipRange()
         rows, layer = (
             PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), body.comm)
-            for dofs in (np.arange(first, last), first + self._dofs)
+            for dofs in (np.arange(first, last), first + self.dofs)
         )
         # K on displacements of the layers: a product with all of K would cost a tenth of a cycle more.
         self._columns = body.K.createSubMatrix(rows, layer)
@@ -42,7 +45,7 @@ class SurfaceLayer:
         width = self._columns.getSizes()[1]
         indptr, indices, values = self._columns.getValuesCSR()
         stiffness = sparse.csr_matrix((values, indices, indptr), shape=(body.size, width[1]))
-        self._stiffness = stiffness[self._dofs]
+        self._stiffness = stiffness[self.dofs]
         self._size = (width, width)
         self._solver = None
 
@@ -56,28 +59,23 @@ class SurfaceLayer:
         """Factorise the block at new derivatives of the nodal maps.  Collective.
 
         Args:
-            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame, as
-                ``Contact.update_with_derivatives`` returns them.
+            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
-        self._mixing = []  # I - R_r and R_u of each contact, global frame
-        for contact, both in zip(self._contacts, derivatives):
-            by_reaction, by_motion = (
-                np.einsum("ki,nkl,lj->nij", contact.frame, d, contact.frame) for d in both
-            )
-            self._mixing.append((np.eye(len(contact.frame)) - by_reaction, by_motion))
-        mix = sparse.eye(self._dofs.size, format="csr")
-        motion = sparse.csr_matrix(self._stiffness.shape)
-        for contact, (left, by_motion) in zip(self._contacts, self._mixing):
-            at = np.searchsorted(self._dofs, contact._dofs)
-            free = np.isin(contact._dofs, self._dofs)
-            pairs = free[:, :, None] & free[:, None, :]
-            i, j = (
-                np.broadcast_to(a, pairs.shape)[pairs] for a in (at[:, :, None], at[:, None, :])
-            )
-            change = (left - np.eye(left.shape[1]))[pairs]
-            mix += sparse.csr_matrix((change, (i, j)), shape=mix.shape)
-            motion += sparse.csr_matrix((by_motion[pairs], (i, self._offset + j)), motion.shape)
-        block = (mix @ self._stiffness - motion).tocsr()
+        points = [contact.points for contact in self._contacts]
+        # B^T R_r B and B^T R_u B on owned degrees of freedom
+        self._by_forces, self._by_motion = (
+            sum(of.matrix(part) for of, part in zip(points, parts)) for parts in zip(*derivatives)
+        )
+        near = sparse.csr_matrix(
+            (np.ones(self.dofs.size), (np.arange(self.dofs.size), self.dofs)),
+            (self.dofs.size, self._body.size),
+        )
+        mix, motion = (near @ part @ near.T for part in (self._by_forces, self._by_motion))
+        motion.resize(motion.shape[0], self._stiffness.shape[1] - self._offset)
+        shifted = sparse.csr_matrix(
+            (motion.data, motion.indices + self._offset, motion.indptr), self._stiffness.shape
+        )
+        block = (self._stiffness - mix @ self._stiffness - shifted).tocsr()
         csr = (block.indptr.astype(PETSc.IntType), block.indices.astype(PETSc.IntType), block.data)
         A = PETSc.Mat().createAIJ(self._size, csr=csr, comm=self._body.comm)
         if self._solver is not None:
@@ -91,20 +89,18 @@ class SurfaceLayer:
         Returns:
             The displacement, zero beyond the layers, and the residual that it leaves.
         """
-        near = self._solver.solve(residual[self._dofs])
+        near = self._solver.solve(residual[self.dofs])
         correction = np.zeros_like(residual)
-        correction[self._dofs] = near
+        correction[self.dofs] = near
         self._near.array_w[:] = near
         self._columns.mult(self._near, self._forces)
         return correction, residual - self.multiply(correction, self._forces.array_r.copy())
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``, in their place."""
-        for contact, (left, motion) in zip(self._contacts, self._mixing):
-            mixed = np.einsum("nij,nj->ni", left, forces[contact._dofs])
-            forces[contact._dofs] = mixed - np.einsum("nij,nj->ni", motion, x[contact._dofs])
-        forces[self._body.fixed] = 0.0
-        return forces
+        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
+        product = forces - self._by_forces @ forces - self._by_motion @ x
+        product[self._body.fixed] = 0.0
+        return product
 
 
 def _near(body, contacts) -> np.ndarray:
@@ -113,7 +109,7 @@ def _near(body, contacts) -> np.ndarray:
     nodes = _dolfinx.cell_nodes(body.V)
     near = fem.Function(body.V)
     for contact in contacts:
-        near.x.array[contact._dofs] = 1.0
+        near.x.array[contact.points.dofs] = 1.0
     for _ in range(LAYERS - 1):
         near.x.scatter_forward()
         marked = near.x.array[::gdim] > 0.0

@@ -10,8 +10,9 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from dolfinx_contact import condensed
+from dolfinx_contact import compliance, condensed
 from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.solver import SolverResult
 
 CASES = {
     "isotropic": dict(mu=0.2, p=None),
@@ -58,10 +59,10 @@ def test_default_says_what_it_chose_and_why():
 def test_default_falls_back(monkeypatch):
     """Where one solver fails the other one takes over, and the record says so."""
 
-    def give_up(self, equations, x, tol):
-        return equations.trial, 1
+    def give_up(self, step, start=None):
+        return SolverResult(step.body.free_state(step.b), 1, 1.0, "CondensedNewton")
 
-    monkeypatch.setattr(dc.CondensedNewton, "solve", give_up)
+    monkeypatch.setattr(condensed.CondensedBody, "solve", give_up)
     reactions, steps = run()
     assert "then FixedPoint" in steps[0].solver
     monkeypatch.undo()
@@ -71,7 +72,7 @@ def test_default_falls_back(monkeypatch):
 
 def test_memory_is_estimated_before_it_is_taken(monkeypatch):
     """An operator that would not fit is refused with the alternative named; the default avoids it."""
-    monkeypatch.setattr(condensed, "_available", lambda: 1000.0)
+    monkeypatch.setattr(compliance, "_available", lambda: 1000.0)
     with pytest.raises(MemoryError, match="FixedPoint"):
         run(solver=dc.CondensedNewton())
     _, steps = run()
@@ -80,16 +81,16 @@ def test_memory_is_estimated_before_it_is_taken(monkeypatch):
 
 def test_operator_is_the_compliance_of_the_contact_nodes():
     """W r is the displacement that reactions r cause, by a solve with the body itself."""
-    scene = scenes.block()
+    scene = scenes.block(solver=dc.CondensedNewton())
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
     problem = scene.problem
-    operator = problem._condensed
+    operator = problem.bound()
     rng = np.random.default_rng(0)
     r = rng.normal(size=(operator.nodes, 3))
     W = operator.compliance()
-    x = problem.body.solve(operator.forces(r))
-    local = operator.gather(x[scene.contact._dofs] @ scene.contact.frame.T)
+    x = operator.displacement(np.zeros(problem.body.size), r.ravel())
+    local = operator.gather(scene.contact.points.motion(x))
     if scene.mesh.comm.rank == 0:
         expected = (W @ r.ravel()).reshape(-1, 3)
         assert np.abs(local - expected).max() <= 1e-12 * np.abs(expected).max()
@@ -105,9 +106,9 @@ def test_without_friction_normal_components_alone(cells):
     assert not found[..., :-1].any()
     W = []
     for mu in (0.0, 1e-12):
-        scene = scenes.block(mu=mu, p=None, cells=cells)
-        scene.problem.body.refresh()
-        body = condensed.CondensedBody(scene.problem.body, [scene.contact])
+        scene = scenes.block(mu=mu, p=None, cells=cells, solver=dc.CondensedNewton())
+        scene.problem.load_step()
+        body = scene.problem.bound()
         W.append(body.compliance())
     if scene.mesh.comm.rank == 0:
         normal = W[1][len(cells) - 1 :: len(cells), len(cells) - 1 :: len(cells)]
@@ -152,18 +153,18 @@ def test_friction_per_node_where_ranks_have_no_contact_node(solver):
 
 def test_operator_is_kept_while_the_matrix_stands():
     """New loads keep W, a new modulus replaces it, and the answers follow."""
-    scene = scenes.block()
+    scene = scenes.block(solver=dc.CondensedNewton())
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    first, operator = scenes.gathered(scene.contact)[1], scene.problem._condensed
+    first, operator = scenes.gathered(scene.contact)[1], scene.problem.bound()
     scene.move_top(0.001, 0, -0.006)
     scene.problem.solve()
-    assert scene.problem._condensed is operator
+    assert scene.problem.bound() is operator
     scene.modulus.value *= 2
     scene.problem.reset()
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    assert scene.problem._condensed is not operator
+    assert scene.problem.bound() is not operator
     assert scenes.gathered(scene.contact)[1] == pytest.approx(2 * first, abs=1e-8 * first.max())
 
 

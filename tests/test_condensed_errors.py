@@ -10,7 +10,7 @@ import pytest
 from condensed_scenes import judge, random_problem
 
 from dolfinx_contact import CondensedNewton, Friction, _kernel
-from dolfinx_contact._errors import RoundingWarning
+from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.condensed_newton import CondensedNotConverged, solve_condensed
 
 TOL = 1e-8

@@ -185,19 +185,17 @@ def test_steps_start_from_the_nearer_state():
     """Of the last state and the extrapolation of the last two, each step of case C starts from the one nearer to
     its solution, in energy: the extrapolation in all steps but the first of loading and of unloading."""
 
-    class Noting(dc.FixedPoint):
-        def solve(self, system, x, tol):
-            self.start = system.guess()
-            return super().solve(system, self.start, tol)
-
-    solver, distances = Noting(), []
-    punch = Punch(Parameters(case="C", tol=1e-10, refine=-1), solver=solver)
+    distances = []
+    punch = Punch(Parameters(case="C", tol=1e-10, refine=-1), solver=dc.FixedPoint())
     body = punch.problem.body
+    last = before = np.zeros(body.size)
     for displacement in programme(punch.parameters):
-        last, before = punch.problem._states
+        punch.approach.value = -displacement
+        begun = punch.problem.load_step().start()
         punch.press(displacement)
-        solution = punch.problem._states[0]
-        steps = [solution - start for start in (solver.start, last, 2 * last - before)]
+        solution = punch.u.x.array[: body.size].copy()
+        steps = [solution - start for start in (begun, last, 2 * last - before)]
+        last, before = solution, last
         distances.append([body.total(step @ body.multiply(step)) for step in steps])
     for index, (start, last, extrapolated) in enumerate(distances):
         assert start <= 1.01 * min(last, extrapolated) + 1e-9 * distances[0][1]

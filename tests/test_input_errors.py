@@ -269,9 +269,9 @@ def test_problem_refuses_conditions_on_contact_nodes(scene):
     with pytest.raises(ValueError, match="boundary condition"):
         rebuilt(scene, bcs=[*scene.bcs, normal])
     rebuilt(scene, bcs=[*scene.bcs, tangential])
-    assert scene.contact.held[:, 0].all() and not scene.contact.held[:, 1].any()
+    assert scene.contact.points.held[:, 0].all() and not scene.contact.points.held[:, 1].any()
     rebuilt(scene, bcs=scene.bcs)
-    assert not scene.contact.held.any()
+    assert not scene.contact.points.held.any()
 
 
 @pytest.mark.parametrize("held", ["nothing", "one point", "height only", "a hinge", "its top"])

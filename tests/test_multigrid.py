@@ -85,7 +85,7 @@ def test_all_digits_of_the_free_state_where_they_count(height, solver):
     assert known.exact
     left = body.norm(known.load - body.multiply(known.displacement))
     assert left <= 1e-10 * body.norm(known.load)
-    counts = scene.problem._counts()
+    counts = scene.problem.counts()
     assert (counts.open == sum(counts)) == (height > 0)
 
 

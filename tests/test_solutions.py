@@ -36,7 +36,7 @@ def test_fixed_point_agrees_with_newton(case):
     newton = Punch(parameters, solver=dc.CondensedNewton())
     others = [Punch(parameters, solver=dc.FixedPoint()) for _ in range(2)]
     for punch, options in zip(others, (DIRECT, MULTIGRID)):
-        punch.problem.body._options = options
+        punch.problem.body.options = options
     largest = np.zeros(2)
     for displacement in programme(parameters):
         expected = results(newton, displacement)
@@ -55,7 +55,7 @@ def test_a_step_with_several_solutions():
     for x, y in ((0.004, 0.002), (-0.004, 0.002)):
         scene.move_top(x, y, -0.01)
         problem.solve()
-    W = problem._condensed.compliance()
+    W = problem.bound().compliance()
     w = np.column_stack((contact.slip_increment, contact.gap))
     q = w - (W @ contact.reaction.ravel()).reshape(w.shape)
     found = solutions.solutions(W, q, contact.friction, contact.reaction, starts=20, seed=1)

@@ -17,9 +17,9 @@ def stiffened(**options):
     )
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    multigrid = scene.problem._stiffened.solver
+    multigrid = scene.problem.bound().preconditioner.stiffened
     assert isinstance(multigrid, StiffenedMultigrid)
-    return scene.problem, multigrid._pc
+    return scene.problem, multigrid.pc
 
 
 def operator(pc, level):
@@ -55,7 +55,7 @@ def test_as_good_as_a_hierarchy_of_its_own():
     ksp.setTolerances(rtol=1e-10)
     ksp.setPC(pc)
     ksp.solve(left, right)
-    own = LinearSolver(A, MULTIGRID | {"ksp_rtol": 1e-10}, "own_", body._rigid_modes)
+    own = LinearSolver(A, MULTIGRID | {"ksp_rtol": 1e-10}, "own_", body.rigid_modes)
     difference = np.abs(own.solve(left.array_r.copy()) - right.array_r).max()
     assert difference <= 1e-8 * right.norm(PETSc.NormType.INFINITY)
     expected = own.ksp.getIterationNumber()

@@ -7,64 +7,64 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
-from dolfinx_contact.contact_equations import ContactEquations
 from dolfinx_contact.linear_solver import MULTIGRID
+from dolfinx_contact.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.preconditioner import ContactPreconditioner
+from dolfinx_contact.surface_layer import SurfaceLayer
 
 LAWS = [(0.0, None), (0.2, None), ((0.3, 0.15), None), ((0.3, 0.15), (0.05, 0.2))]
 
 
 def linearised(map, turn=None, **options):
-    """Equations of a step of a pressed and sheared block, linearised at a state with all statuses."""
+    """A load step of a pressed and sheared block, maps, the preconditioner, and a state with all statuses."""
     scene = scenes.block(cells=(6, 6, 3), turn=turn, **options)
     scene.move_top(0.001, 0.0005, -0.005)
     scene.problem.solve()
+    last = scene.u.x.array[: scene.problem.body.size].copy()
     scene.move_top(0.002, 0.0, -0.003)
-    problem = scene.problem
-    b, external = problem.body.load()
-    trial = problem.body.solve(b)
-    equations = ContactEquations(problem, b, *problem._load(trial, external))
-    equations.use_metric(map, 1.0)
-    x = problem._states[0] + 0.3 * (trial - problem._states[0])
-    x[problem.body.fixed] = b[problem.body.fixed]
-    return equations, x
+    step = scene.problem.load_step()
+    x = last + 0.3 * (step.body.solve(step.b) - last)
+    x[step.body.fixed] = step.b[step.body.fixed]
+    rho = [of.normal for of in step.stiffness]
+    maps = [BipotentialMap(r) if map == "bipotential" else ReturnMap(r, r) for r in rho]
+    return step, maps, ContactPreconditioner(step.body, step.contacts, maps), x
 
 
 @pytest.mark.parametrize("map", ["return", "bipotential"])
 @pytest.mark.parametrize("mu, p", LAWS)
 def test_tangent_is_the_derivative_of_the_residual(map, mu, p):
     """J x is the difference quotient of the fixed point's residual, in any direction, in a turned frame."""
-    equations, x = linearised(map, turn=scenes.rotation(), mu=mu, p=p)
-    body = equations.body
-    equations.linearise(x)
+    step, maps, preconditioner, x = linearised(map, turn=scenes.rotation(), mu=mu, p=p)
+    body = step.body
+    preconditioner.linearise(step.derivatives(x, maps))
     rng = np.random.default_rng(scenes.COMM.rank)
-    before, _ = equations.residual(x)
+    before = step.out_of_balance(x, maps)
     for _ in range(3):
         direction = rng.normal(size=x.size) * np.abs(body.norm(x)) / np.sqrt(x.size)
         direction[body.fixed] = 0.0
-        step = 1e-7
-        after, _ = equations.residual(x + step * direction)
-        quotient = -(after - before) / step
-        quotient[body.fixed] = 0.0
-        product = equations.problem._layer.multiply(direction, body.multiply(direction))
+        h = 1e-7
+        after = step.out_of_balance(x + h * direction, maps)
+        quotient = step.free(-(after - before) / h)
+        product = preconditioner.tangent(direction)
         assert body.norm(quotient - product) <= 1e-5 * body.norm(product)
 
 
 @pytest.mark.parametrize("mu, p", LAWS)
 def test_block_is_solved_exactly(mu, p):
     """The correction of the layers leaves no residual there, on any number of ranks."""
-    equations, x = linearised("return", mu=mu, p=p)
-    body = equations.body
-    equations.linearise(x)
-    layer = equations.problem._layer
+    step, maps, _, x = linearised("return", mu=mu, p=p)
+    body = step.body
+    layer = SurfaceLayer(body, step.contacts, "block_")
+    layer.linearise(step.derivatives(x, maps))
     residual = np.random.default_rng(scenes.COMM.rank).normal(size=x.size)
     residual[body.fixed] = 0.0
     correction, left = layer.correct(residual)
     by_all_of_it = residual - layer.multiply(correction, body.multiply(correction))
     assert body.norm(left - by_all_of_it) <= 1e-12 * body.norm(residual)
-    near = body.total(np.array([layer._dofs.size]))[0]
+    near = body.total(np.array([layer.dofs.size]))[0]
     planes = 7 * 7 * 3  # nodes of one horizontal plane
     assert near == 2 * planes or scenes.COMM.size > 1 and near <= 2 * planes
-    assert body.norm(left[layer._dofs]) <= 1e-10 * body.norm(residual)
+    assert body.norm(left[layer.dofs]) <= 1e-10 * body.norm(residual)
 
 
 def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch):

@@ -1,0 +1,39 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Numbers and arrays that users give, checked once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+class RoundingWarning(UserWarning):
+    """An answer is as good as double precision allows, which is less than the tolerance asked for."""
+
+
+def finite(name: str, value) -> np.ndarray:
+    """A float64 array of finite numbers, or a ``ValueError``."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise ValueError
+    except ValueError:
+        raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} contains NaN or infinity.")
+    return array.astype(np.float64)
+
+
+def positive(name: str, value, whole: bool = False, finite: bool = False) -> float:
+    """A positive number, or a ``ValueError``; of a whole one infinity is none."""
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    fits = number > 0 and not ((whole or finite) and math.isinf(number))
+    if not fits or whole and number != int(number):
+        kind = "whole " if whole else ""
+        raise ValueError(f"{name} must be a positive {kind}number, got {value!r}.")
+    return number

@@ -1,0 +1,94 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Contact points as linear functionals of the displacement: motion is B u, forces on the body are B^T r."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from dolfinx_contact.error import NodalStiffness
+
+
+class ContactPoints:
+    """Points of a body that may touch, each with a frame of its own, this rank's share.
+
+    Args:
+        dofs: Owned degrees of freedom of each point's node, ``shape=(n, gdim)``.
+        frames: Rows (t1, t2, n) of each point, ``shape=(n, gdim, gdim)``, global components, orthonormal.
+        size: Number of owned degrees of freedom.
+
+    Attributes:
+        B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
+        held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  There is neither
+            slip nor friction in them: what the support carries is no reaction of the plane.
+    """
+
+    def __init__(self, dofs: np.ndarray, frames: np.ndarray, size: int):
+        self.size, (self.count, self.dim) = size, dofs.shape
+        self.dofs, self.frames = dofs, frames
+        columns = np.repeat(dofs, self.dim, axis=0).ravel()
+        starts = np.arange(0, frames.size + 1, self.dim)
+        self.B = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
+        self._forces = self.B.T.tocsr()
+        self._magnitudes = abs(self.B)
+        self.held = np.zeros((self.count, self.dim - 1), dtype=bool)
+
+    def motion(self, u: np.ndarray) -> np.ndarray:
+        """Local components of the points' motion, ``shape=(n, gdim)``, from owned degrees of freedom."""
+        return (self.B @ u).reshape(self.count, self.dim)
+
+    def magnitudes(self, u: np.ndarray) -> np.ndarray:
+        """Size of the terms that ``motion`` adds up, ``shape=(n, gdim)``."""
+        return (self._magnitudes @ np.abs(u)).reshape(self.count, self.dim)
+
+    def reactions(self, forces: np.ndarray) -> np.ndarray:
+        """Reactions, ``shape=(n, gdim)``, local, that are these forces on the body at the points' nodes."""
+        return self.motion(forces)  # the frames are orthonormal
+
+    def add_forces(self, reaction: np.ndarray, forces: np.ndarray) -> None:
+        """Add the forces on the body that are these reactions to those on owned degrees of freedom."""
+        forces += self._forces @ reaction.ravel()
+
+    def add_magnitudes(self, reaction: np.ndarray, forces: np.ndarray) -> None:
+        """Add the magnitudes of these reactions' components to forces on owned degrees of freedom."""
+        forces += self._magnitudes.T @ np.abs(reaction).ravel()
+
+    def matrix(self, blocks: np.ndarray):
+        """``B^T D B`` of nodal blocks, ``shape=(n, gdim, gdim)``, local frame: sparse, owned rows and columns."""
+        n = self.count
+        D = sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * self.dim,) * 2)
+        return self._forces @ D.tocsr() @ self.B
+
+    def free_of(self, fixed: np.ndarray) -> np.ndarray:
+        """Length of what boundary conditions leave of each local direction, ``shape=(n, gdim)``: 1, 0 or a part."""
+        free = ~np.isin(self.dofs, fixed)
+        return np.linalg.norm(self.frames * free[:, None, :], axis=2)
+
+    def stiffness(self, K) -> NodalStiffness:
+        """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective."""
+        first = K.getOwnershipRange()[0]
+        dofs = (self.dofs.ravel() + first).astype(PETSc.IntType)
+        rows = PETSc.IS().createGeneral(dofs, comm=K.comm)
+        block = K.createSubMatrix(rows, rows)
+        start, columns, values = block.getValuesCSR()
+        row = np.repeat(np.arange(dofs.size), np.diff(start))
+        column = columns - block.getOwnershipRange()[0]
+        here = row // self.dim == column // self.dim
+        blocks = np.zeros(self.frames.shape)
+        blocks[row[here] // self.dim, row[here] % self.dim, column[here] % self.dim] = values[here]
+        rows.destroy()
+        block.destroy()
+        local = self.frames @ blocks @ self.frames.transpose(0, 2, 1)
+        return NodalStiffness(local[:, -1, -1].copy(), local[:, :-1, :-1])
+
+
+def add_to(K, values) -> None:
+    """Add a sparse matrix of owned rows and columns to an assembled PETSc matrix.  Collective."""
+    first = K.getOwnershipRange()[0]
+    for row in np.flatnonzero(np.diff(values.indptr)):
+        part = slice(values.indptr[row], values.indptr[row + 1])
+        columns = (first + values.indices[part]).astype(PETSc.IntType)
+        K.setValues([first + row], columns, values.data[part], addv=PETSc.InsertMode.ADD_VALUES)
+    K.assemble()

@@ -1,0 +1,90 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The correction of an iteration: body with springs at its contact nodes, and the contact tangent next to the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from dolfinx_contact.linear_solver import stage
+from dolfinx_contact.rigid_balance import RigidBalance
+from dolfinx_contact.surface_layer import SurfaceLayer
+
+
+class ContactPreconditioner:
+    """Corrects a displacement for forces out of balance; every application is one cycle or back-solve.
+
+    Args:
+        body: The body, its stiffness assembled.
+        contacts: Its contacts.
+        maps: Of each contact; their springs are added to the stiffness.  Collective.
+
+    Attributes:
+        rigid: ``RigidBalance`` of the motions that the springs stiffen too much.
+        stiffened: What applies the preconditioner of the stiffness with springs.
+    """
+
+    def __init__(self, body, contacts, maps):
+        self._body, self._contacts = body, contacts
+        self._layer, self._linearised = None, False
+        with stage("contact: set-up of springs"):
+            S, A = self._springs(maps), body.K.copy()
+            A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self.rigid = RigidBalance(body, contacts, A)
+            self.stiffened = body.stiffened(A, S)
+        A.destroy()  # the solver has its own reference
+        S.destroy()
+
+    def destroy(self) -> None:
+        """Free factors and levels.  Collective."""
+        self.stiffened.destroy()
+        if self._layer is not None:
+            self._layer.destroy()
+
+    def _springs(self, maps):
+        """The maps' springs, a PETSc matrix with entries at contact nodes alone."""
+        K, S = self._body.K, None
+        for contact, map in zip(self._contacts, maps):
+            springs = map.springs(contact.friction, contact.points.dim)
+            blocks = springs[:, :, None] * np.eye(contact.points.dim)
+            matrix = contact.points.matrix(blocks).tocsr()
+            S = matrix if S is None else S + matrix
+        S.resize(self._body.size, K.getSize()[1])
+        indices = K.getOwnershipRange()[0] + S.indices
+        csr = (S.indptr.astype(PETSc.IntType), indices.astype(PETSc.IntType), S.data)
+        return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
+
+    def linearise(self, derivatives) -> None:
+        """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.
+
+        Args:
+            derivatives: As ``LoadStep.derivatives`` returns them.
+        """
+        if self._layer is None:
+            prefix = f"{self._body.prefix}layer_"
+            self._layer = SurfaceLayer(self._body, self._contacts, prefix)
+        with stage("contact: surface layer"):
+            self._layer.linearise(derivatives)
+        self._linearised = True
+
+    def forget_tangent(self) -> None:
+        """Corrections by springs alone again."""
+        self._linearised = False
+
+    def tangent(self, x: np.ndarray) -> np.ndarray:
+        """Minus the derivative of the forces out of balance along ``x``, where they were linearised."""
+        return self._layer.multiply(x, self._body.multiply(x))
+
+    def correct(self, residual: np.ndarray) -> np.ndarray:
+        """Displacement that removes the residual while the springs hold the contact nodes.
+
+        After ``linearise`` the layers next to the plane are corrected first.
+        """
+        residual, near = residual.copy(), 0.0
+        residual[self._body.fixed] = 0.0
+        if self._linearised:
+            near, residual = self._layer.correct(residual)
+        correction = near + self.stiffened.apply(residual)
+        correction[self._body.fixed] = 0.0
+        return correction

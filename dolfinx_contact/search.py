@@ -1,0 +1,88 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The best iterate of a step so far, how far it may be off, and whether the search goes on."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from time import perf_counter
+
+import numpy as np
+
+# Steps over which the fall of the errors is taken.
+WINDOW = 3
+
+# Iterations in which the smallest error has to halve.
+PATIENCE = 100
+
+
+class Search:
+    """Keeps the best iterate.
+
+    Args:
+        step: The ``LoadStep``.
+        x: Where the search begins.
+        max_seconds: Wall time after which it ends, seconds.
+
+    Attributes:
+        best: The iterate of the smallest errors.
+        error: The largest error of the last one.
+        forward_error: Of the best one, see docs/errors.md.
+        iterations: Done so far.
+        left: Iterations left.
+        over: Solved, or out of time.
+    """
+
+    def __init__(self, step, x: np.ndarray, max_seconds: float):
+        self.step, self.best = step, x
+        self.error = self._smallest = self.forward_error = np.inf
+        self._errors: deque[float] = deque(maxlen=WINDOW + 1)
+        self.iterations = self.left = 0
+        self._start, self._seconds = perf_counter(), max_seconds
+        self.over = self._lost = False
+
+    def begin(self, most: int) -> None:
+        """Once more, with so many iterations at most."""
+        self.left, self._lost = most, False
+        self._halved, self._since = np.inf, self.iterations
+
+    @property
+    def goes_on(self) -> bool:
+        """Neither over nor lost nor at its last iteration."""
+        return not (self.over or self._lost) and self.left > 0
+
+    def count(self, iterations: int) -> None:
+        """Iterations that were done."""
+        self.iterations += iterations
+        self.left -= iterations
+
+    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, np.ndarray]:
+        """``x`` and its forces out of balance; takes note of its errors."""
+        residual, errors = self.step.residual(x, maps)
+        self.error, tol = errors.largest, self.step.tol
+        self._errors.append(self.error)
+        change = errors.change * self._contraction()
+        if self.error < self._smallest:
+            self._smallest, self.best, self.forward_error = self.error, x, change
+        if self._smallest < 0.5 * self._halved:
+            self._halved, self._since = self._smallest, self.iterations
+        self._lost = not np.isfinite(self.error) or self.iterations - self._since > PATIENCE
+        solved = errors.acts and max(self.error, change) <= tol
+        rounded = errors.within(tol) and len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error  # fmt: skip
+        self.over = bool(solved or rounded or self._late())
+        return x, residual
+
+    def _contraction(self) -> float:
+        """What is left to go over the last step, were errors to fall on as in the last steps."""
+        last, first, steps = self._errors[-1], self._errors[0], len(self._errors) - 1
+        if last == 0.0 or steps == 0:
+            return 0.0 if last == 0.0 else 1.0
+        rate = max(last / self._errors[-2], (last / first) ** (1 / steps))
+        return rate / (1 - rate) if rate < 0.9 else 9.0
+
+    def _late(self) -> bool:
+        """Whether the time is up on any rank; asks them only if there is a limit."""
+        if self._seconds == math.inf:
+            return False
+        return bool(self.step.total([perf_counter() - self._start > self._seconds])[0] > 0)

@@ -1,0 +1,55 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What a solver is: options that can be bound to a body and its contacts, and then solves load steps.
+
+A solver is an object with options and ``bind(body, contacts, stiffness)``, which returns a ``BoundSolver``.  That owns
+everything set up for the body's present stiffness, and is thrown away when the stiffness changes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+
+class SolverResult(NamedTuple):
+    """What a solver found for a load step; the problem judges it.
+
+    Attributes:
+        x: Displacement of owned degrees of freedom, the best one found.
+        iterations: Iterations of the solver.
+        forward_error: Estimate of how far the reactions are from the exact ones, over the forces that act.
+        chosen: Name of the solver, and why it was chosen where the user did not.
+        tried: Methods that were tried, in order, where the solver has more than one.
+    """
+
+    x: np.ndarray
+    iterations: int
+    forward_error: float
+    chosen: str
+    tried: tuple = ()
+
+
+class BoundSolver(Protocol):
+    """A solver bound to a body and its contacts."""
+
+    def solve(self, step) -> SolverResult:
+        """Search a displacement whose errors are at most ``step.tol``.  Collective."""
+
+    def destroy(self) -> None:
+        """Free what PETSc holds.  Collective."""
+
+
+class Solver(Protocol):
+    """Options of a solver; one object may be used for many problems."""
+
+    def bind(self, body, contacts, stiffness, memory) -> BoundSolver:
+        """Set up for a body with its assembled stiffness.  Collective.
+
+        Args:
+            body: The body.
+            contacts: Its contacts.
+            stiffness: ``NodalStiffness`` of each contact.
+            memory: Dictionary that outlives the binding, for starts; saved in checkpoints.
+        """

@@ -1,0 +1,185 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A load step as solvers see it: forces out of balance, their errors, and where to start."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.contact import Status
+from dolfinx_contact.error import EPSILON, Errors, as_errors, contact_defects, contact_rounding
+from dolfinx_contact.maps import ReturnMap
+
+
+class LoadStep:
+    """Equilibrium of a body under new loads, its contacts, and the errors of a displacement.
+
+    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``maps.py`` for each contact.
+
+    Args:
+        body: The body, its stiffness assembled.
+        contacts: Its contacts; their reactions, gaps and statuses are those of the displacement asked for last.
+        stiffness: ``NodalStiffness`` of each contact.
+        b: ``b - K u`` are the forces out of balance for a ``u`` with the boundary values, which ``b`` holds.
+        external: External forces.
+        starts: Displacements near which the solution may lie.
+        tol: Largest error.
+        unit: Of force, any that keeps squares within the range of double precision.
+        monitor: None, or a function of iteration, largest error and ``Counts``.
+    """
+
+    def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
+        self.body, self.contacts, self.stiffness = body, contacts, stiffness
+        self.b, self.external, self.tol = b, external, tol
+        self._starts, self._unit, self._monitor = starts, unit, monitor
+        self._before = None  # reactions of the state judged before
+        self._evaluations = 0
+        self._known = None  # a displacement, and the forces b - K x that it leaves
+        self._measured = None  # displacement whose errors were measured with F
+
+    def total(self, array) -> np.ndarray:
+        """Sum of an array over all ranks."""
+        return self.body.total(array)
+
+    def start(self) -> np.ndarray:
+        """The start with the smallest error.
+
+        By the return map: the paper's, whose reactions differ more from those before where slip is far from the
+        normal of the cone, takes an extrapolation for worse than it is.
+        """
+        guesses = [start.copy() for start in self._starts]
+        for guess in guesses:
+            guess[self.body.fixed] = self.b[self.body.fixed]
+        maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
+        best = min(guesses, key=lambda guess: self.residual(guess, maps)[1].largest)
+        self._before = None
+        return best
+
+    # -- forces --------------------------------------------------------------------------------
+
+    def forces(self, x: np.ndarray) -> np.ndarray:
+        """``b - K x``; of the array that was asked for last without another product."""
+        if self._known is None or self._known[0] is not x:
+            self._known = (x, self.b - self.body.multiply(x))
+        return self._known[1]
+
+    def know(self, x: np.ndarray, forces: np.ndarray) -> None:
+        """Take note of the forces at a displacement that were found without a product."""
+        self._known = x, forces
+
+    def free(self, forces: np.ndarray) -> np.ndarray:
+        """Forces without what supports carry."""
+        forces = forces.copy()
+        forces[self.body.fixed] = 0.0
+        return forces
+
+    def size(self, forces: np.ndarray) -> float:
+        """Norm of forces at free degrees of freedom."""
+        return self.body.norm(self.free(forces))
+
+    def out_of_balance(self, x: np.ndarray, maps) -> np.ndarray:
+        """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``."""
+        return self._left(x, self.forces(x), maps)
+
+    def derivatives(self, x: np.ndarray, maps) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of the new reactions of each contact, by the reactions before and by the motion."""
+        asked = self._asked(self.forces(x))
+        return [contact.respond_with_derivatives(x, map) for contact, map in zip(asked, maps)]
+
+    def along(self, x: np.ndarray, dx: np.ndarray, maps):
+        """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
+        forces, change = self.forces(x), self.body.multiply(dx)
+
+        def size(length: float) -> float:
+            return self.size(self._left(x + length * dx, forces - length * change, maps))
+
+        return size
+
+    # -- errors --------------------------------------------------------------------------------
+
+    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
+        """``out_of_balance`` and the errors of the state.
+
+        The reactions that enter the predictor are those the body asks for, ``K x - b``.  Once the
+        errors fall below the tolerance they are measured again with F itself, assembled by DOLFINx.
+        """
+        left = self.out_of_balance(x, maps)
+        self.errors = self._errors(left, x, self.body.support_forces(x))
+        if self.errors.within(self.tol):
+            change = self.errors.change
+            self._judge(x, -self.body.residual(x))
+            self.errors = self.errors._replace(change=change)
+        if self._monitor is not None:
+            self._monitor(self._evaluations, self.errors.largest)
+        self._evaluations += 1
+        return left, self.errors
+
+    def measure(self, x: np.ndarray) -> Errors:
+        """Errors of a displacement by F itself; also takes its reactions, gaps and slips.
+
+        Reactions by the return map: where slip is large beside them their direction is that of the slip, not that of
+        rounding in the forces.
+        """
+        if self._measured is None or not self.body.same(x, self._measured):
+            forces = -self.body.residual(x)
+            maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
+            for contact, map in zip(self._asked(self.free(forces)), maps):
+                contact.respond(x, map)
+            self._judge(x, forces)
+        return self.errors
+
+    def measure_open(self, x: np.ndarray) -> Errors:
+        """Errors of a displacement without reactions."""
+        for contact in self.contacts:
+            contact.move(x)
+            contact.reaction = np.zeros_like(contact.reaction)
+            contact.status = np.full_like(contact.status, Status.OPEN)
+        self._judge(x, -self.body.residual(x))
+        return self.errors
+
+    def _asked(self, forces: np.ndarray):
+        """The contacts, each with the reactions that balance the forces at its nodes."""
+        self._measured = None  # contacts will move
+        for contact in self.contacts:
+            contact.take_reaction(-forces)
+            yield contact
+
+    def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+        for contact, map in zip(self._asked(forces), maps):
+            contact.respond(x, map)
+        return self.with_reactions(forces)
+
+    def with_reactions(self, forces: np.ndarray) -> np.ndarray:
+        """Forces plus the contacts' present reactions."""
+        forces = forces.copy()
+        for contact in self.contacts:
+            contact.assemble_reaction(forces)
+        return forces
+
+    def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
+        """Errors of the contacts' present state, ``forces = -F(x)``."""
+        self.errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
+        self._measured = x.copy()
+
+    def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
+        """Errors of the contacts' present state.
+
+        Args:
+            left: Forces out of balance, ``f - F(u) + r``; at fixed degrees of freedom they do not count.
+            x: Displacement.
+            supports: What the supports carry, at fixed degrees of freedom.
+        """
+        left, acting = self.free(left), np.abs(self.external)
+        columns = [[np.zeros(0)] for _ in range(5)]
+        for contact, stiffness in zip(self.contacts, self.stiffness):
+            contact.points.add_magnitudes(contact.reaction, acting)
+            rounding = contact_rounding(contact, stiffness, x)
+            parts = (*contact_defects(contact, stiffness), rounding, contact.reaction)
+            for column, part in zip(columns, parts):
+                column.append(part.ravel())
+        law, penetration, slip, rounding, reaction = map(np.concatenate, columns)
+        before, self._before = self._before, reaction
+        change = np.full(1, np.inf) if before is None else reaction - before
+        cancelling = EPSILON * (self.body.cancelling(x) + acting)
+        parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
+        return as_errors(self.total([np.square(part / self._unit).sum() for part in parts]))
