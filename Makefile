@@ -4,7 +4,7 @@
 # make test     a test of every feature: the Python ones that are not marked slow, on 1 and 2 MPI ranks, and
 #               the kernel without Python
 # make test-all all tests: make test, the slow ones, 3 ranks, and the C++ ones
-# make stress   every solver on some 480 scenes, each answer judged by the NumPy twin; resumable
+# make stress   every solver on some 640 scenes, each answer judged from the mechanics in NumPy; resumable
 # make report   error against run time: every solver, the peers beside it, the price of every ingredient;
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.

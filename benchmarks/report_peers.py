@@ -19,7 +19,7 @@ from time import process_time
 import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
 
 # isort: split
-import condensed_scenes
+import judge
 import numpy as np
 import report_calculix
 import report_getfem
@@ -159,7 +159,7 @@ def compared(punch, given, u, seconds, refine, increments, mesh) -> dict:
 def siconos() -> dict:
     """The condensed problems of A, B, C by Siconos' NSN_AC, before and after it by CondensedNewton.
 
-    All answers are judged by tests/condensed_scenes.py from ``W``, ``q`` and the reactions alone.
+    All answers are judged by tests/judge.py from ``W``, ``q`` and the reactions alone.
     """
     if subprocess.run([PYTHON, "-c", "import siconos.numerics"], capture_output=True).returncode:
         return dict(absent="Siconos is not installed (apt install python3-siconos)")
@@ -176,7 +176,7 @@ def siconos() -> dict:
             for solver in ("ours", name, "ours again"):
                 found = np.load(f"{file.removesuffix('npz')}{solver}.npz")
                 judged = [
-                    max(condensed_scenes.judge(problems["W"], q, np.array(mu), np.array(p), r))
+                    judge.condensed(problems["W"], q, np.array(mu), np.array(p), r, 1e-8).error
                     for q, r in zip(problems[f"{case}q"], found[f"{case}reaction"])
                 ]
                 row[solver] = dict(seconds=found[f"{case}seconds"].tolist(), errors=judged,

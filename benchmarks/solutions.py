@@ -21,9 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
+import judge
 import numpy as np
 import scenes
-from condensed_scenes import judge
 from punch import CASES, Parameters, Punch, programme
 
 TOL, APART = 1e-10, 1e-6  # solutions differ by more than APART of the largest reaction
@@ -50,7 +50,7 @@ def random_start(rng, r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 def solutions(W, q, friction, first, starts: int, seed: int) -> list[list]:
     """``[reactions, how many starts led to them, judged errors]`` of each solution, the first one first."""
     rng, newton = np.random.default_rng(seed), dc.CondensedNewton(fallbacks=False)
-    found = [[first, 0, judge(W, q, friction.mu, friction.p, first)]]
+    found = [[first, 0, errors(W, q, friction, first)]]
     for _ in range(starts):
         start = random_start(rng, first, friction.mu)
         try:
@@ -61,12 +61,17 @@ def solutions(W, q, friction, first, starts: int, seed: int) -> list[list]:
     return found
 
 
+def errors(W, q, friction, r) -> tuple[float, float]:
+    """Of the law and of slips, over the reactions, by the judge of the tests."""
+    return judge.condensed(W, q, friction.mu, friction.p, r, TOL).errors
+
+
 def number(found, r, W, q, friction) -> int:
     """Which of the solutions found ``r`` is; a new one is judged and added."""
     apart = [np.abs(r - known).max() / np.abs(r).max() for known, *_ in found]
     if min(apart) <= APART:
         return int(np.argmin(apart))
-    found.append([r.copy(), 0, judge(W, q, friction.mu, friction.p, r)])
+    found.append([r.copy(), 0, errors(W, q, friction, r)])
     return len(found) - 1
 
 

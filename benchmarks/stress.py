@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The stress matrix: every scene times every solver, every answer judged by the NumPy twin.
+"""The stress matrix: every scene times every solver, every answer judged from the mechanics (tests/judge.py).
 
 A run that is stopped continues where it was; ``--output`` then holds one line per scene and solver.
 At the end: a table, ``stress.json``, ``stress.csv`` and ``stress.png``; ``stress-small`` with ``--small``.
@@ -12,27 +12,30 @@ import argparse
 import csv
 import json
 import sys
+import warnings
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
+from types import SimpleNamespace
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
-import dolfinx.fem.petsc
 import numpy as np
-import ufl
-from dolfinx import fem
 from report_run import commit, now
 from stress_scenes import Scene, build, scenes, small
 from stress_table import summary
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
-import twin_solver
-from condensed_scenes import direction_of_slip, judge, random_problem
+import judge
+from condensed_scenes import random_problem
+from judge import Verdict
+from judge_scene import SceneJudge
 
-TOL = 1e-8
-WRONG = 3 * TOL  # the twin's own rounding, and |du| against |du + |du| d| at the edge of the cone
+TOL = 1e-8  # of all scenes that do not name another
+WRONG = judge.DEFECT * TOL
+REFUSALS = (dc.NotConverged, dc.CondensedNotConverged, dc.LinearSolverError, ValueError)
+ROUNDING = getattr(dc, "RoundingWarning", UserWarning)
 SOLVERS = {
     "default": lambda: None,
     "condensed": lambda: dc.CondensedNewton(max_seconds=30),
@@ -40,108 +43,104 @@ SOLVERS = {
 }
 
 
-class Twin:
-    """Judges the steps of a scene from displacement and reactions, with its own dense stiffness."""
-
-    def __init__(self, scene):
-        self.scene, contact = scene, scene.contact
-        derivative = ufl.derivative(scene.F, scene.u, ufl.TrialFunction(scene.V))
-        matrix = dolfinx.fem.petsc.assemble_matrix(fem.form(derivative))
-        matrix.assemble()
-        self.K = matrix[:, :]
-        self.residual = fem.form(scene.F)
-        fixed = [bc.dof_indices()[0] for bc in scene.bcs] or [np.zeros(0, int)]
-        self.free = np.setdiff1d(np.arange(self.K.shape[0]), np.concatenate(fixed))
-        self.factor = np.linalg.inv(self.K[np.ix_(self.free, self.free)])
-        self.frame = np.array(contact.frame)
-        x = scene.V.tabulate_dof_coordinates()
-        self.gap0 = x @ self.frame[2]
-        self.nodes = np.flatnonzero(np.abs(self.gap0) <= 1e-9 * np.abs(x).max())
-        n = self.frame[2]
-        self.kappa = np.array(
-            [n @ self.K[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] @ n for i in self.nodes]
-        )
-        self.before = np.zeros((self.nodes.size, 3))
-        self.reaction = np.zeros((self.nodes.size, 3))
-
-    def errors(self) -> tuple[float, float]:
-        """Error and slip error of the last step, from definitions written anew."""
-        u, contact, frame = self.scene.u, self.scene.contact, self.frame
-        order = [int(np.flatnonzero(contact.nodes == i)[0]) for i in self.nodes]
-        r, friction = contact.reaction[order], contact.friction
-        values = u.x.array.copy()
-        forces = np.zeros((len(values) // 3, 3))
-        forces[self.nodes] = r @ frame
-        unbalanced = fem.assemble_vector(self.residual)
-        unbalanced = np.array(getattr(unbalanced, "array", unbalanced)) - forces.ravel()
-        # The state without reactions: the same, less what the reactions move.
-        trial = values.copy()
-        trial[self.free] -= self.factor @ (forces.ravel() + unbalanced)[self.free]
-        local, free = ((v.reshape(-1, 3)[self.nodes] @ frame.T) for v in (values, trial))
-        gap, slip = self.gap0[self.nodes] + local[:, 2], (local - self.before)[:, :2]
-        free_gap, free_slip = self.gap0[self.nodes] + free[:, 2], (free - self.before)[:, :2]
-        pressed = np.linalg.norm(self.kappa * np.maximum(-free_gap, 0))
-        # A soft spring's force is an external force of the body as DOLFINx assembles it.
-        u.x.array[:] = 0.0
-        external = np.array(getattr(v := fem.assemble_vector(self.residual), "array", v))[self.free]
-        u.x.array[:] = values
-        load = max(pressed, np.linalg.norm(self.reaction), np.linalg.norm(external))
-        length = max(np.abs(free_slip).max(), np.maximum(-free_gap, 0).max())
-        self.before, self.reaction = local, r
-        if not r.any() and (gap >= -1e-12 * np.abs(values).max()).all():
-            return np.linalg.norm(unbalanced[self.free]) / max(load, 1e-300) if load else 0.0, 0.0
-        mu = friction.mu if not friction.frictionless else np.full(2, 1e-30)
-        p = friction.p if not friction.frictionless else mu
-        error = twin_solver.error(
-            self.kappa, mu, p, r, gap, slip, unbalanced[self.free], load
-        )  # fmt: skip
-        defect = 0.0
-        for ri, du in zip(r, slip) if not friction.frictionless else ():
-            if ri[2] == 0:
-                continue
-            inside = np.linalg.norm(ri[:2] / mu) < ri[2] * (1 - 1e-12)
-            against = np.zeros(2) if inside or not ri[:2].any() else direction_of_slip(ri[:2], p)
-            rest = np.linalg.norm(du + np.linalg.norm(du) * against)
-            defect = max(defect, min(rest, np.linalg.norm(du)))
-        return error, defect / length if length else 0.0
-
-
 def run(scene: Scene, solver) -> dict:
-    """One scene with one solver: outcome, worst judged errors, iterations, seconds."""
+    """One scene with one solver: outcome, worst judged errors, iterations, seconds.
+
+    The outcome is ``solved``; ``rounding`` if a step returns with an error above its tolerance because double
+    precision allows no more, and is judged by that error; ``WRONG``; or ``refused``.
+    """
     start = perf_counter()
-    record = dict(outcome="solved", error=0.0, slip_error=0.0, steps=0, iterations=0, slowest=0.0)
+    record = dict(outcome="solved", error=0.0, slip_error=0.0, reactions=0.0, rounding=0.0, steps=0, scratch=0, iterations=0, slowest=0.0)  # fmt: skip
     used = Counter()
-    try:
-        if scene.seed is not None:
-            random = random_problem(scene.seed)
-            friction = dc.Friction(random.mu, random.p)
-            found = dc.solve_condensed(random.W, random.q, friction, solver, TOL, max_seconds=30)
-            errors = judge(random.W, random.q, random.mu, random.p, found.reaction)
-            record.update(error=float(errors[0]), slip_error=float(errors[1]), steps=1)
-            record.update(iterations=found.iterations, slowest=found.seconds)
-            used[found.branch] += 1
-        else:
-            built = build(**scene.body)
-            twin = Twin(built)
-            problem = dc.ContactProblem(
-                built.F, built.u, [built.contact], bcs=built.bcs, solver=solver, tol=TOL
-            )
-            for top in scene.tops:
-                built.move_top(top)
-                step = problem.solve()
-                errors = twin.errors()
-                record["steps"] += 1
-                record["iterations"] += step.iterations
-                record["error"] = max(record["error"], errors[0])
-                record["slip_error"] = max(record["slip_error"], errors[1])
-                record["slowest"] = max(record["slowest"], step.seconds)
-                used[step.tried[-1].branch if step.tried else step.solver.split()[0]] += 1
-        if not max(record["error"], record["slip_error"]) <= WRONG:
-            record["outcome"] = "WRONG"
-    except (dc.NotConverged, dc.CondensedNotConverged, dc.LinearSolverError, ValueError) as said:
-        record.update(outcome="refused", said=f"{type(said).__name__}: {str(said)[:200]}")
+    steps = condensed_steps if scene.condensed else body_steps
+    for verdict, step, method in steps(scene, solver, record):
+        at = level(step, scene.tol)
+        note(record, verdict, at, at > scene.tol)
+        record["steps"] += 1
+        record["scratch"] += verdict.from_scratch is not None
+        record["iterations"] += step.iterations
+        record["slowest"] = max(record["slowest"], step.seconds)
+        used[method] += 1
     record.update(seconds=perf_counter() - start, methods=dict(used))
     return record
+
+
+def level(step, tol: float) -> float:
+    """What an answer is held to: its tolerance, or a larger error that it admits."""
+    return max(tol, step.error, getattr(step, "slip_error", 0.0))
+
+
+def note(record: dict, verdict: Verdict, at: float, rounded: bool) -> None:
+    """Worst figures of the judge, and whether an answer is wrong that is held to the error ``at``."""
+    error, slip = verdict.errors
+    figures = dict(error=error, slip_error=slip, reactions=verdict.reactions, rounding=verdict.rounding)  # fmt: skip
+    for name, value in figures.items():
+        record[name] = max(record[name], value)
+    if not verdict.accepts(at):
+        record["outcome"] = "WRONG"
+        first = f"step {record['steps'] + 1}: {verdict}"
+        record.setdefault("said", first)
+    elif rounded and record["outcome"] == "solved":
+        record["outcome"] = "rounding"
+
+
+def refuse(record: dict, said: Exception) -> None:
+    record["refused"] = record.get("refused", 0) + 1
+    if record["outcome"] != "WRONG":
+        record["outcome"] = "refused"
+        step = record["steps"] + record["refused"]
+        record.setdefault("said", f"step {step}: {type(said).__name__}: {str(said)[:300]}")
+
+
+def condensed_steps(scene: Scene, solver, record):
+    """The one answer of a condensed problem: (verdict, result, method); none if it is refused."""
+    problem = sliding_problem(scene) if scene.seed is None else random_problem(scene.seed)
+    friction = dc.Friction(problem.mu, problem.p)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ROUNDING)
+            found = dc.solve_condensed(problem.W, problem.q, friction, solver, scene.tol, max_seconds=30)  # fmt: skip
+    except REFUSALS as said:
+        return refuse(record, said)
+    mu, p = np.broadcast_to(problem.mu, 2), np.broadcast_to(problem.p, 2)
+    yield (
+        judge.condensed(problem.W, problem.q, mu, p, found.reaction, scene.tol),
+        found,
+        found.branch,
+    )
+
+
+def sliding_problem(scene: Scene):
+    """One node that slides by more than 1 while it is pressed by ``scene.depth``."""
+    mu = scene.body["mu"]
+    q = np.array([[1.0, 0.5, -scene.depth]])
+    return SimpleNamespace(W=np.eye(3), q=q, mu=mu, p=scene.body.get("p", mu))
+
+
+def body_steps(scene: Scene, solver, record):
+    """Load step after load step that is not refused: (verdict, step, method)."""
+    built = build(**scene.body)
+    body = scene.body
+    of = SceneJudge(built, body.get("mu", 0.2), body.get("p"))
+    contacts = [built.contact] if built.contact is not None else []
+    problem = dc.ContactProblem(
+        built.F, built.u, contacts, bcs=built.bcs, solver=solver, tol=scene.tol
+    )
+    for move in scene.tops:
+        if getattr(move, "fresh", False):
+            problem.reset()
+            of.restart()
+        built.move_top(move)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ROUNDING)
+                step = problem.solve()
+        except REFUSALS as said:
+            refuse(record, said)
+            if not scene.goes_on:
+                return
+            continue
+        yield of.verdict(scene.tol), step, step.tried[-1].branch if step.tried else step.solver.split()[0]  # fmt: skip
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:
@@ -150,7 +149,7 @@ def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:
         (scene, solver)
         for scene in chosen
         for solver in solvers
-        if scene.seed is None or solver == "default"
+        if not scene.condensed or solver == "default"
     ]
 
 
@@ -180,6 +179,7 @@ def main(argv=None) -> list[dict]:
     parser.add_argument("--output", type=Path, default=Path("results/stress"))
     parser.add_argument("--every", type=int, default=1, help="run every n-th scene only")
     parser.add_argument("--first", type=int, default=0, help="start with this scene")
+    parser.add_argument("--group", help="scenes of this group only")
     parser.add_argument("--solver", choices=SOLVERS, help="this solver only")
     parser.add_argument("--small", action="store_true", help="the same scenes on small bodies")
     options = parser.parse_args(argv)
@@ -188,7 +188,8 @@ def main(argv=None) -> list[dict]:
     log = options.output / f"{name}.jsonl"
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(r["group"], r["name"], r["solver"]) for r in records}
-    chosen = scenes()[options.first :: options.every]
+    chosen = [s for s in scenes() if options.group in (None, s.group)]
+    chosen = chosen[options.first :: options.every]
     if options.small:
         chosen = list(map(small, chosen))
     todo = [
@@ -219,7 +220,7 @@ def main(argv=None) -> list[dict]:
     for record in records:
         if record["outcome"] != "solved":
             print(record["outcome"], record["solver"], record["group"], record["name"],
-                  record.get("said", ""), record["error"], record["slip_error"])  # fmt: skip
+                  record.get("said", ""), record["error"], record["slip_error"], record["reactions"])  # fmt: skip
     return records
 
 

@@ -6,18 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
-import ufl
-from mpi4py import MPI
+from stress_bodies import Move, build
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
-from dolfinx import fem, mesh
-
-from dolfinx_contact._dolfinx import functionspace
+__all__ = ["LAWS", "PROGRAMMES", "Scene", "build", "scenes", "small"]
 
 A = dict(mu=0.2)
 B = dict(mu=(0.3, 0.15))
@@ -35,11 +28,19 @@ class Scene:
     body: dict = field(default_factory=dict)
     seed: int | None = None  # of a random condensed problem
     most_steps: int | None = None  # of the programme
+    depth: float | None = None  # of a condensed problem that slides at a penetration of this depth
+    tol: float = 1e-8
+    goes_on: bool = False  # a step that is refused does not end it
 
     @property
     def tops(self) -> list[tuple]:
         """Displacements of the top, step by step, scene's axes."""
         return PROGRAMMES[self.programme][: self.most_steps]
+
+    @property
+    def condensed(self) -> bool:
+        """Whether it is given as arrays, without a body."""
+        return self.seed is not None or self.depth is not None
 
 
 def cycles(count, high=0.01, low=0.002):
@@ -57,6 +58,12 @@ def turning(steps=16):
     return [(0, 0, -0.01)] + [(0.004 * np.cos(a), 0.004 * np.sin(a), -0.01) for a in angles]
 
 
+def circle(**how):
+    """Slides of 0.01 in 73 directions; the first one closes the circle."""
+    angles = np.linspace(0, 2 * np.pi, 73)
+    return [Move((0.01 * np.cos(a), 0.01 * np.sin(a), 0), **how) for a in angles]
+
+
 PROGRAMMES = {
     "press": [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006), (0.01, 0, -0.002)],
     "six cycles": cycles(6),
@@ -68,56 +75,21 @@ PROGRAMMES = {
     "turning": turning(),
     "1000 tiny steps": [(1e-5 * k, 0, -1e-5 * k) for k in range(1, 1001)],
     "rocking": [(0, 0, -0.005), (0.02, 0, -0.005), (-0.02, 0, -0.003), (0, 0.02, -0.004)],
-}
-
-
-def build(
-    mu=0.2, p=None, cells=(4, 4, 2), E=210e3, nu=0.3, length=1.0, turn=None, aspect=1.0, jump=1.0,
-    spring=None,
-):  # fmt: skip
-    """A block of edges 1, 1, 0.6 over ``aspect``, top held rigidly or by a soft ``spring``.
-
-    ``jump`` is the ratio of the moduli of neighbouring cells; ``spring`` its stiffness over E.
-    """
-    turn = np.eye(3) if turn is None else turn
-    domain = mesh.create_box(
-        MPI.COMM_SELF,
-        [np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 0.6])],
-        cells,
-        mesh.CellType.hexahedron,
-    )
-    facets = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.0))
-    top = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.6))
-    domain.geometry.x[:, 2] /= aspect
-    domain.geometry.x[:] = length * domain.geometry.x @ turn.T
-    V = functionspace(domain, ("Lagrange", 1, (3,)))
-    u, v = fem.Function(V), ufl.TestFunction(V)
-    held = fem.Function(V)
-    modulus = fem.Function(functionspace(domain, ("Discontinuous Lagrange", 0)))
-    modulus.x.array[:] = E * np.where(np.arange(modulus.x.array.size) % 2, jump, 1.0)
-    nu = fem.Constant(domain, float(nu))
-    lmbda, shear = modulus * nu / ((1 + nu) * (1 - 2 * nu)), modulus / (2 * (1 + nu))
-    eps = ufl.sym(ufl.grad(u))
-    sigma = lmbda * ufl.tr(eps) * ufl.Identity(3) + 2 * shear * eps
-    F = ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx
-    bcs = []
-    if spring is None:
-        bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, top))]
-    else:
-        tags = mesh.meshtags(domain, 2, np.sort(top), np.ones(top.size, dtype=np.int32))
-        ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)
-        stiffness = fem.Constant(domain, spring * E / length)
-        F = F + stiffness * ufl.inner(u - held, v) * ds(1)
-    plane = dc.RigidPlane(point=(0, 0, 0), normal=turn[:, 2], axis=turn[:, 0])
-    friction = dc.Friction(mu=mu, p=p)
-    contact = dc.Contact(V, facets, plane, friction)
-
-    def move_top(displacement):
-        held.x.array[:] = np.tile(
-            length / aspect * turn @ np.asarray(displacement, dtype=float), held.x.array.size // 3
-        )
-
-    return SimpleNamespace(V=V, u=u, F=F, bcs=bcs, contact=contact, move_top=move_top, turn=turn)
+    "tip": [(0, 0, -0.01), (0.002, 0.001, -0.02), (0.004, -0.002, -0.01), (0, 0.01, -0.002)],
+    "weight": [Move(load=(x, y, z)) for x, y, z in
+               ((0, 0, -1e-3), (1.5e-4, 0, -1e-3), (1.5e-4, 1e-4, -1e-3), (-5e-5, 1e-4, -7e-4))],
+    "deep unloading": [(0, 0, -(10.0**-k)) for k in range(2, 9)],
+    "deep unloading after a drag":
+        [(0, 0, -0.01), (0.002, 0.001, -0.01)] + [(0.002, 0, -(10.0**-k)) for k in range(3, 9)],
+    "tilting": [Move((x, 0, -0.005), tilt) for x, tilt in
+                ((0, 0), (0, 0.005), (0, 0.02), (0.002, 0.05), (0.004, -0.02), (0.004, 0))],
+    "unloaded": circle(fresh=True),
+    "after a load was removed": [(0, 0, -0.01), (0, 0, 0), *circle()],
+    "lift after a touch of 1e-6": [(0, 0, -1e-6), (0, 0, 0.1), (0, 0, 0.1)],
+    "lift after a touch of 1e-8": [(0, 0, -1e-8), (0, 0, 0.1), (0, 0, 0.1)],
+    **{f"grazing at 1e-{k}": [(0.1, 0, -(10.0**-k))] for k in range(9, 15)},
+}  # fmt: skip
+PAPERS = list(PROGRAMMES)[: list(PROGRAMMES).index("tip")]  # with the laws of the paper
 
 
 def small(scene: Scene) -> Scene:
@@ -138,7 +110,7 @@ def scenes() -> list[Scene]:
     def add(group, name, programme="press", **body):
         found.append(Scene(group, f"{name}, {programme}", programme, body))
 
-    for (law, friction), programme in product(LAWS.items(), PROGRAMMES):
+    for (law, friction), programme in product(LAWS.items(), PAPERS):
         add("paper's laws", law, programme, **friction)
     for mu, programme in product(
         (0, 1e-6, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.3, 0.5, 0.8, 1, 3, 10, 100, 1e3),
@@ -181,5 +153,45 @@ def scenes() -> list[Scene]:
         add("few and many nodes", f"cells {cells} {law}", cells=cells, **friction)
     for seed in range(150):
         found.append(Scene("random condensed", f"seed {seed}", "condensed", seed=seed))
+    found += hard_scenes()
     found.sort(key=lambda scene: scene.programme == "1000 tiny steps")  # the long ones last
+    return found
+
+
+def hard_scenes() -> list[Scene]:
+    """Slender and softly held bodies, states with small forces, and where too large a scale broke down."""
+    found = []
+
+    def add(group, name, programme, tol=1e-8, goes_on=False, **body):
+        name = f"{name} {law}, {programme}"
+        found.append(Scene(group, name, programme, body | friction, tol=tol, goes_on=goes_on))
+
+    for law, friction in LAWS.items():
+        for slender, nx in ((3, 6), (10, 20), (30, 30), (60, 60), (100, 60)):
+            add("cantilevers", f"L/W {slender}", "tip", edges=(slender, 1.0, 1.0), cells=(nx, 2, 2), tip=2.5 * slender / nx)  # fmt: skip
+            add("columns", f"L/W {slender}", "press", edges=(1.0, 1.0, slender), cells=(2, 2, nx // 2))  # fmt: skip
+        for spring, programme in product((1e-7, 1e-8, 1e-9), ("press", "rocking")):
+            add("softest springs", f"spring {spring:g}", programme, spring=spring)
+        for spring in (1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-9):
+            add("own weight on springs", f"spring {spring:g}", "weight", spring=spring, loads=True)
+        for spring in (1e-2, 1e-4, 1e-6, 1e-9):
+            add("own weight on springs", f"143 nodes spring {spring:g}", "weight", spring=spring, loads=True, cells=(12, 10, 2))  # fmt: skip
+        for spring in (1e-4, 1e-9):
+            add("softest springs", f"143 nodes spring {spring:g}", "rocking", spring=spring, cells=(12, 10, 2))  # fmt: skip
+        for programme in ("deep unloading", "deep unloading after a drag"):
+            add("deep unloading", "block", programme)
+        for cells in ((4, 4, 2), (8, 8, 2)):
+            add("partial lift-off", f"cells {cells}", "tilting", cells=cells)
+        for ratio, thickness in product((1e4, 1e-4), (0.1, 0.01)):
+            add("thin coatings", f"modulus {ratio:g} thickness {thickness:g}", "press", coat=(ratio, thickness), cells=(4, 4, 3))  # fmt: skip
+        for programme in ("press", "turning"):
+            add("tiny and huge elements", "1 to 1000", programme, grade=1e3, cells=(8, 8, 2))
+        for programme in ("unloaded", "after a load was removed"):
+            add("sliding without load", "block", programme, goes_on=True)
+        add("sliding without load", "no contact", "unloaded", goes_on=True, touching=False)
+        for k, tol in ((6, 1e-10), (8, 1e-8)):
+            add("lift after a light touch", f"tol {tol:g}", f"lift after a touch of 1e-{k}", tol, True, E=1.0, cells=(4, 4, 3))  # fmt: skip
+        for k in range(9, 15):
+            add("grazing while sliding", "block", f"grazing at 1e-{k}")
+            found.append(Scene("grazing condensed", f"depth 1e-{k} {law}", "condensed", friction, depth=10.0**-k))  # fmt: skip
     return found

@@ -20,5 +20,5 @@ def summary(records: list[dict]) -> str:
 
 def _outcomes(records) -> str:
     count = Counter(r["outcome"] for r in records)
-    wrong = f", {count['WRONG']} WRONG" if count["WRONG"] else ""
-    return f"{count['solved']} / {len(records)}{wrong}" if records else "–"
+    others = "".join(f", {count[o]} {o}" for o in ("rounding", "WRONG") if count[o])
+    return f"{count['solved']} / {len(records)}{others}" if records else "–"

@@ -1,4 +1,4 @@
-"""Random condensed contact problems with a known solution, and a judge that shares nothing with the solver.
+"""Random condensed contact problems with a known solution.
 
 Everything here is NumPy alone, written from the paper; of the package nothing is imported.
 """

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: MIT
 """solve_condensed on plain arrays: every answer is judged by NumPy code that shares nothing with it."""
 
+import judge
 import numpy as np
 import pytest
 import scipy.sparse
 import twin_solver
-from condensed_scenes import judge, random_problem
+from condensed_scenes import random_problem
 
 from dolfinx_contact import Friction
 from dolfinx_contact.condensed_newton import (
@@ -16,8 +17,6 @@ from dolfinx_contact.condensed_newton import (
 )
 
 TOL = 1e-8
-# The judge's bisection and the solver's projection differ by rounding, nothing else.
-ROUNDING = 1e-6
 
 
 def friction(scene):
@@ -34,12 +33,10 @@ def check(scene, **options):
     """Solve; judge; return the result."""
     found = solve_condensed(scene.W, scene.q, friction(scene), **options)
     tol = options.get("tol", TOL)
-    errors = judge(scene.W, scene.q, scene.mu, scene.p, found.reaction)
-    assert errors[0] <= tol * (1 + ROUNDING) + 1e-13 and errors[1] <= 2 * tol
-    assert errors[0] == pytest.approx(found.error, rel=1e-3, abs=1e-13)
-    # At the edge of the cone rounding decides between |du| and |du + |du| d|, up to twice as much.
-    assert found.slip_error / 2.01 - 1e-13 <= errors[1] <= 2.01 * found.slip_error + 1e-13
     W = scene.W.toarray() if scipy.sparse.issparse(scene.W) else scene.W
+    # The law; how far reactions are from tight ones where W has no full rank is the stress matrix' question.
+    verdict = judge.condensed(W, scene.q, scene.mu, scene.p, found.reaction, tol)
+    assert verdict.error <= judge.DEFECT * tol
     w = scene.q + (W @ found.reaction.ravel()).reshape(scene.q.shape)
     assert found.displacement == pytest.approx(
         w, abs=1e-12 * np.abs(W).max() * np.abs(found.reaction).max()

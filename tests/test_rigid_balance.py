@@ -101,6 +101,6 @@ def test_fixed_point_solves_what_soft_springs_hold(cells, stiffness):
         step = own.problem.solve()
         newton.problem.solve()
         assert step.iterations <= 40
-        bound = 1000 * own.problem.tol
+        bound = 1000 * own.problem.tol  # the judge's bound of reactions, see judge.py
         (_, found), (_, expected) = scenes.gathered(own.contact), scenes.gathered(newton.contact)
         assert np.abs(found - expected).max() <= bound * np.abs(expected).max()

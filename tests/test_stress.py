@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A tenth of the stress matrix (benchmarks/stress.py): answers that the twin confirms, or exceptions."""
+"""A tenth of the stress matrix (benchmarks/stress.py): answers that the judge confirms, or exceptions."""
 
 import sys
 from pathlib import Path
@@ -9,26 +9,36 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import stress
-from stress_scenes import scenes, small
+from stress_scenes import hard_scenes, scenes, small
 
 LONG = ("six cycles", "1000 tiny steps")
 # Four solutions are known, and rounding decides whether a start leads to one, see docs/solvers.md.
 CHAOTIC = {"seed 143"}
-TENTH = [scene for scene in scenes()[::10] if scene.programme not in LONG]
+# Where forces are a billionth of what cancels, double precision may allow less than tol; the answer then says so.
+ROUNDED = ("softest springs", "grazing while sliding", "grazing condensed")
+HARD = hard_scenes()
+NAMES = {(scene.group, scene.name) for scene in HARD}
+OLD = [scene for scene in scenes() if (scene.group, scene.name) not in NAMES]
+TENTH = [scene for scene in OLD[::10] if scene.programme not in LONG]
+FIRST = list({scene.group: scene for scene in reversed(HARD)}.values())  # of each group
+SOME = [scene for scene in HARD[::10] if scene not in FIRST and "143 nodes" not in scene.name]
 
 
-@pytest.mark.parametrize("scene", TENTH, ids=lambda scene: f"{scene.group}: {scene.name}")
+@pytest.mark.parametrize(
+    "scene", TENTH + FIRST + SOME, ids=lambda scene: f"{scene.group}: {scene.name}"
+)
 def test_default_solves_or_says_so(scene):
     """No wrong answer and no silent failure; the default choice solves all but one, which it may refuse."""
     record = stress.run(scene, None)
-    allowed = {"solved", "refused"} if scene.name in CHAOTIC else {"solved"}
+    allowed = {"solved"} | ({"refused"} if scene.name in CHAOTIC else set())
+    allowed |= {"rounding"} if scene.group in ROUNDED else set()
     assert record["outcome"] in allowed, record
 
 
 def test_there_are_enough_scenes():
-    """At least 400, no two alike."""
+    """At least 600, no two alike."""
     every = scenes()
-    assert len(every) >= 400 and len({(s.group, s.name) for s in every}) == len(every)
+    assert len(every) >= 600 and len({(s.group, s.name) for s in every}) == len(every)
 
 
 def test_small_scenes_are_the_same_scenes():
@@ -37,7 +47,7 @@ def test_small_scenes_are_the_same_scenes():
         less = small(scene)
         assert (less.group, less.name, less.seed) == (scene.group, scene.name, scene.seed)
         assert less.body.items() >= scene.body.items()
-        assert less.seed is not None or (
+        assert less.condensed or (
             len(less.tops) == len(scene.tops)
             if scene.programme != LONG[1]
             else len(less.tops) == 90

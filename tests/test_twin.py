@@ -1,4 +1,4 @@
-"""The package against its slow twin, which shares neither law nor error nor solver with it."""
+"""The package against its slow twin and the judge, which share neither law nor error nor solver with it."""
 
 import dolfinx.fem.petsc
 import numpy as np
@@ -7,6 +7,7 @@ import scenes
 import twin_solver
 import ufl
 from dolfinx import fem
+from judge_scene import SceneJudge
 from mpi4py import MPI
 
 from dolfinx_contact._dolfinx import bc_dofs
@@ -38,7 +39,7 @@ def dense_stiffness(scene):
     "case", [*list(CASES)[:-1], pytest.param("crossed", marks=pytest.mark.slow)]
 )
 def test_programme_agrees_with_the_twin(case):
-    """Every step's reactions and error agree with the twin's to 1e-8; history goes along."""
+    """Every step's reactions agree with the twin's to 1e-8 and the judge accepts it; history goes along."""
     cells, mu, p = CASES[case]
     scene = scenes.block(comm=MPI.COMM_SELF, cells=cells, mu=mu, p=p)
     contact, d = scene.contact, len(cells)
@@ -59,6 +60,7 @@ def test_programme_agrees_with_the_twin(case):
     W = np.einsum("aj,ijkl,bl->iakb", frame, block, frame)
     before = np.zeros((nodes.size, d))
     kappa = np.array([K[d * i + d - 1, d * i + d - 1] for i in nodes])
+    of = SceneJudge(scene, mu, p)
     for top in PROGRAMMES[d][: 2 if p[0] != mu[0] else None]:  # the twin is slow where p is small
         scene.move_top(*top)
         step = scene.problem.solve()
@@ -70,6 +72,8 @@ def test_programme_agrees_with_the_twin(case):
         q = w - np.column_stack([before[:, :-1], np.zeros(nodes.size)])
         expected = twin_solver.solve(W, q, mu, p)
         assert np.abs(contact.reaction - expected).max() <= 1e-8 * np.abs(expected).max()
+        verdict = of.verdict(scene.problem.tol)
+        assert verdict.accepts(scene.problem.tol), verdict
         # The error, from the package's own displacement and reactions.
         u = scene.u.x.array
         local = u.reshape(-1, d)[nodes] @ frame.T

@@ -1,4 +1,4 @@
-"""A slow twin of law, error and solver, in NumPy, written from the paper and not from the package.
+"""A slow twin of law and solver, in NumPy, written from the paper and not from the package.
 
 Everything is dense and node by node: the body is its full stiffness matrix, the contact problem is
 condensed to the contact nodes, and solved by block Gauss-Seidel in the scaled variables in which

@@ -1,0 +1,86 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The judge on DOLFINx scenes: the library's answers spoiled, a stiffness of the wrong sign, outcomes of the matrix."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import dolfinx_contact as dc
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+import stress
+from judge import Verdict
+from judge_scene import SceneJudge
+from stress_bodies import build
+from stress_scenes import LAWS
+
+TOL = 1e-8
+
+
+def pressed(law="A", **body):
+    """A block pressed and dragged in one step, its judge, and the record of the step."""
+    scene = build(**LAWS[law], **body)
+    of = SceneJudge(scene, **LAWS[law])
+    problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], bcs=scene.bcs, tol=TOL)
+    scene.move_top((0.001, 0.0005, -0.01))
+    return scene, of, problem.solve()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_scaled_reactions_are_rejected(law):
+    """What the library found is accepted, and with reactions larger by a thousandth rejected."""
+    scene, of, _ = pressed(law)
+    assert of.verdict(TOL).accepts(TOL)
+    of.restart()
+    scene.contact.reaction = 1.001 * scene.contact.reaction
+    assert not of.verdict(TOL).accepts(TOL)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_nothing_done_is_rejected(law):
+    """The body as it was, under a top that has moved: no reactions, no equilibrium; and moved rigidly with the top into
+    the plane, in equilibrium without a force."""
+    scene, of, _ = pressed(law)
+    scene.contact.reaction = np.zeros_like(scene.contact.reaction)
+    for rigid in (False, True):
+        of.restart()
+        scene.u.x.array[:] = 0 if not rigid else np.tile((0.001, 0.0005, -0.01), of.body.free.size // 3 + of.fixed.size // 3)  # fmt: skip
+        scene.u.x.array[of.fixed] = scene.held.x.array[of.fixed]
+        found = of.verdict(TOL)
+        assert not found.accepts(TOL)
+        assert found.excess("normal" if rigid else "equilibrium") > 1e-2
+
+
+def test_negative_moduli_are_refused_or_rejected():
+    """A modulus of the wrong sign: the library raises, or the judge says that the answer is none."""
+    try:
+        _, of, _ = pressed(E=-210e3)
+    except (ValueError, dc.NotConverged, dc.LinearSolverError):
+        return
+    found = of.verdict(TOL)
+    assert found.notes and not found.accepts(TOL)
+    assert found.excess("normal") > 1e-2
+
+
+def outcome(excess, step_error):
+    """Outcome of a step with this error, judged off by this much."""
+    zero = dict.fromkeys(("equilibrium", "supports", "normal", "cone", "slip", "reactions"), 0.0)
+    record = dict(outcome="solved", error=0.0, slip_error=0.0, reactions=0.0, rounding=0.0, steps=0)
+    verdict = Verdict(1.0, 1.0, zero | dict(equilibrium=excess), zero)
+    step = SimpleNamespace(error=step_error)
+    level = stress.level(step, TOL)
+    stress.note(record, verdict, level, level > TOL)
+    return record["outcome"]
+
+
+def test_outcomes():
+    """Ten times the tolerance is allowed; beyond it an answer is wrong, unless it said so itself, and then within ten times
+    what it said."""
+    assert outcome(9e-8, 9e-9) == "solved"
+    assert outcome(1.1e-7, 9e-9) == "WRONG"
+    assert outcome(1.1e-7, 1e-6) == "rounding"
+    assert outcome(1.1e-5, 1e-6) == "WRONG"
