@@ -262,6 +262,11 @@ class ElasticBody:
             self._elastic = self.solver(self.K)
         return self._elastic.ksp
 
+    @property
+    def exact(self) -> bool:
+        """Whether solves are exact and cheap, as with a factorisation.  Collective at first."""
+        return self.ksp.getType() == "preonly"
+
     def solver(self, A) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
         return LinearSolver(A, self.options, self.prefix, self.rigid_modes)

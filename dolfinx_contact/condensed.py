@@ -104,7 +104,7 @@ class CondensedBody:
             rounding = rounding + self._motion(x) - moved
         x, force, result = best
         self.past.append((q, force, self._tied))
-        forward = result.change + step.measure(x).largest
+        forward = max(result.change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
 
     def compliance(self) -> np.ndarray:

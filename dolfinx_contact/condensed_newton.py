@@ -249,9 +249,30 @@ def solve_condensed(
         q = np.einsum("nij,nj->ni", turns, q)
     operator = _kernel.CondensedOperator(W, dim)
     try:
-        return _turned_back(solver.solve_condensed(operator, friction, q, tol, starts), turns)
+        found = solver.solve_condensed(operator, friction, q, tol, starts)
+        return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
+
+
+def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
+    """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
+
+    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off.
+    """
+    finer = (
+        solver if solver.slip_tol is None else CondensedNewton(**vars(solver) | {"slip_tol": None})
+    )
+    for factor in (1e-2, 1e-4):
+        if found.change <= tol or found.error <= found.rounding:
+            break
+        try:
+            found = finer.solve_condensed(
+                operator, friction, q, max(factor * tol, 1e-14), [found.reaction]
+            )
+        except CondensedNotConverged:
+            break
+    return found
 
 
 def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:

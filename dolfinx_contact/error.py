@@ -29,6 +29,9 @@ import numpy as np
 
 EPSILON = np.finfo(float).eps / 2  # of one operation
 
+# Rounding is an estimate: errors up to this many times as large may be no more than that.
+ROUNDED = 2.0
+
 
 class NodalStiffness(NamedTuple):
     """Blocks of the stiffness at the contact nodes, local frame, force per length."""
@@ -53,7 +56,8 @@ class Errors(NamedTuple):
 
     def within(self, tol: float) -> bool:
         """Whether both are at most ``tol``, or as small as double precision allows."""
-        return self.largest <= (max(tol, self.rounding) if self.acts else self.rounding)
+        rounding = ROUNDED * self.rounding
+        return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
 def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:

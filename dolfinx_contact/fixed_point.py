@@ -104,15 +104,21 @@ class BoundFixedPoint:
         search = Search(step, step.start() if start is None else start, options.max_seconds)
         newton = options.newton
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            search.begin(options.max_iterations)
-            while search.goes_on:
-                self._accelerate(search, self._set(factor), search.best)
+            self._fall(search, factor)
+            if not search.over and self.preconditioner.soften():
+                self._fall(search, factor)
             if newton and not search.over:
                 search_by_newton(search, self.preconditioner, search.best)
                 newton = False
             if search.over:
                 break
         return SolverResult(search.best, search.iterations, search.forward_error, "FixedPoint")
+
+    def _fall(self, search, factor: float) -> None:
+        """Iterate with one rho while the errors fall."""
+        search.begin(self._options.max_iterations)
+        while search.goes_on:
+            self._accelerate(search, self._set(factor), search.best)
 
     def _set(self, factor: float) -> list:
         """The maps with a rho, and a preconditioner that belongs to them."""

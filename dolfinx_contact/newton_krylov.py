@@ -16,8 +16,8 @@ from dolfinx_contact.maps import ReturnMap
 # against errors of reaction; the next one is taken where a step gets SHORT.
 NORMAL, TANGENTIAL, SHORT = 10.0, (0.1, 0.3, 0.03, 1.0), 0.25
 
-# Iterations at most.
-MOST = 600
+# Iterations at most, and those in which the smallest error has to halve.
+MOST, PATIENCE = 600, 100
 
 # Iterations of GMRES for one step at most, each of which keeps a vector, and the part of the residual it may leave.
 INNER, ACCURACY = 20, 0.1
@@ -35,7 +35,7 @@ def search_by_newton(search, preconditioner, x: np.ndarray) -> None:
         x: Displacement of owned degrees of freedom.
     """
     step = search.step
-    search.begin(MOST)
+    search.begin(MOST, PATIENCE)
     with closing(NewtonKrylov(step, preconditioner)) as newton:
         for tangential in cycle(TANGENTIAL):
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]

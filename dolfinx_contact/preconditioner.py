@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.linear_solver import stage
-from dolfinx_contact.rigid_balance import RigidBalance
+from dolfinx_contact.rigid_balance import RigidBalance, patch_motions
 from dolfinx_contact.surface_layer import SurfaceLayer
 
 
@@ -31,14 +31,29 @@ class ContactPreconditioner:
         with stage("contact: set-up of springs"):
             S, A = self._springs(maps), body.K.copy()
             A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            self.rigid = RigidBalance(body, contacts, A)
+            modes = [body.rigid_modes()]
+            if body.exact:  # else the motions of contacts are found when they are needed
+                modes.append(patch_motions(body, contacts))
+            self.rigid = RigidBalance(body, contacts, A, np.concatenate(modes, axis=1))
+            self._patched = body.exact
             self.stiffened = body.stiffened(A, S)
-        A.destroy()  # the solver has its own reference
+        self._A = A
         S.destroy()
+
+    def soften(self) -> bool:
+        """Look for more soft motions, of a step that does not converge; whether there are any new ones.  Collective."""
+        if self._patched:
+            return False
+        self._patched, known = True, len(self.rigid)
+        modes = (self._body.rigid_modes(), patch_motions(self._body, self._contacts))
+        rigid = RigidBalance(self._body, self._contacts, self._A, np.concatenate(modes, axis=1))
+        self.rigid = rigid if len(rigid) > known else self.rigid
+        return len(rigid) > known
 
     def destroy(self) -> None:
         """Free factors and levels.  Collective."""
         self.stiffened.destroy()
+        self._A.destroy()
         if self._layer is not None:
             self._layer.destroy()
 

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Rigid motions of a body that nothing but soft springs hold, balanced apart from the rest."""
+"""Motions of a body that soft springs or slenderness hardly resist, balanced apart from the rest."""
 
 from __future__ import annotations
 
@@ -11,31 +11,34 @@ import numpy as np
 # stiffness (up to 2300 times) more than halves its iterations.
 STIFFENED = 200.0
 
+# Motions whose part of their own, squared, is below this are combinations of others.
+DEPENDENT = 1e-10
+
 # Newton's method ends when the forces along the motions are this small beside those on all nodes.
 SMALL, NEWTON = 1e-3, 20
 
 
 class RigidBalance:
-    """Moves a body rigidly until the forces along its soft motions are in balance.
+    """Moves a body until the forces along its soft motions are in balance.
 
-    The springs of the preconditioner hold motions that the body's own supports hardly resist, so an iteration
-    hardly moves them.  Their balance ``Z^T (f - K u + R(K u - f, u)) = 0``, ``R`` the nodal map, has at most
-    six unknowns ``c`` of ``u + Z c`` and needs products at the contact nodes only: Newton's method, every step
+    The springs of the preconditioner hold motions that the body hardly resists, so an iteration
+    hardly moves them: rigid ones on soft supports, the bending of slender bodies.  Their balance ``Z^T (f - K u + R(K u - f, u)) = 0``, ``R`` the nodal map, has a few
+    unknowns ``c`` of ``u + Z c`` and needs products at the contact nodes only: Newton's method, every step
     halved until the forces along ``Z`` fall.
 
     Args:
         body: The elastic body, its stiffness assembled.
         contacts: Its contacts.
-        A: The stiffness plus springs of the preconditioner, a PETSc matrix.  Collective.
+        A: The stiffness plus springs of the preconditioner, a PETSc matrix.
+        modes: Motions that may be soft, ``shape=(owned dofs, k)``.  Collective.
 
     Attributes:
         modes: The soft motions ``Z``, ``shape=(owned dofs, m)``.
         forces: ``K Z``, of the same shape.
     """
 
-    def __init__(self, body, contacts, A):
+    def __init__(self, body, contacts, A, modes):
         self._body, self._contacts = body, contacts
-        modes = body.rigid_modes()
         forces = np.array([body.multiply(z) for z in modes.T]).T
         right, left = A.createVecs()
         stiffened = np.empty_like(modes)
@@ -45,7 +48,7 @@ class RigidBalance:
             column[:] = left.array_r
         energy, all_energy = body.total([modes.T @ forces, modes.T @ stiffened])
         # Motions orthonormal in the energy of A, by the share that K has in it: 1 where no spring acts.
-        root = np.linalg.inv(np.linalg.cholesky(all_energy)).T
+        root = _inverse_root(all_energy)
         share, vectors = np.linalg.eigh(root.T @ (energy + energy.T) @ root / 2)
         soft = root @ vectors[:, share < 1 / STIFFENED]
         self.modes, self.forces, self._energy = (
@@ -105,3 +108,27 @@ class RigidBalance:
         sums = np.concatenate((self.modes.T @ left, slope.ravel(), [scaled @ scaled]))
         sums = self._body.total(sums)  # one reduction
         return sums[:n], self._energy + sums[n:-1].reshape(n, n), np.sqrt(sums[-1])
+
+
+def patch_motions(body, contacts) -> np.ndarray:
+    """What the body gives way to forces and moments on each of its contacts, ``shape=(owned dofs, m)``.
+
+    The bending of a slender body is among them.  One solve with the stiffness for each.  Collective.
+    """
+    rigid, motions = body.rigid_modes(), [np.zeros((body.size, 0))]
+    for contact in contacts:
+        for z in rigid.T:
+            forces = np.zeros(body.size)
+            contact.points.add_forces(contact.points.motion(z), forces)
+            forces[body.fixed] = 0.0
+            if body.norm(forces) > 0.0:
+                motions.append(body.solve(forces, rough=True)[:, None])
+    return np.concatenate(motions, axis=1)
+
+
+def _inverse_root(energy: np.ndarray) -> np.ndarray:
+    """R with R^T energy R the identity, without the directions that are combinations of others."""
+    scale = 1 / np.sqrt(np.diag(energy))
+    values, vectors = np.linalg.eigh(scale[:, None] * energy * scale)
+    kept = values > DEPENDENT * values[-1]
+    return scale[:, None] * vectors[:, kept] / np.sqrt(values[kept])

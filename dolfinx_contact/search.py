@@ -13,9 +13,6 @@ import numpy as np
 # Steps over which the fall of the errors is taken.
 WINDOW = 3
 
-# Iterations in which the smallest error has to halve.
-PATIENCE = 100
-
 
 class Search:
     """Keeps the best iterate.
@@ -37,14 +34,15 @@ class Search:
     def __init__(self, step, x: np.ndarray, max_seconds: float):
         self.step, self.best = step, x
         self.error = self._smallest = self.forward_error = np.inf
+        self._rank = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=WINDOW + 1)
         self.iterations = self.left = 0
         self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
-    def begin(self, most: int) -> None:
-        """Once more, with so many iterations at most."""
-        self.left, self._lost = most, False
+    def begin(self, most: int, patience: float = math.inf) -> None:
+        """Once more, with so many iterations at most, in each ``patience`` of which the smallest error has to halve."""
+        self.left, self._lost, self._patience = most, False, patience
         self._halved, self._since = np.inf, self.iterations
 
     @property
@@ -63,13 +61,17 @@ class Search:
         self.error, tol = errors.largest, self.step.tol
         self._errors.append(self.error)
         change = errors.change * self._contraction()
-        if self.error < self._smallest:
-            self._smallest, self.best, self.forward_error = self.error, x, change
+        within = self.error <= tol  # of those the forward error counts, too
+        rank = (not within, max(self.error, change) if within else self.error)
+        if rank < self._rank:
+            self._rank, self.best, self.forward_error = rank, x, change
+        self._smallest = min(self._smallest, self.error)
         if self._smallest < 0.5 * self._halved:
             self._halved, self._since = self._smallest, self.iterations
-        self._lost = not np.isfinite(self.error) or self.iterations - self._since > PATIENCE
+        self._lost = not np.isfinite(self.error) or self.iterations - self._since > self._patience
         solved = errors.acts and max(self.error, change) <= tol
-        rounded = errors.within(tol) and len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error  # fmt: skip
+        stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error
+        rounded = stalled and errors.within(0.0)
         self.over = bool(solved or rounded or self._late())
         return x, residual
 
