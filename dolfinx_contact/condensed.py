@@ -83,25 +83,27 @@ class CondensedBody:
         acting = self._body.norm(step.external)
         q, anchors = self._motion(free), slice(self.dim * self.nodes, None)
         starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
-        for factor in (0.1, 1e-2, 1e-3):  # this error is not quite the condensed problem's
+        base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
+        for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             result = self._reactions(q + rounding, factor * step.tol, starts, acting)
             iterations += result.iterations
             force = np.concatenate((result.reaction.ravel(), result.tied))
-            x, previous = self.displacement(free, force), error
+            x, previous = self.displacement(base, force - known), error
             error = step.measure(x).largest
             if not error < previous:
                 break
             best = x, force, result
             if max(error, result.change) <= step.tol:
                 break
-            starts = [force]
-            # Of the free state, whose forces may be far larger than those that act: another digit.
-            free = free + self._held_by.solve(step.b - self._held_by.multiply(free))
-            # Of W, which a long lever or a soft support makes large: slip and gap of the body itself count.
+            # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
+            # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
+            left = step.b + self._nodal(force) - self._held_by.multiply(x)
+            left[self._body.fixed] = 0.0
+            base, known, starts = x + self._held_by.solve(left), force, [force]
             moved = np.concatenate(
                 (result.displacement.ravel(), force[anchors] / self._scales["tied_stiffness"])
             )
-            rounding = rounding + self._motion(x) - moved
+            rounding = rounding + self._motion(base) - moved
         x, force, result = best
         self.past.append((q, force, self._tied))
         forward = max(result.change, step.measure(x).largest)
@@ -142,14 +144,18 @@ class CondensedBody:
         nodes, anchored = self._parts
         return np.concatenate((nodes.gather(local), anchored.gather(anchored.of(displacement))))
 
-    def displacement(self, trial: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Displacement of owned dofs at the forces of all rows, from the one without."""
+    def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Displacement of owned dofs with more forces of all rows than ``base`` has."""
+        correction = self._held_by.solve(self._nodal(force))
+        correction[self._body.fixed] = 0.0
+        return base + correction
+
+    def _nodal(self, force: np.ndarray) -> np.ndarray:
+        """Forces of all rows on owned degrees of freedom."""
         forces = np.zeros(self._body.size)
         self._parts[0].add_forces(force[: self.dim * self.nodes], forces)
         self._parts[1].add_forces(force[self.dim * self.nodes :], forces)
-        correction = self._held_by.solve(forces)
-        correction[self._body.fixed] = 0.0
-        return trial + correction
+        return forces
 
     def _reactions(self, q: np.ndarray, tol: float, starts, acting: float):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
