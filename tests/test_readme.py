@@ -57,3 +57,16 @@ def test_links_lead_somewhere(page):
         target = (page.parent / name).resolve() if name else page
         assert target.exists(), link
         assert not heading or heading in anchors(target), link
+
+
+def test_the_map_shows_every_module():
+    """CONTRIBUTING's map has every module of the package that is not private, and no file that is not there."""
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    rows = [line.split("|")[2:5] for line in text.splitlines() if line.count("|") == 5]
+    folders = ("cpp/include/dolfinx_contact", "dolfinx_contact", "tests")
+    cells = [[re.findall(r"`(\w+\.(?:h|py))`", cell) for cell in row] for row in rows]
+    for row in cells:
+        for folder, names in zip(folders, row):
+            assert all((ROOT / folder / name).exists() for name in names), names
+    modules = {file.name for file in (ROOT / "dolfinx_contact").glob("[!_]*.py")}
+    assert modules == {name for _, names, _ in cells for name in names}
