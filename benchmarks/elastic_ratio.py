@@ -29,7 +29,7 @@ from punch import CASES, Parameters, Punch, programme
 from report_run import commit, now
 from tables import table
 
-from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
 
 TITLES = [
     "unknowns", "ranks", "elastic: iterations, s", "case", "cycles: first step", "first unloading", "worst", "mean",

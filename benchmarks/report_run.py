@@ -142,7 +142,7 @@ def machine() -> dict:
     )
     from petsc4py import PETSc
 
-    from dolfinx_contact._dolfinx import version as dolfinx
+    from dolfinx_contact.compat import version as dolfinx
 
     return dict(
         processor=cpu[0].split(":")[1].strip() if cpu else platform.processor(),
@@ -179,9 +179,9 @@ class Memory:
 @contextmanager
 def counted():
     """Counts what the library does with its matrices, in a dictionary by name."""
-    from dolfinx_contact.body import ElasticBody
-    from dolfinx_contact.condensed import CondensedBody
-    from dolfinx_contact.linear_solver import LinearSolver
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.petsc.linear_solver import LinearSolver
+    from dolfinx_contact.solvers.condensed import CondensedBody
     from dolfinx_contact.step import LoadStep
 
     targets = (

@@ -16,7 +16,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 # isort: split
 from dolfinx import fem, mesh
 
-from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.compat import functionspace
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from punch import CASES, Parameters, Punch, programme
 from scipy.optimize import brentq
 
 import dolfinx_contact as dc
-from dolfinx_contact.dissipation import work_of_friction
+from dolfinx_contact.law.dissipation import work_of_friction
 
 RULES = ("library", "chord", "mean", "end")
 

@@ -7,7 +7,7 @@ checked against ``dc.ContactProblem``.
 """
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact._dolfinx import petsc_vec
+from dolfinx_contact.compat import petsc_vec
 
 # isort: split
 import numpy as np

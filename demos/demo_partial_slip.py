@@ -41,7 +41,7 @@
 from __future__ import annotations
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.compat import functionspace
 
 # isort: split
 import numpy as np

@@ -17,8 +17,8 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact._dolfinx import functionspace
-from dolfinx_contact._dolfinx import version as dolfinx_version
+from dolfinx_contact.compat import functionspace
+from dolfinx_contact.compat import version as dolfinx_version
 
 # isort: split
 import numpy as np

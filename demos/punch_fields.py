@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dolfinx_contact._dolfinx import functionspace, interpolation_points
+from dolfinx_contact.compat import functionspace, interpolation_points
 
 # isort: split
 import numpy as np

@@ -13,7 +13,7 @@ import math
 import gmsh
 from scipy.optimize import brentq
 
-from dolfinx_contact._dolfinx import model_to_mesh
+from dolfinx_contact.compat import model_to_mesh
 
 CONTACT, TOP = 1, 2  # tags of the facets z = 0 and z = height
 

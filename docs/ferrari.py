@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import mpmath as mp
 import numpy as np
 
-from dolfinx_contact.friction_cone import load_function, project_cone
+from dolfinx_contact.law.friction_cone import load_function, project_cone
 
 mp.mp.dps = 60
 UNIT = np.finfo(float).eps / 2

@@ -24,50 +24,52 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
-    from dolfinx_contact.bipotential import bipotential_gap as bipotential_gap
     from dolfinx_contact.checks import RoundingWarning as RoundingWarning
-    from dolfinx_contact.condensed_newton import CondensedNewton as CondensedNewton
-    from dolfinx_contact.condensed_newton import CondensedNotConverged as CondensedNotConverged
-    from dolfinx_contact.condensed_newton import CondensedResult as CondensedResult
-    from dolfinx_contact.condensed_newton import solve_condensed as solve_condensed
-    from dolfinx_contact.contact import Contact as Contact
-    from dolfinx_contact.contact import Status as Status
-    from dolfinx_contact.fixed_point import FixedPoint as FixedPoint
-    from dolfinx_contact.friction import Friction as Friction
-    from dolfinx_contact.friction_cone import load_function as load_function
-    from dolfinx_contact.friction_cone import project_cone as project_cone
-    from dolfinx_contact.history import History as History
-    from dolfinx_contact.linear_solver import LinearSolverError as LinearSolverError
-    from dolfinx_contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.contact.contact import Contact as Contact
+    from dolfinx_contact.contact.contact import Status as Status
+    from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
+    from dolfinx_contact.law.friction import Friction as Friction
+    from dolfinx_contact.law.friction_cone import load_function as load_function
+    from dolfinx_contact.law.friction_cone import project_cone as project_cone
+    from dolfinx_contact.law.wear import Wear as Wear
+    from dolfinx_contact.petsc.linear_solver import LinearSolverError as LinearSolverError
     from dolfinx_contact.problem import ContactProblem as ContactProblem
     from dolfinx_contact.problem import Counts as Counts
     from dolfinx_contact.problem import NotConverged as NotConverged
     from dolfinx_contact.problem import Step as Step
-    from dolfinx_contact.wear import Wear as Wear
+    from dolfinx_contact.results.history import History as History
+    from dolfinx_contact.solvers.condensed_newton import CondensedNewton as CondensedNewton
+    from dolfinx_contact.solvers.condensed_newton import (
+        CondensedNotConverged as CondensedNotConverged,
+    )
+    from dolfinx_contact.solvers.condensed_newton import CondensedResult as CondensedResult
+    from dolfinx_contact.solvers.condensed_newton import solve_condensed as solve_condensed
+    from dolfinx_contact.solvers.fixed_point import FixedPoint as FixedPoint
 
     __version__: str
 
 _HOME = {  # the module of every name
-    "CondensedNewton": "condensed_newton",
-    "CondensedNotConverged": "condensed_newton",
-    "CondensedResult": "condensed_newton",
-    "Contact": "contact",
+    "CondensedNewton": "solvers.condensed_newton",
+    "CondensedNotConverged": "solvers.condensed_newton",
+    "CondensedResult": "solvers.condensed_newton",
+    "Contact": "contact.contact",
     "ContactProblem": "problem",
     "Counts": "problem",
-    "FixedPoint": "fixed_point",
-    "Friction": "friction",
-    "History": "history",
-    "LinearSolverError": "linear_solver",
+    "FixedPoint": "solvers.fixed_point",
+    "Friction": "law.friction",
+    "History": "results.history",
+    "LinearSolverError": "petsc.linear_solver",
     "NotConverged": "problem",
-    "RigidPlane": "plane",
+    "RigidPlane": "contact.plane",
     "RoundingWarning": "checks",
-    "Status": "contact",
+    "Status": "contact.contact",
     "Step": "problem",
-    "Wear": "wear",
-    "bipotential_gap": "bipotential",
-    "load_function": "friction_cone",
-    "project_cone": "friction_cone",
-    "solve_condensed": "condensed_newton",
+    "Wear": "law.wear",
+    "bipotential_gap": "law.bipotential",
+    "load_function": "law.friction_cone",
+    "project_cone": "law.friction_cone",
+    "solve_condensed": "solvers.condensed_newton",
 }
 __all__ = list(_HOME)
 

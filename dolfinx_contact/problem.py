@@ -11,14 +11,14 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from dolfinx_contact import checkpoint
-from dolfinx_contact._errors import raised_together
-from dolfinx_contact.automatic import Automatic
-from dolfinx_contact.body import ElasticBody
+from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.contact import Contact
-from dolfinx_contact.linear_solver import stage
-from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.results import checkpoint
+from dolfinx_contact.solvers.automatic import Automatic
+from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.step import LoadStep
 
 

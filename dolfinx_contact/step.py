@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.contact import Status
+from dolfinx_contact.contact.contact import Status
 from dolfinx_contact.error import EPSILON, Errors, as_errors, contact_defects, contact_rounding
-from dolfinx_contact.maps import ReturnMap
+from dolfinx_contact.law.maps import ReturnMap
 
 
 class LoadStep:

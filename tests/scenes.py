@@ -10,7 +10,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc  # before dolfinx, which some releases want
-from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.compat import functionspace
 
 COMM = MPI.COMM_WORLD
 

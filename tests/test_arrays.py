@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from dolfinx_contact.bipotential import bipotential_gap
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.friction_cone import load_function, project_cone
+from dolfinx_contact.law.bipotential import bipotential_gap
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction_cone import load_function, project_cone
 
 
 @pytest.mark.parametrize("layout", ["C", "F", "strided", "reversed", "float32", "integers"])

@@ -8,8 +8,8 @@ import twin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dolfinx_contact.bipotential import bipotential_gap
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.bipotential import bipotential_gap
+from dolfinx_contact.law.friction import Friction
 
 EPS = np.finfo(float).eps
 LAWS = {

@@ -10,9 +10,9 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from dolfinx_contact import compliance, condensed
-from dolfinx_contact._dolfinx import functionspace
-from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.compat import functionspace
+from dolfinx_contact.solvers import compliance, condensed
+from dolfinx_contact.solvers.base import SolverResult
 
 CASES = {
     "isotropic": dict(mu=0.2, p=None),

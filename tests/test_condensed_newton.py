@@ -10,7 +10,7 @@ import twin_solver
 from condensed_scenes import random_problem
 
 from dolfinx_contact import Friction
-from dolfinx_contact.condensed_newton import (
+from dolfinx_contact.solvers.condensed_newton import (
     CondensedNewton,
     CondensedNotConverged,
     solve_condensed,

@@ -8,7 +8,7 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
-from dolfinx_contact.dissipation import work_of_friction
+from dolfinx_contact.law.dissipation import work_of_friction
 
 COMM = scenes.COMM
 EPS = np.finfo(float).eps

@@ -10,7 +10,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.compat import functionspace
 
 SOLVERS = {"default": lambda: None, "fixed point": dc.FixedPoint, "condensed": dc.CondensedNewton}
 every_solver = pytest.mark.parametrize("solver", SOLVERS)

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 
 def test_scalar_is_isotropic_and_associated():

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.friction_cone import load_function, project_cone
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction_cone import load_function, project_cone
 
 EPS = np.finfo(float).eps
 UNIT = EPS / 2  # unit of rounding

@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
-from dolfinx_contact._dolfinx import functionspace
+from dolfinx_contact.compat import functionspace
 
 COMM = scenes.COMM
 FRICTION = dc.Friction(mu=0.3)

@@ -7,9 +7,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
-from dolfinx_contact import linear_solver
-from dolfinx_contact._dolfinx import partitioner
-from dolfinx_contact.linear_solver import MULTIGRID
+from dolfinx_contact.compat import partitioner
+from dolfinx_contact.petsc import linear_solver
+from dolfinx_contact.petsc.linear_solver import MULTIGRID
 
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 # Cells of the block, and who owns them: flat elements are shared out like tiles, tall stacks by height.

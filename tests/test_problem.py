@@ -6,7 +6,7 @@ import scenes
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from dolfinx_contact.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID
 
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 CASES = {

@@ -64,9 +64,10 @@ def test_the_map_shows_every_module():
     text = (ROOT / "CONTRIBUTING.md").read_text()
     rows = [line.split("|")[2:5] for line in text.splitlines() if line.count("|") == 5]
     folders = ("cpp/include/dolfinx_contact", "dolfinx_contact", "tests")
-    cells = [[re.findall(r"`(\w+\.(?:h|py))`", cell) for cell in row] for row in rows]
+    cells = [[re.findall(r"`([\w/]+\.(?:h|py))`", cell) for cell in row] for row in rows]
     for row in cells:
         for folder, names in zip(folders, row):
             assert all((ROOT / folder / name).exists() for name in names), names
-    modules = {file.name for file in (ROOT / "dolfinx_contact").glob("[!_]*.py")}
+    package = ROOT / "dolfinx_contact"
+    modules = {file.relative_to(package).as_posix() for file in package.rglob("[!_]*.py")}
     assert modules == {name for _, names, _ in cells for name in names}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 EPS = np.finfo(float).eps
 coefficients = st.floats(1e-3, 1e3)

@@ -7,7 +7,7 @@ import ufl
 from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
-from dolfinx_contact._dolfinx import functionspace, model_to_mesh
+from dolfinx_contact.compat import functionspace, model_to_mesh
 
 gmsh = pytest.importorskip("gmsh")
 

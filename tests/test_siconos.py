@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from dolfinx_contact.bipotential import bipotential_gap
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.friction_cone import project_cone
+from dolfinx_contact.law.bipotential import bipotential_gap
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction_cone import project_cone
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),

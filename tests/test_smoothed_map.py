@@ -11,7 +11,7 @@ import pytest
 import twin
 
 from dolfinx_contact._kernel import make_law
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 EPS = np.finfo(float).eps
 PER_NODE = 10.0 ** np.random.default_rng(0).uniform(-1, 1, size=(2, 48, 2))

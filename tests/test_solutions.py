@@ -16,7 +16,7 @@ import scenes
 import solutions
 from punch import Parameters, Punch, programme
 
-from dolfinx_contact.linear_solver import DIRECT, MULTIGRID
+from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID
 
 pytestmark = pytest.mark.skipif(scenes.COMM.size > 1, reason="programs for one rank")
 

@@ -6,8 +6,8 @@ import scenes
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
-from dolfinx_contact.linear_solver import MULTIGRID, LinearSolver
-from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
+from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 
 def stiffened(**options):

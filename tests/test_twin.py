@@ -10,7 +10,7 @@ from dolfinx import fem
 from judge_scene import SceneJudge
 from mpi4py import MPI
 
-from dolfinx_contact._dolfinx import bc_dofs
+from dolfinx_contact.compat import bc_dofs
 
 CASES = {
     "A": ((4, 4, 2), 0.2, None),

@@ -68,7 +68,7 @@ template <int P> class Judge {
         Left left = measure(s, w, size);
         const double contacts = s.reaction.head(D * op_.nodes()).stableNorm();
         s.acting = std::max(std::min(contacts, load_), external_);
-        s.near_rounding = eps * std::max(left.size, left.slip_size) > 0.1 * tol_ * s.acting;
+        s.near_rounding = eps * std::max(left.size, left.slip_size) > 1e-2 * tol_ * s.acting;
         if (s.near_rounding && !free) {
             w = op_.W().accurate(q_, s.reaction);
             left = measure(s, w, size);

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from dolfinx_contact.linear_solver import stage
-from dolfinx_contact.rigid_balance import RigidBalance, patch_motions
-from dolfinx_contact.surface_layer import SurfaceLayer
+from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.solvers.rigid_balance import RigidBalance, patch_motions
+from dolfinx_contact.solvers.surface_layer import SurfaceLayer
 
 
 class ContactPreconditioner:

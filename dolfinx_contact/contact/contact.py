@@ -11,15 +11,15 @@ from dolfinx import fem
 from dolfinx.mesh import exterior_facet_indices, meshtags
 from mpi4py import MPI
 
-from dolfinx_contact import _dolfinx
-from dolfinx_contact._errors import raised_together
-from dolfinx_contact.dissipation import work_of_friction
+from dolfinx_contact import compat
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.contact.interface import ContactPoints, add_to
+from dolfinx_contact.contact.plane import RigidPlane
 from dolfinx_contact.error import EPSILON, NodalStiffness
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.interface import ContactPoints, add_to
-from dolfinx_contact.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.plane import RigidPlane
-from dolfinx_contact.wear import Wear
+from dolfinx_contact.law.dissipation import work_of_friction
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.law.wear import Wear
 
 
 class Status(IntEnum):
@@ -75,7 +75,7 @@ class Contact:
     """
 
     def __init__(self, V, facets, plane: RigidPlane, friction: Friction, wear: Wear | None = None):
-        if not _dolfinx.is_function_space(V):
+        if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
         gdim, fdim = mesh.geometry.dim, mesh.topology.dim - 1
@@ -376,7 +376,7 @@ class Contact:
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(1)
             form = fem.form(ufl.TestFunction(self.V)[0] * ds)
             work = fem.Function(self.V)
-            _dolfinx.assemble_into(work.x, form)
+            compat.assemble_into(work.x, form)
             self._area = work.x.array[self.points.dofs[:, 0]]
         return self._area
 
@@ -416,7 +416,7 @@ def _check_space(V) -> None:
             f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
             f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
         )
-    if _dolfinx.lagrange_degree(V) != 1:
+    if compat.lagrange_degree(V) != 1:
         raise ValueError(
             f"V must be continuous Lagrange of degree 1 (other orders are not supported yet), "
             f"got {V.ufl_element()}."

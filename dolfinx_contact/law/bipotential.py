@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.friction_cone import as_nodes
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction_cone import as_nodes
 
 
 def bipotential_gap(r, gap, slip_increment, friction: Friction):

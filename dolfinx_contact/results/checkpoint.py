@@ -14,10 +14,10 @@ from collections import deque
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact import _dolfinx
-from dolfinx_contact._errors import raised_together
-from dolfinx_contact.body import FreeState
-from dolfinx_contact.condensed import KEPT
+from dolfinx_contact import compat
+from dolfinx_contact.bodies.elastic import FreeState
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.solvers.condensed import KEPT
 
 
 def save(problem, path) -> None:
@@ -108,7 +108,7 @@ def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
 
 def _nodes(problem) -> dict[str, np.ndarray]:
     """Original indices of this rank's nodes, of the body and of each contact."""
-    original = _dolfinx.original_nodes(problem.u.function_space)
+    original = compat.original_nodes(problem.u.function_space)
     contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(problem.contacts)}
     return {"nodes": original} | contacts
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.linear_solver import LinearSolver
+from dolfinx_contact.petsc.linear_solver import LinearSolver
 
 
 class Anchors:

@@ -6,7 +6,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from dolfinx_contact import _dolfinx
+from dolfinx_contact import compat
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
@@ -80,7 +80,7 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
 
 def _connected_parts(V, comm) -> tuple[np.ndarray, int]:
     """Number of the connected part of the mesh that each local node is in, and how many there are."""
-    local = _local_parts(_dolfinx.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
+    local = _local_parts(compat.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
     # Names that no other rank uses; the owner of a node tells its name to those who see it as ghost.
     first = comm.exscan(local.max(initial=-1) + 1) or 0
     name = fem.Function(V)

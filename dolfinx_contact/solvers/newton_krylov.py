@@ -10,7 +10,7 @@ from itertools import cycle
 import numpy as np
 from petsc4py import PETSc
 
-from dolfinx_contact.maps import ReturnMap
+from dolfinx_contact.law.maps import ReturnMap
 
 # Augmentation parameters over the nodal stiffness, along the normal and along slip. The latter weights errors of slip
 # against errors of reaction; the next one is taken where a step gets SHORT.

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.compliance import fits
-from dolfinx_contact.condensed import components
-from dolfinx_contact.condensed_newton import CondensedNewton
-from dolfinx_contact.fixed_point import FixedPoint
-from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.compliance import fits
+from dolfinx_contact.solvers.condensed import components
+from dolfinx_contact.solvers.condensed_newton import CondensedNewton
+from dolfinx_contact.solvers.fixed_point import FixedPoint
 
 CROSSOVER = 400  # contact nodes, see docs/solvers.md
 

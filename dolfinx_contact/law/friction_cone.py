@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 
 def as_nodes(name: str, value, components: int | None, nodes: int | None = None) -> np.ndarray:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfinx_contact.anderson import Anderson
 from dolfinx_contact.checks import positive
-from dolfinx_contact.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.newton_krylov import search_by_newton
-from dolfinx_contact.preconditioner import ContactPreconditioner
-from dolfinx_contact.search import Search
-from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.solvers.anderson import Anderson
+from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.newton_krylov import search_by_newton
+from dolfinx_contact.solvers.preconditioner import ContactPreconditioner
+from dolfinx_contact.solvers.search import Search
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.

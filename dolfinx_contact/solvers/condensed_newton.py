@@ -12,7 +12,7 @@ import numpy as np
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning, finite, positive
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,9 @@ class CondensedNewton:
 
     def bind(self, body, contacts, stiffness, memory):
         """See ``solver.Solver``."""
-        from dolfinx_contact.condensed import CondensedBody  # arrays alone do without DOLFINx
+        from dolfinx_contact.solvers.condensed import (
+            CondensedBody,  # arrays alone do without DOLFINx
+        )
 
         return CondensedBody(self, body, contacts, stiffness, memory)
 

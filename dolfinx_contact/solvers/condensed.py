@@ -11,12 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact import _kernel
-from dolfinx_contact._errors import raised_together
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.compliance import Rows, bytes_needed, check_memory, compliance
-from dolfinx_contact.condensed_newton import CondensedNotConverged, principal_axes
-from dolfinx_contact.friction import Friction
-from dolfinx_contact.solver import SolverResult
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
+from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged, principal_axes
 
 KEPT = 64  # earlier steps: more than a cycle has
 

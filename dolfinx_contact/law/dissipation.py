@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.friction import Friction
+from dolfinx_contact.law.friction import Friction
 
 
 def work_of_friction(friction: Friction, before, slipped, reaction, slip_increment) -> np.ndarray:

@@ -7,8 +7,8 @@ from dolfinx import fem
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact import _dolfinx
-from dolfinx_contact.linear_solver import DIRECT, LinearSolver
+from dolfinx_contact import compat
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
@@ -106,7 +106,7 @@ class SurfaceLayer:
 def _near(body, contacts) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
     gdim = body.V.dofmap.index_map_bs
-    nodes = _dolfinx.cell_nodes(body.V)
+    nodes = compat.cell_nodes(body.V)
     near = fem.Function(body.V)
     for contact in contacts:
         near.x.array[contact.points.dofs] = 1.0
@@ -115,7 +115,7 @@ def _near(body, contacts) -> np.ndarray:
         marked = near.x.array[::gdim] > 0.0
         reached = nodes[marked[nodes].any(axis=1)]
         near.x.array[(gdim * reached[:, :, None] + np.arange(gdim)).ravel()] = 1.0
-        _dolfinx.add_to_owners(near.x)
+        compat.add_to_owners(near.x)
     free = near.x.array[: body.size] > 0.0
     free[body.fixed] = False
     return np.flatnonzero(free)

@@ -15,11 +15,12 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from dolfinx_contact import _dolfinx, rigid_motion
-from dolfinx_contact._errors import raised_together
-from dolfinx_contact.anchors import Anchors
-from dolfinx_contact.linear_solver import LinearSolver, preconditioner
-from dolfinx_contact.stiffened_multigrid import StiffenedMultigrid
+from dolfinx_contact import compat
+from dolfinx_contact.bodies import rigid_motion
+from dolfinx_contact.bodies.anchors import Anchors
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.petsc.linear_solver import LinearSolver, preconditioner
+from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
 
@@ -61,7 +62,7 @@ class ElasticBody:
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
         self._work = fem.Function(self.V)
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
-        fixed = [_dolfinx.bc_dofs(bc, self.size) for bc in self.bcs]
+        fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
         self.options = None if petsc_options is None else dict(petsc_options)
         self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
@@ -123,7 +124,7 @@ class ElasticBody:
         """
         lift = self._work.x.array.copy()
         lift[:] = 0.0
-        _dolfinx.set_bc_values(lift, self.bcs)
+        compat.set_bc_values(lift, self.bcs)
         digest = _digest(self._load_parameters)
         if self.comm.allreduce(digest != self._load_digest, op=MPI.LOR):
             self._external = -self.internal_force(np.zeros_like(lift))
@@ -159,7 +160,7 @@ class ElasticBody:
         try:
             self.u.x.array[: values.size] = values
             self.u.x.scatter_forward()
-            _dolfinx.assemble_into(self._work.x, self._residual_form)
+            compat.assemble_into(self._work.x, self._residual_form)
         finally:
             self.u.x.array[:] = kept
         return self._work.x.array[: self.size].copy()

@@ -1,0 +1,1 @@
+"""Bodies as DOLFINx assembles them, without a word of contact."""

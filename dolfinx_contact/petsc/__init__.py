@@ -1,0 +1,1 @@
+"""Linear solvers: PETSc behind a few verbs."""

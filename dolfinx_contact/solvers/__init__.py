@@ -1,0 +1,1 @@
+"""Solvers of a load step, each bound to a body and its contacts."""
