@@ -5,20 +5,13 @@
 #include "py_law.h"
 
 namespace {
-double checked(double rounding) {
-    detail::require(rounding >= 0.0 && std::isfinite(rounding),
-                    "rounding must be finite and not negative", rounding);
-    return rounding;
-}
-
 template <int T> void bind_law(py::module_ &m, const char *name) {
     using Law = PyLaw<T>;
     using Call = typename Law::Call;
     const auto r = py::arg("r").noconvert(), tau = py::arg("tau").noconvert(),
                gap = py::arg("gap").noconvert(), slip = py::arg("slip").noconvert(),
                rho = py::arg("rho").noconvert(), rho_n = py::arg("rho_n").noconvert(),
-               rho_t = py::arg("rho_t").noconvert(), branch = py::arg("branch").noconvert(),
-               rounding = py::arg("rounding");
+               rho_t = py::arg("rho_t").noconvert(), branch = py::arg("branch").noconvert();
 
     py::class_<Law> law(m, name);
     law.def_property_readonly("kind", [](const Law &self) {
@@ -57,18 +50,6 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
             return Call(self, "r", r).gap(gap).slip(slip).rho(rho_n, rho_t).reaction(ReturnMap{});
         },
         r, gap, slip, rho_n, rho_t, "Projection in the metric of the slip rule: (r, branch)");
-    law.def(
-        "smoothed_map",
-        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho_n,
-           const Array &rho_t, double rounding) {
-            return Call(self, "r", r)
-                .gap(gap)
-                .slip(slip)
-                .rho(rho_n, rho_t)
-                .reaction(SmoothedMap{checked(rounding)});
-        },
-        r, gap, slip, rho_n, rho_t, rounding,
-        "return_map, its corner rounded off by a length: (r, branch of return_map)");
 
     law.def(
         "project_jacobian",
@@ -106,18 +87,6 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
         },
         r, gap, slip, rho_n, rho_t,
         "return_map and its derivatives: (r, branch, by r, by (slip, gap))");
-    law.def(
-        "smoothed_jacobian",
-        [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho_n,
-           const Array &rho_t, double rounding) {
-            return Call(self, "r", r)
-                .gap(gap)
-                .slip(slip)
-                .rho(rho_n, rho_t)
-                .linearisation(SmoothedJacobian{checked(rounding)});
-        },
-        r, gap, slip, rho_n, rho_t, rounding,
-        "smoothed_map and its derivatives: (r, branch, by r, by (slip, gap))");
 
     law.def(
         "bipotential_gap",

@@ -139,35 +139,6 @@ class Law2D:
         """
         Part of the slip increment that the slip rule does not explain, (n,)
         """
-    def smoothed_jacobian(
-        self,
-        r: numpy.typing.NDArray[numpy.float64],
-        gap: numpy.typing.NDArray[numpy.float64],
-        slip: numpy.typing.NDArray[numpy.float64],
-        rho_n: numpy.typing.NDArray[numpy.float64],
-        rho_t: numpy.typing.NDArray[numpy.float64],
-        rounding: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.uint8],
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.float64],
-    ]:
-        """
-        smoothed_map and its derivatives: (r, branch, by r, by (slip, gap))
-        """
-    def smoothed_map(
-        self,
-        r: numpy.typing.NDArray[numpy.float64],
-        gap: numpy.typing.NDArray[numpy.float64],
-        slip: numpy.typing.NDArray[numpy.float64],
-        rho_n: numpy.typing.NDArray[numpy.float64],
-        rho_t: numpy.typing.NDArray[numpy.float64],
-        rounding: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
-        """
-        return_map, its corner rounded off by a length: (r, branch of return_map)
-        """
     @property
     def dim(self) -> int: ...
     @property
@@ -295,35 +266,6 @@ class Law3D:
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         Part of the slip increment that the slip rule does not explain, (n,)
-        """
-    def smoothed_jacobian(
-        self,
-        r: numpy.typing.NDArray[numpy.float64],
-        gap: numpy.typing.NDArray[numpy.float64],
-        slip: numpy.typing.NDArray[numpy.float64],
-        rho_n: numpy.typing.NDArray[numpy.float64],
-        rho_t: numpy.typing.NDArray[numpy.float64],
-        rounding: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.uint8],
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.float64],
-    ]:
-        """
-        smoothed_map and its derivatives: (r, branch, by r, by (slip, gap))
-        """
-    def smoothed_map(
-        self,
-        r: numpy.typing.NDArray[numpy.float64],
-        gap: numpy.typing.NDArray[numpy.float64],
-        slip: numpy.typing.NDArray[numpy.float64],
-        rho_n: numpy.typing.NDArray[numpy.float64],
-        rho_t: numpy.typing.NDArray[numpy.float64],
-        rounding: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
-        """
-        return_map, its corner rounded off by a length: (r, branch of return_map)
         """
     @property
     def dim(self) -> int: ...

@@ -116,24 +116,3 @@ def return_map(mu, p, r, x_n, du, rho_n, rho_t):
 
     angle = argmax_on_circle(nearness)
     return np.append(point(np.atleast_1d(angle))[:, 0], R)
-
-
-def smoothed_map(mu, p, r, x_n, du, rho_n, rho_t, rounding):
-    """The return map with ``lambda (R - |x|) = rho_t rounding`` for its complementarity of the multiplier
-    and the slack of the cone; lambda by bisection of its logarithm."""
-    R = max(0.0, r[-1] - rho_n * x_n)
-    if R == 0.0:
-        return np.zeros(len(r))
-    q = (np.asarray(p) / np.max(p)) ** 2
-    z = (r[:-1] - rho_t * du) / mu
-
-    def point(exponent):
-        return q * z / (q + np.exp(exponent))
-
-    low, high = -600.0, 600.0
-    for _ in range(64):
-        middle = (low + high) / 2
-        slack = R - np.linalg.norm(point(middle))
-        too_small = slack <= 0 or middle + np.log(slack) < np.log(rho_t * rounding)
-        low, high = (middle, high) if too_small else (low, middle)
-    return np.append(mu * point(high), R)

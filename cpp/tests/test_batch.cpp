@@ -70,9 +70,6 @@ template <class Law, class S> auto at_node(ScaledMap, const Law &law, const S &s
 template <class Law, class S> auto at_node(ReturnMap, const Law &law, const S &s) {
     return return_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
 }
-template <class Law, class S> auto at_node(SmoothedMap f, const Law &law, const S &s) {
-    return smoothed_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t, f.rounding);
-}
 
 /// Nodal result by the function of one node, in the frame of the arrays.
 template <class Law, class F>
@@ -129,7 +126,6 @@ TEST(Batch, equals_node_by_node) {
         check(source, EuclideanProjection{});
         check(source, BipotentialMap{});
         check(source, ReturnMap{});
-        check(source, SmoothedMap{0.1});
         check(source, ScaledMap{});
     };
     check_all(Uniform<Isotropic<2>>{{0.4}});
@@ -159,7 +155,6 @@ TEST(Batch, frictionless_touches_no_tangential_memory) {
     check_map(BipotentialMap{});
     check_map(ScaledMap{});
     check_map(ReturnMap{});
-    check_map(SmoothedMap{0.1});
 }
 
 // Results may overwrite inputs.

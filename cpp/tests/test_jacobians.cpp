@@ -18,8 +18,6 @@ template <int T> struct Result {
     Derivative<T> derivative;
 };
 
-constexpr double rounding = 1.0; // of the smoothed map
-
 /// One of the maps at a state, by its derivative function.
 template <class Law, int T = Law::tangents>
 Result<T> linearised(int map, const Law &law, const Vector<T> &state, double rho) {
@@ -34,10 +32,8 @@ Result<T> linearised(int map, const Law &law, const Vector<T> &state, double rho
         out = bipotential_jacobian(law, r, gap, slip, rho);
     else if (map == 2)
         out = scaled_jacobian(law, r, gap, slip, rho);
-    else if (map == 3)
-        out = return_jacobian(law, r, gap, slip, rho, 0.5 * rho);
     else
-        out = smoothed_jacobian(law, r, gap, slip, rho, 0.5 * rho, rounding);
+        out = return_jacobian(law, r, gap, slip, rho, 0.5 * rho);
     Derivative<T> all;
     all << out.by_reaction, out.by_motion;
     return {out.value, all};
@@ -55,9 +51,7 @@ Reaction<T> value(int map, const Law &law, const Vector<T> &state, double rho) {
         return bipotential_map(law, r, gap, slip, rho);
     if (map == 2)
         return scaled_map(law, r, gap, slip, rho);
-    if (map == 3)
-        return return_map(law, r, gap, slip, rho, 0.5 * rho);
-    return smoothed_map(law, r, gap, slip, rho, 0.5 * rho, rounding);
+    return return_map(law, r, gap, slip, rho, 0.5 * rho);
 }
 
 template <class Law, int T = Law::tangents> Vector<T> random_state(const Law &law, Random &random) {
@@ -90,7 +84,7 @@ TYPED_TEST(Jacobians, are_the_limits_of_differences) {
     constexpr int T = TypeParam::tangents, N = 2 * (T + 1);
     constexpr double h = 1e-5;
     Random random(1);
-    for (int map = 0; map < 5; ++map) {
+    for (int map = 0; map < 4; ++map) {
         std::array<int, 3> checked{};
         for (int draw = 0; draw < 20000; ++draw) {
             const auto law = this->law(random);
@@ -99,13 +93,9 @@ TYPED_TEST(Jacobians, are_the_limits_of_differences) {
             const Result<T> at = linearised(map, law, state, rho);
             EXPECT_EQ(at.value.r, value(map, law, state, rho).r);
             const double slip = length(state.template segment<T>(T + 1));
-            const bool smoothed = map == 4, open = at.value.branch == Branch::open,
-                       curved = at.value.branch == Branch::slip || (smoothed && !open),
-                       near_apex = curved && at.value.r[T] < 0.1;
+            const bool near_apex = at.value.branch == Branch::slip && at.value.r[T] < 0.1;
             if ((map == 1 || map == 2) && slip < 0.2)
                 continue; // the kink of |du_t|, below
-            if (smoothed && load_function(law, at.value.r) < -0.99 * at.value.r[T])
-                continue; // a kink of the derivative: differences are of first order
             Derivative<T> differences;
             bool smooth = !near_apex;
             for (int i = 0; i < N && smooth; ++i) {
@@ -212,11 +202,9 @@ TEST(Frictionless, derivative_is_that_of_the_positive_part) {
         EXPECT_EQ(J(0, 0), n > 0.0 ? 1.0 : 0.0);
         EXPECT_EQ(at.branch, n > 0.0 ? Branch::slip : Branch::open);
         const Tangent<0> none;
-        for (const auto &out :
-             {bipotential_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0),
-              scaled_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0),
-              return_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0, 1.0),
-              smoothed_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0, 1.0, rounding)})
+        for (const auto &out : {bipotential_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0),
+                                scaled_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0),
+                                return_jacobian(Frictionless{}, Local<0>(n), 0.0, none, 3.0, 1.0)})
             EXPECT_EQ(out.by_motion(0, 0), n > 0.0 ? -3.0 : 0.0);
     }
 }

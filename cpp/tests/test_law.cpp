@@ -79,8 +79,6 @@ TEST(MakeLaw, frictionless_nodes_of_a_field) {
         expect(scaled_map(law, r, gap, slip, 2.0), scaled_map(Frictionless{}, rn, gap, none, 2.0));
         expect(return_map(law, r, gap, slip, 2.0, 1.0),
                return_map(Frictionless{}, rn, gap, none, 2.0, 1.0));
-        expect(smoothed_map(law, r, gap, slip, 2.0, 1.0, 0.1),
-               smoothed_map(Frictionless{}, rn, gap, none, 2.0, 1.0, 0.1));
         EXPECT_EQ(bipotential_gap(law, r, std::abs(gap), slip), r[2] * std::abs(gap));
         EXPECT_EQ(slip_defect(law, r, slip, Branch::slip), 0.0);
     }

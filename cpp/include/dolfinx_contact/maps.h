@@ -5,8 +5,9 @@
 /// batch.h.
 #pragma once
 
-#include "smoothed_map.h"
-
+#include "bipotential.h"
+#include "return_map.h"
+#include "slip_rule.h"
 namespace dolfinx_contact {
 /// What a function of one node may look at.
 template <int T> struct State {
@@ -53,14 +54,6 @@ struct ReturnMap {
     template <class Law, class P, class Root>
     auto point(const Law &law, const P &, double scale, const Root &root) const {
         return return_point(law, scale, root);
-    }
-};
-
-/// With a jump, and one equation after the other: not for loops that have to be fast.
-struct SmoothedMap {
-    double rounding;
-    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
-        return smoothed_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t, rounding);
     }
 };
 
@@ -118,13 +111,6 @@ struct ScaledJacobian {
 struct ReturnJacobian {
     template <class Law, class S> auto operator()(const Law &law, const S &s) const {
         return return_jacobian(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
-    }
-};
-
-struct SmoothedJacobian {
-    double rounding;
-    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
-        return smoothed_jacobian(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t, rounding);
     }
 };
 } // namespace dolfinx_contact
