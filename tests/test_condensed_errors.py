@@ -158,7 +158,9 @@ def test_change_is_what_is_missing():
     for seed in range(60):
         scene = random_problem(seed, contacts=6, rank=18, mu_range=(0.05, 0.4), ratio=2)
         law = Friction(scene.mu, scene.p)
-        operator = _kernel.CondensedOperator(scene.W, scene.q.shape[1])  # the public function goes on
+        operator = _kernel.CondensedOperator(
+            scene.W, scene.q.shape[1]
+        )  # the public function goes on
         loose = CondensedNewton().solve_condensed(operator, law, scene.q, 1e-6)
         tight = solved(scene.W, scene.q, law, tol=1e-13, r0=loose.reaction)
         distance = np.linalg.norm(loose.reaction - tight.reaction)

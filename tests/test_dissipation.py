@@ -265,6 +265,7 @@ def test_wear_depth_never_decreases():
     assert COMM.allreduce(c.wear_depth.sum()) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", "ABC")
 def test_increments_of_the_punch(case):
     """The first cycle's work in 15 increments is within 2 % of that in 120, in 60 within 0.2 %."""
