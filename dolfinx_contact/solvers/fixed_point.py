@@ -20,8 +20,9 @@ from dolfinx_contact.solvers.search import Search
 PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
-# and easy steps are nearly over. If the error then grows by more than GROWTH, it was too early.
-EVERY, GROWTH = 20, 100.0
+# and easy steps are nearly over. Where that does not converge it is tried SOONER: the second number. If the error
+# then grows by more than GROWTH, it was too early.
+EVERY, SOONER, GROWTH = 20, 10, 100.0
 
 # Corrections that grow by this mislead.
 ASTRAY = 1e3
@@ -104,9 +105,11 @@ class BoundFixedPoint:
         search = Search(step, step.start() if start is None else start, options.max_seconds)
         newton = options.newton
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            self._fall(search, factor)
+            self._fall(search, factor, EVERY)
             if not search.over and self.preconditioner.soften():
-                self._fall(search, factor)
+                self._fall(search, factor, EVERY)
+            if not search.over and options.max_iterations > EVERY:
+                self._fall(search, factor, SOONER)
             if newton and not search.over:
                 search_by_newton(search, self.preconditioner, search.best)
                 newton = False
@@ -114,11 +117,11 @@ class BoundFixedPoint:
                 break
         return SolverResult(search.best, search.iterations, search.forward_error, "FixedPoint")
 
-    def _fall(self, search, factor: float) -> None:
-        """Iterate with one rho while the errors fall."""
+    def _fall(self, search, factor: float, every: int) -> None:
+        """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
         search.begin(self._options.max_iterations)
         while search.goes_on:
-            self._accelerate(search, self._set(factor), search.best)
+            self._accelerate(search, self._set(factor), search.best, every)
 
     def _set(self, factor: float) -> list:
         """The maps with a rho, and a preconditioner that belongs to them."""
@@ -132,11 +135,11 @@ class BoundFixedPoint:
         self.preconditioner.forget_tangent()
         return maps
 
-    def _accelerate(self, search, maps, x: np.ndarray) -> None:
+    def _accelerate(self, search, maps, x: np.ndarray, every: int) -> None:
         """Anderson's method from ``x``, until the search ends or a tangent misleads."""
         step, tangent = search.step, np.inf  # error at the last tangent
         anderson = Anderson(x.size, self._options.depth, step.total)
-        smallest, due = np.inf, search.left - EVERY
+        smallest, due = np.inf, search.left - every
         while True:
             x = self.preconditioner.rigid.balanced(x, step, maps)
             x, residual = search.residual(x, maps)
@@ -148,7 +151,7 @@ class BoundFixedPoint:
                     self.preconditioner.linearise(step.derivatives(x, maps))
                     anderson.restart()
                     smallest = np.inf
-                tangent, due = search.error, search.left - EVERY
+                tangent, due = search.error, search.left - every
             following, norm = anderson.step(x, self.preconditioner.correct(residual))
             search.count(1)
             if norm > ASTRAY * smallest:  # the differences mislead: start again from the best
