@@ -26,7 +26,7 @@ except ImportError as error:
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
     from dolfinx_contact.checks import RoundingWarning as RoundingWarning
     from dolfinx_contact.contact.contact import Contact as Contact
-    from dolfinx_contact.contact.contact import Status as Status
+    from dolfinx_contact.contact.history import Status as Status
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
     from dolfinx_contact.law.friction import Friction as Friction
@@ -35,10 +35,10 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.law.wear import Wear as Wear
     from dolfinx_contact.petsc.linear_solver import LinearSolverError as LinearSolverError
     from dolfinx_contact.problem import ContactProblem as ContactProblem
-    from dolfinx_contact.problem import Counts as Counts
-    from dolfinx_contact.problem import NotConverged as NotConverged
-    from dolfinx_contact.problem import Step as Step
     from dolfinx_contact.results.history import History as History
+    from dolfinx_contact.results.record import Counts as Counts
+    from dolfinx_contact.results.record import NotConverged as NotConverged
+    from dolfinx_contact.results.record import Step as Step
     from dolfinx_contact.solvers.condensed_newton import CondensedNewton as CondensedNewton
     from dolfinx_contact.solvers.condensed_newton import (
         CondensedNotConverged as CondensedNotConverged,
@@ -55,16 +55,16 @@ _HOME = {  # the module of every name
     "CondensedResult": "solvers.condensed_newton",
     "Contact": "contact.contact",
     "ContactProblem": "problem",
-    "Counts": "problem",
+    "Counts": "results.record",
     "FixedPoint": "solvers.fixed_point",
     "Friction": "law.friction",
     "History": "results.history",
     "LinearSolverError": "petsc.linear_solver",
-    "NotConverged": "problem",
+    "NotConverged": "results.record",
     "RigidPlane": "contact.plane",
     "RoundingWarning": "checks",
-    "Status": "contact.contact",
-    "Step": "problem",
+    "Status": "contact.history",
+    "Step": "results.record",
     "Wear": "law.wear",
     "bipotential_gap": "law.bipotential",
     "load_function": "law.friction_cone",

@@ -141,3 +141,16 @@ def add_to_owners(x) -> None:
 def petsc_vec(u):
     """The PETSc vector of a Function: ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before."""
     return u.x.petsc_vec if hasattr(u.x, "petsc_vec") else u.vector
+
+
+def is_condition(bc) -> bool:
+    """Whether it is what ``dirichletbc`` returns."""
+    return hasattr(
+        bc if hasattr(bc, "dof_indices") else getattr(bc, "_cpp_object", 0), "dof_indices"
+    )
+
+
+def condition_lives_on(bc, V) -> bool:
+    """Whether a boundary condition is one on ``V`` or a part of it."""
+    space = bc.function_space
+    return V._cpp_object.contains(getattr(space, "_cpp_object", space))

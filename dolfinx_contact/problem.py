@@ -2,79 +2,37 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
-from dataclasses import dataclass
+from collections import deque
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.collective import raised_together
-from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.problem_input import (
+    check_mesh,
+    check_size,
+    checked_conditions,
+    checked_contacts,
+    checked_options,
+    checked_solver,
+    checked_tolerance,
+    hold,
+)
 from dolfinx_contact.results import checkpoint
-from dolfinx_contact.solvers.automatic import Automatic
+from dolfinx_contact.results.record import Counts, NotConverged, Step, counts, record
 from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.condensed import KEPT
 from dolfinx_contact.step import LoadStep
 
-
-class Counts(NamedTuple):
-    """Number of contact nodes by status, over all ranks."""
-
-    open: int
-    stick: int
-    slip: int
-
-
-@dataclass(frozen=True)
-class Step:
-    """Record of a load step, the same on all ranks.
-
-    Attributes:
-        error: What is out of balance, off the law or penetrates, over the forces that act; see
-            ``dolfinx_contact.error``.
-        slip_error: Defect of the slip rule, as a force over the forces that act; see the same place.
-        rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
-        forward_error: How far the reactions may still be from the exact ones, over the same forces: an
-            estimate from the solver's last correction.
-        bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
-        penetration: Largest penetration, >= 0, length.
-        iterations: Iterations of the solver; 0 if the contact-free state already was the solution.
-        seconds: Wall time of the step.
-        counts: Contact nodes open, sticking and slipping.
-        solver: The solver that was used, and why it was chosen where the user did not.
-        tried: What the solver tried, in order, where it has more than one method.
-    """
-
-    error: float
-    slip_error: float
-    rounding: float
-    forward_error: float
-    bipotential_gap: float
-    penetration: float
-    iterations: int
-    seconds: float
-    counts: Counts
-    solver: str
-    tried: tuple = ()
-
-
-class NotConverged(RuntimeError):
-    """A step did not reach its tolerance; the problem is back in its last converged state.
-
-    Attributes:
-        step: Record of the step, with what was tried.
-        displacement: The best one found, owned degrees of freedom; not a solution.
-        reactions: Of each contact in that state, local frame.
-    """
-
-    def __init__(self, message: str, step: Step, displacement, reactions):
-        super().__init__(message)
-        self.step, self.displacement, self.reactions = step, displacement, reactions
+LOG = logging.getLogger("dolfinx_contact")
 
 
 NOTHING = "none: nothing touches"
@@ -83,13 +41,13 @@ NOTHING = "none: nothing touches"
 CERTAIN = 0.1
 
 
-class ContactProblem:
+class ContactProblem(Guarded):
     """An elastic body pressed against rigid planes, solved load step by load step.
 
     Args:
         F: Residual form, internal minus external virtual work, linear in ``u``.
-        u: Displacement, a Function.  Holds the solution after a step; at the start of one it is only
-            a guess, the last converged state is kept inside.
+        u: Displacement, a Function.  Holds the solution after a step; at the start of one, the first too, it is
+            only a guess, the last converged state is kept inside.
         contacts: The contacts; no node in two of them.
         bcs: Dirichlet conditions; their values may change between steps.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
@@ -103,11 +61,17 @@ class ContactProblem:
         monitor: None, or a function ``f(iteration, error, counts)`` that is called on all ranks whenever a
             solver evaluates the residual of the whole body, with the largest error and ``Counts``.
 
+    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0.  ``close``, or ``with``, frees
+    what PETSc holds.
+
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
         NotImplementedError: ``F`` is not linear, or a tangential direction of a contact node is held
             that is no axis of its contact.
     """
+
+    _settable = ("monitor", "solver", "tol")
+    _remedy = "monitor, solver and tol may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
         self,
@@ -123,31 +87,72 @@ class ContactProblem:
     ):
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
-        with raised_together(u.function_space.mesh.comm):
-            self.contacts = _checked_contacts(contacts, u)
-            self.solver = Automatic() if solver is None else solver
-            if not callable(getattr(self.solver, "bind", None)) or isinstance(self.solver, type):
-                raise ValueError(
-                    f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
-                )
-            self.tol = _checked_tolerance(tol)
+        comm = u.function_space.mesh.comm
+        with raised_together(comm):
+            self.contacts = checked_contacts(contacts, u)
+            bcs = checked_conditions(bcs, u.function_space)
+            self.solver, self.tol = solver, tol
+            petsc_options = checked_options(petsc_options)
+        agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
+        agree(comm, solver=self.solver, tol=self.tol)
         self.u, self.monitor = u, None
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
-        with raised_together(self.body.comm):
-            for contact in self.contacts:
-                contact.points.held = _held_directions(contact, self.body.fixed)
+        hold(self.contacts, self.body)
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
-        self.reset()
+        self._laws = self._present_laws()
+        for contact in self.contacts:
+            contact.belong_to(self)
+        self._begin()
+        self._made = True
+
+    @property
+    def solver(self):
+        """The solver's options; another one may be assigned between steps, on all ranks."""
+        return self._solver
+
+    @solver.setter
+    def solver(self, solver) -> None:
+        self._solver = checked_solver(solver)
+
+    @property
+    def tol(self) -> float:
+        """The tolerance; another one may be assigned between steps, on all ranks."""
+        return self._tol
+
+    @tol.setter
+    def tol(self, tol: float) -> None:
+        self._tol = checked_tolerance(tol)
+
+    def __repr__(self) -> str:
+        nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
+        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
+        return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
 
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
+        self._check_owned()
+        self._begin()
+        self._restore()
+
+    def _begin(self) -> None:
+        """No history.  ``u`` is left: it is the guess of the first step."""
         self._states = [np.zeros(self.body.size)] * 2
         self.body.known = None
         self._memory.clear()
         for contact in self.contacts:
             contact.reset()
-        self._restore()
+
+    def close(self) -> None:
+        """Free what PETSc holds: matrices, factors, levels.  Collective; results stay, no step can follow."""
+        self._unbind()
+        self.body.close()
+
+    def __enter__(self) -> ContactProblem:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
 
     def solve(self) -> Step:
         """Solve one load step; the history advances when it succeeds.  Collective.
@@ -164,33 +169,31 @@ class ContactProblem:
         try:
             self._check_input()
             step, found = self._search()
-            record = self._record(step, found, perf_counter() - start)
-            if not self._converged(step.errors, record):
+            done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
+            if not self._converged(step.errors, done):
                 raise NotConverged(
-                    f"not converged: error {record.error:.3e}, slip error {record.slip_error:.3e}, forward error "
-                    f"{record.forward_error:.3e}, tol {self.tol:.1e}, rounding {record.rounding:.1e}, after {record.iterations} iterations "
-                    f"({record.counts.open} open, {record.counts.stick} sticking, {record.counts.slip} slipping nodes). "
-                    "Smaller load steps help most often.",
-                    record,
+                    f"not converged: {done}, tol {self.tol:.1e}. Smaller load steps help most often.",
+                    done,
                     found.x,
                     [contact.reaction for contact in self.contacts],
                 )
-        except BaseException:
+        except BaseException as failure:
+            self._log(f"step failed: {type(failure).__name__}: {failure}")
             self._restore()
             raise
         self._states = [found.x, self._states[0]]
         self._show(found.x)
         for contact in self.contacts:
             contact.advance()
-        if max(record.error, record.slip_error, record.forward_error) > self.tol:
+        self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
+        check_size(self.body, found.x)
+        if max(done.error, done.slip_error, done.forward_error) > self.tol:
             warnings.warn(
-                f"double precision allows no smaller error here: error {record.error:.1e}, slip error "
-                f"{record.slip_error:.1e}, forward error {record.forward_error:.1e}, rounding {record.rounding:.1e}, "
-                f"tol {self.tol:.1e}.",
+                f"double precision allows no smaller error here than at present, tol is {self.tol:.1e}: {done}.",
                 RoundingWarning,
                 stacklevel=2,
             )
-        return record
+        return done
 
     def save(self, path) -> None:
         """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
@@ -200,7 +203,9 @@ class ContactProblem:
         Args:
             path: File name, usually ending in ``.npz``.
         """
-        checkpoint.save(self, path)
+        self._check_owned()
+        past = self._memory.get("past", ())
+        checkpoint.save(path, self.body, self.contacts, self._states, past)
 
     def load(self, path) -> None:
         """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
@@ -211,7 +216,11 @@ class ContactProblem:
         Raises:
             ValueError: the file is no checkpoint of this problem.
         """
-        checkpoint.load(self, path)
+        self._check_owned()
+        self._states, past = checkpoint.load(path, self.body, self.contacts)
+        kept = self._memory.setdefault("past", deque(maxlen=KEPT))
+        kept.clear()
+        kept.extend(past)
         self._restore()
 
     def load_step(self) -> LoadStep:
@@ -283,7 +292,13 @@ class ContactProblem:
         """The user's monitor with the statuses of all nodes; None costs nothing."""
         if self.monitor is None:
             return None
-        return lambda iteration, error: self.monitor(iteration, error, self.counts())
+
+        def watch(iteration: int, error: float) -> None:
+            now = self.counts()
+            with raised_together(self.body.comm):
+                self.monitor(iteration, error, now)
+
+        return watch
 
     def _presses(self, trial: np.ndarray) -> bool:
         """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
@@ -314,43 +329,48 @@ class ContactProblem:
 
     # -- helpers -------------------------------------------------------------------------------
 
+    def _check_owned(self) -> None:
+        """Raise a ``ValueError`` if this problem can no longer go on."""
+        if self.body.closed:
+            raise ValueError("this ContactProblem has been closed: make a new one.")
+        if not all(contact.belongs_to(self) for contact in self.contacts):
+            raise ValueError(
+                "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
+                "go on with that one, or make a Contact for each."
+            )
+
     def _check_input(self) -> None:
-        moved = np.concatenate([c.plane.displacement for c in self.contacts] + [np.zeros(0)])
-        extremes = np.concatenate([moved, -moved])
-        self.body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
-        with raised_together(self.body.comm):
+        comm = self.body.comm
+        laws = comm.bcast([contact.described() for contact in self.contacts], root=0)
+        with raised_together(comm):
+            self._check_owned()
+            for contact, described in zip(self.contacts, laws):
+                contact.check(described)
+            for contact in self.contacts[:1]:  # of one mesh, all of them
+                check_mesh(contact)
             if not np.isfinite(self.u.x.array).all():
                 raise ValueError(
                     "u contains NaN or infinity: it is the guess of this step, set it anew."
                 )
-            if not np.isfinite(moved).all():
-                raise ValueError(f"plane.displacement must be finite, got {moved}.")
-            if (extremes[: moved.size] != -extremes[moved.size :]).any():
-                raise ValueError(f"plane.displacement differs between ranks: here {moved}.")
+        agree(comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
+        laws = self._present_laws()
+        changed = any(one is not other for one, other in zip(laws, self._laws))
+        if comm.allreduce(changed, op=MPI.LOR):
+            self._laws = laws
+            renew = getattr(self._bound, "renew_law", None)
+            if renew is None or not renew():
+                self._unbind()
 
-    def _record(self, step: LoadStep, found: SolverResult, seconds: float) -> Step:
-        gap, penetration = 0.0, 0.0
-        for contact in self.contacts:
-            gap += contact.bipotential_gap.sum()
-            penetration = max(penetration, -contact.gap.min(initial=0.0))
-        return Step(
-            error=step.errors.error,
-            slip_error=step.errors.slip_error,
-            rounding=step.errors.rounding,
-            forward_error=found.forward_error,
-            bipotential_gap=float(self.body.total(gap)),
-            penetration=self.body.largest(np.array([penetration])),
-            iterations=found.iterations,
-            seconds=self.body.largest(np.array([seconds])),
-            counts=self.counts(),
-            solver=found.chosen,
-            tried=found.tried,
-        )
+    def _present_laws(self) -> list:
+        return [contact.friction for contact in self.contacts]
+
+    def _log(self, line: str) -> None:
+        if self.body.comm.rank == 0:
+            LOG.info(line)
 
     def counts(self) -> Counts:
         """Contact nodes open, sticking and slipping in the present state.  Collective."""
-        counts = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
-        return Counts(*(int(count) for count in self.body.total(counts + np.zeros(3))))
+        return counts(self.body, self.contacts)
 
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x
@@ -360,57 +380,3 @@ class ContactProblem:
         self._show(self._states[0])
         for contact in self.contacts:
             contact.restore()
-
-
-def _checked_contacts(contacts, u) -> list[Contact]:
-    contacts = [contacts] if isinstance(contacts, Contact) else list(contacts)
-    taken = np.zeros(0, dtype=np.int64)
-    for contact in contacts:
-        if not isinstance(contact, Contact):
-            raise ValueError(
-                f"contacts must hold dc.Contact objects, got {type(contact).__name__}."
-            )
-        if contact.V != u.function_space:
-            raise ValueError(
-                "a contact lives on another space or mesh than u: build it on u.function_space."
-            )
-        twice = np.intersect1d(taken, contact.nodes)
-        if twice.size:
-            raise ValueError(
-                f"{twice.size} node(s) are in two contacts, the first at "
-                f"{contact.x[np.searchsorted(contact.nodes, twice[0])].tolist()}: separate their facets."
-            )
-        taken = np.union1d(taken, contact.nodes)
-    return contacts
-
-
-def _checked_tolerance(tol) -> float:
-    try:
-        value = float(tol)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 1e-13 <= value < np.inf:
-        raise ValueError(
-            f"tol must be a finite number of at least 1e-13 (rounding forbids less), got {tol!r}."
-        )
-    return value
-
-
-def _held_directions(contact: Contact, fixed: np.ndarray) -> np.ndarray:
-    """Tangential directions of the contact nodes that boundary conditions fix, ``shape=(n, gdim - 1)``."""
-    left = contact.points.free_of(fixed)
-    if (left[:, -1] < 1e-12).any():
-        node = np.argmin(left[:, -1])
-        raise ValueError(
-            f"the normal displacement of the contact node at {contact.x[node].tolist()} is fixed by a "
-            "boundary condition: contact and condition contradict each other, take the node out of one."
-        )
-    # What is left of each local direction without its fixed components: all, nothing, or a part.
-    partly = (left > 1e-12) & (left < 1 - 1e-12)
-    if partly.any():
-        node = np.argmax(partly.any(axis=1))
-        raise NotImplementedError(
-            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along "
-            "none of the axes of its contact: let plane.axis be along or across that direction."
-        )
-    return left[:, :-1] < 0.5

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.contact.contact import Status
 from dolfinx_contact.error import EPSILON, Errors, as_errors, contact_defects, contact_rounding
 from dolfinx_contact.law.maps import ReturnMap
 
@@ -132,8 +131,7 @@ class LoadStep:
         """Errors of a displacement without reactions."""
         for contact in self.contacts:
             contact.move(x)
-            contact.reaction = np.zeros_like(contact.reaction)
-            contact.status = np.full_like(contact.status, Status.OPEN)
+            contact.release()
         self._judge(x, -self.body.residual(x))
         return self.errors
 

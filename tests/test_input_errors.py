@@ -307,7 +307,7 @@ def test_a_soft_spring_holds_a_body(scene):
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-@pytest.mark.parametrize("place", ["load", "boundary value", "guess", "plane", "material"])
+@pytest.mark.parametrize("place", ["load", "boundary value", "guess", "material"])
 def test_nothing_that_is_not_finite_becomes_a_result(place, bad):
     """NaN or infinity anywhere in the input is a ValueError, and the last state stays usable."""
     scene = scenes.block(cells=(2, 2, 2))
@@ -321,14 +321,12 @@ def test_nothing_that_is_not_finite_becomes_a_result(place, bad):
         scene.held.x.array[:] = bad
     elif place == "guess":
         scene.u.x.array[:] = bad
-    elif place == "plane":
-        scene.plane.displacement[0] = bad
     else:
         scene.modulus.value = bad
-    with pytest.raises(ValueError, match="NaN or infinity|must be finite"):
+    with pytest.raises(ValueError, match="NaN or infinity"):
         scene.problem.solve()
     assert np.array_equal(scene.u.x.array, u)
     assert np.array_equal(scene.contact.reaction, reaction)
-    scene.force.value[0], scene.plane.displacement[0], scene.modulus.value = 0.0, 0.0, 210e3
+    scene.force.value[0], scene.modulus.value = 0.0, 210e3
     scene.move_top(0, 0, -0.02)
     assert scene.problem.solve().error <= 1e-10

@@ -36,7 +36,7 @@ def test_scaled_reactions_are_rejected(law):
     scene, of, _ = pressed(law)
     assert of.verdict(TOL).accepts(TOL)
     of.restart()
-    scene.contact.reaction = 1.001 * scene.contact.reaction
+    scene.contact.take(reaction=1.001 * scene.contact.reaction)
     assert not of.verdict(TOL).accepts(TOL)
 
 
@@ -45,7 +45,7 @@ def test_nothing_done_is_rejected(law):
     """The body as it was, under a top that has moved: no reactions, no equilibrium; and moved rigidly with the top into
     the plane, in equilibrium without a force."""
     scene, of, _ = pressed(law)
-    scene.contact.reaction = np.zeros_like(scene.contact.reaction)
+    scene.contact.release()
     for rigid in (False, True):
         of.restart()
         scene.u.x.array[:] = 0 if not rigid else np.tile((0.001, 0.0005, -0.01), of.body.free.size // 3 + of.fixed.size // 3)  # fmt: skip

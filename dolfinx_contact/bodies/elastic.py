@@ -5,12 +5,9 @@ All vectors are NumPy arrays of the degrees of freedom that this rank owns.
 
 from __future__ import annotations
 
-import hashlib
 from itertools import count
-from typing import NamedTuple
 
 import numpy as np
-import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -18,20 +15,14 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
+from dolfinx_contact.bodies.checks import check_diagonal, check_dilation
+from dolfinx_contact.bodies.forms import digest_of, linear_part
+from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.petsc.linear_solver import LinearSolver, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
-
-
-class FreeState(NamedTuple):
-    """The displacement without contact under a load, arrays of owned degrees of freedom."""
-
-    digest: np.ndarray  # of the stiffness
-    load: np.ndarray
-    displacement: np.ndarray
-    exact: bool  # or to three digits
 
 
 class ElasticBody:
@@ -55,7 +46,7 @@ class ElasticBody:
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
         with raised_together(self.comm):
-            derivative = _linear_part(F, u, J)
+            derivative = linear_part(F, u, J)
         self._residual_form = fem.form(F)
         self._stiffness_form = fem.form(derivative)
         self._parameters = [*derivative.coefficients(), *derivative.constants()]
@@ -69,7 +60,10 @@ class ElasticBody:
         self._digest, self._load_digest = None, None
         self._assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
-        self.known = None  # the last FreeState
+        self._coupling = self._lift = self._lifted = self._right = self._left = None
+        self.closed = False
+        self.known: FreeState | None = None  # the last one
+        self.extent = rigid_motion.extent(self.V)
 
     def refresh(self) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.
@@ -77,17 +71,34 @@ class ElasticBody:
         Returns:
             How often it was assembled so far: a number that changes with the matrix.
         """
-        digest = _digest(self._parameters)
+        digest = digest_of(self._parameters)
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
+        self._free_matrices()
         if self.K is None:
             self.K = fem.petsc.assemble_matrix(self._stiffness_form)
         else:
             self.K.zeroEntries()
             fem.petsc.assemble_matrix(self.K, self._stiffness_form)
         self.K.assemble()
-        # The forces of boundary values; then rows and columns of fixed dofs become the identity's.
+        # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
+        entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
+        diagonal = self.diagonal()
+        self._row_size = np.sqrt(entries) * np.abs(diagonal)
+        self._right, self._left = self.K.createVecs()
+        with raised_together(self.comm):
+            check_diagonal(diagonal, self.V)
+        check_dilation(self)
+        self._hold()
+        self.forget_solver()
+        self.soft = rigid_motion.soft_motions(self)
+        self._digest = digest
+        self._assemblies += 1
+        return self._assemblies
+
+    def _hold(self) -> None:
+        """Keep the forces of boundary values; then rows and columns of fixed dofs become the identity's."""
         first, last = self.K.getOwnershipRange()
         rows, fixed = (
             PETSc.IS().createGeneral(np.asarray(dofs, dtype=np.int32), comm=self.comm)
@@ -95,21 +106,35 @@ class ElasticBody:
         )
         self._coupling = self.K.createSubMatrix(rows, fixed)
         self._lift, self._lifted = self._coupling.createVecs()
-        # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
-        entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
-        self._row_size = np.sqrt(entries) * np.abs(self.K.getDiagonal().array_r)
         self.K.zeroRowsColumns(fixed)
-        with raised_together(self.comm):
-            if not np.isfinite(self.K.getDiagonal().array).all():
-                raise ValueError(
-                    "the stiffness contains NaN or infinity: check the material parameters in F."
-                )
-        self._right, self._left = self.K.createVecs()
+        for part in (rows, fixed):
+            part.destroy()
+
+    def diagonal(self) -> np.ndarray:
+        """Diagonal of K, owned degrees of freedom."""
+        diagonal = self.K.getDiagonal()
+        values = diagonal.array_r.copy()
+        diagonal.destroy()
+        return values
+
+    def stiffness_norm(self) -> float:
+        """Frobenius norm of K: to rounding the same however the mesh is shared.  Collective."""
+        return self.K.norm(PETSc.NormType.FROBENIUS)
+
+    def _free_matrices(self) -> None:
+        """Free what belongs to the last stiffness.  Collective."""
+        for part in ("_coupling", "_lift", "_lifted", "_right", "_left"):
+            if getattr(self, part) is not None:
+                getattr(self, part).destroy()
+            setattr(self, part, None)
+
+    def close(self) -> None:
+        """Free everything that PETSc holds.  Collective; nothing can be solved any more."""
         self.forget_solver()
-        self.soft = rigid_motion.soft_motions(self)
-        self._digest = digest
-        self._assemblies += 1
-        return self._assemblies
+        self._free_matrices()
+        if self.K is not None:
+            self.K.destroy()
+        self.K, self.closed = None, True
 
     # -- loads and residuals -------------------------------------------------------------------
 
@@ -125,7 +150,7 @@ class ElasticBody:
         lift = self._work.x.array.copy()
         lift[:] = 0.0
         compat.set_bc_values(lift, self.bcs)
-        digest = _digest(self._load_parameters)
+        digest = digest_of(self._load_parameters)
         if self.comm.allreduce(digest != self._load_digest, op=MPI.LOR):
             self._external = -self.internal_force(np.zeros_like(lift))
             self._load_digest = digest
@@ -213,7 +238,10 @@ class ElasticBody:
             b: As ``load`` returns it.
             rough: Three digits are enough, see ``linear_solver.ROUGH``; only where they are cheaper.
         """
-        start = self._known_state(b)
+        known = self.known
+        if known is not None and known.digest.tobytes() != self._digest:
+            known = None
+        start = None if known is None else known.scaled(b, self.fixed, self.comm)
         if start is not None and (rough or self.known.exact):
             return start
         x = self.solve(b, rough, start)
@@ -222,20 +250,6 @@ class ElasticBody:
         digest = np.frombuffer(self._digest, dtype=np.uint8)
         self.known = FreeState(digest, b.copy(), x.copy(), exact)
         return x
-
-    def _known_state(self, b: np.ndarray) -> np.ndarray | None:
-        """The last free state times a factor, if ``b`` is."""
-        if self.known is None or self.known.digest.tobytes() != self._digest:
-            return None
-        factor = max(self.comm.allgather(_ratio(b, self.known.load)))[1]
-        sizes = np.abs([b - factor * self.known.load, b])
-        # Forces and boundary values have different units: each to its own rounding.
-        fixed = np.zeros(b.size, dtype=bool)
-        fixed[self.fixed] = True
-        largest = np.array([sizes[:, part].max(axis=1, initial=0.0) for part in (fixed, ~fixed)])
-        self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-        same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
-        return factor * self.known.displacement if same else None
 
     def forget(self) -> None:
         """Assemble and set up everything anew when it is next needed."""
@@ -289,46 +303,3 @@ class ElasticBody:
         modes[self.fixed] = 0.0
         lower = np.linalg.cholesky(self.total(modes.T @ modes))
         return np.linalg.solve(lower, modes.T).T
-
-
-def _digest(parameters) -> bytes:
-    """A number that changes with the values of constants and coefficients."""
-    digest = hashlib.blake2b()
-    for parameter in parameters:
-        values = parameter.x.array if hasattr(parameter, "x") else parameter.value
-        digest.update(np.ascontiguousarray(values))
-    return digest.digest()
-
-
-def _ratio(b: np.ndarray, last: np.ndarray) -> tuple[float, float]:
-    """Largest entry of ``last`` in magnitude, and ``b`` over ``last`` there."""
-    if not last.any():
-        return 0.0, 0.0
-    k = np.abs(last).argmax()
-    return abs(last[k]), b[k] / last[k]
-
-
-def _linear_part(F, u, J):
-    """The bilinear form of F, after a check that F is linear in u."""
-    if not isinstance(F, ufl.Form) or len(F.arguments()) != 1:
-        raise ValueError(
-            f"F must be a residual form with one test function, as in DOLFINx's NonlinearProblem; got "
-            f"{type(F).__name__}"
-            + (f" of rank {len(F.arguments())}." if isinstance(F, ufl.Form) else ".")
-        )
-    if F.arguments()[0].ufl_function_space() != u.ufl_function_space():
-        raise ValueError("the test function of F lives on another space than u.")
-    derivative = ufl.algorithms.expand_derivatives(
-        ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
-    )
-    if derivative.empty():
-        raise ValueError(
-            "F does not depend on u: write it as residual, internal minus external work."
-        )
-    if J is not None:
-        derivative, given = ufl.algorithms.expand_derivatives(J), derivative
-        if any(c is u for c in given.coefficients()):
-            derivative = given
-    if any(c is u for c in derivative.coefficients()):
-        raise NotImplementedError("F is not linear in u: nonlinear bodies are not supported yet.")
-    return derivative

@@ -34,7 +34,7 @@ def soft_motions(body) -> np.ndarray:
     gdim = body.V.mesh.geometry.dim
     x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
     part, parts = _connected_parts(body.V, body.comm)
-    diagonal, soft = body.K.getDiagonal().array.copy(), [np.zeros((body.size, 0))]
+    diagonal, soft = body.diagonal(), [np.zeros((body.size, 0))]
     for k in range(parts):
         modes = rigid_modes(x, part[: x.shape[0]] == k, body.comm)
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
@@ -76,6 +76,14 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
         modes[:, i, k], modes[:, j, k] = -x[:, j], x[:, i]
     modes[~here] = 0.0
     return modes.reshape(gdim * n, modes.shape[2])
+
+
+def extent(V) -> float:
+    """Largest edge of the box around the body.  Collective."""
+    x, comm = V.tabulate_dof_coordinates(), V.mesh.comm
+    edges = np.concatenate((x.max(axis=0, initial=-np.inf), (-x).max(axis=0, initial=-np.inf)))
+    comm.Allreduce(MPI.IN_PLACE, edges, op=MPI.MAX)
+    return float((edges[:3] + edges[3:]).max())
 
 
 def _connected_parts(V, comm) -> tuple[np.ndarray, int]:

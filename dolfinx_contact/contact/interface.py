@@ -23,6 +23,7 @@ class ContactPoints:
         B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  There is neither
             slip nor friction in them: what the support carries is no reaction of the plane.
+        closed: Points whose motion along the normal is given, ``shape=(n,)``: they never touch.
     """
 
     def __init__(self, dofs: np.ndarray, frames: np.ndarray, size: int):
@@ -33,7 +34,13 @@ class ContactPoints:
         self.B = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
         self._forces = self.B.T.tocsr()
         self._magnitudes = abs(self.B)
-        self.held = np.zeros((self.count, self.dim - 1), dtype=bool)
+        self.hold(
+            np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
+        )
+
+    def hold(self, held: np.ndarray, closed: np.ndarray) -> None:
+        """Take note of what boundary conditions fix: directions ``held``, points ``closed``."""
+        self.held, self.closed = held, closed
 
     def motion(self, u: np.ndarray) -> np.ndarray:
         """Local components of the points' motion, ``shape=(n, gdim)``, from owned degrees of freedom."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfinx_contact.attributes import Guarded, frozen
+
 
 def _vector(name: str, value, size: int | None = None) -> np.ndarray:
     try:
@@ -28,7 +30,7 @@ def _unit(name: str, value, size: int) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-class RigidPlane:
+class RigidPlane(Guarded):
     """A rigid plane on which bodies press and slide.
 
     Args:
@@ -42,17 +44,21 @@ class RigidPlane:
         ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
 
     Attributes:
+        point, normal, axis: As given, the latter two of unit length; read-only.
         displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global
-            frame, length units; zero at first.  Change it between steps: the plane moves, and slip
-            is relative to it.
+            frame, length units; zero at first, a read-only array.  Assign another one between steps: the plane
+            moves, and slip is relative to it.
     """
 
+    _settable = ("displacement",)
+    _remedy = "make a new RigidPlane and a new Contact; plane.displacement = ... moves a plane."
+
     def __init__(self, point, normal, axis=None):
-        self.point = _vector("point", point)
+        self.point = frozen(_vector("point", point))
         size = self.point.size
-        self.normal = _unit("normal", normal, size)
+        self.normal = frozen(_unit("normal", normal, size))
         self.axis = None
-        self._displacement = np.zeros(size)
+        self._displacement = frozen(np.zeros(size))
         if axis is not None:
             along = _unit("axis", axis, size)
             across = along - (along @ self.normal) * self.normal
@@ -63,7 +69,8 @@ class RigidPlane:
                 )
             across /= np.linalg.norm(across)
             across -= (across @ self.normal) * self.normal  # once more, for a nearly parallel axis
-            self.axis = across / np.linalg.norm(across)
+            self.axis = frozen(across / np.linalg.norm(across))
+        self._made = True
 
     @property
     def displacement(self) -> np.ndarray:
@@ -71,7 +78,7 @@ class RigidPlane:
 
     @displacement.setter
     def displacement(self, value):
-        self._displacement = _vector("plane.displacement", value, self.point.size)
+        self._displacement = frozen(_vector("plane.displacement", value, self.point.size))
 
     @property
     def frame(self) -> np.ndarray:

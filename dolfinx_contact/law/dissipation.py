@@ -22,7 +22,14 @@ import numpy as np
 from dolfinx_contact.law.friction import Friction
 
 
-def work_of_friction(friction: Friction, before, slipped, reaction, slip_increment) -> np.ndarray:
+def work_of_friction(
+    friction: Friction,
+    before,
+    slipped,
+    reaction,
+    slip_increment,
+    law_before: Friction | None = None,
+) -> np.ndarray:
     """Work of friction of one step along the principal friction directions, all entries >= 0.
 
     Args:
@@ -31,6 +38,8 @@ def work_of_friction(friction: Friction, before, slipped, reaction, slip_increme
         slipped: Nodes that slipped in the last step, ``shape=(n,)``, bool.
         reaction: Reactions at the end of this one; of these the normal components count.
         slip_increment: Slip during this one, ``shape=(n, gdim - 1)``, local frame.
+        law_before: The law of the last step, if friction was exchanged since: it says along which direction the
+            node slipped then.
 
     Returns:
         ``shape=(n, gdim - 1)``, force times length; the work of a node is the sum of its row.
@@ -42,7 +51,11 @@ def work_of_friction(friction: Friction, before, slipped, reaction, slip_increme
     _, s1 = _split(Q**2 * mu * e1)  # M^-1 P^2 e1
     per_way = mu * e1 * s1
 
-    s0, e0 = _of_force(mu, Q, _along_axes(friction, before[:, :-1]))
+    if law_before in (None, friction):
+        s0, e0 = _of_force(mu, Q, _along_axes(friction, before[:, :-1]))
+    else:
+        e0 = _along_axes(friction, -law_before.against_slip(before[:, :-1]))
+        _, s0 = _split(Q**2 * mu * e0)
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
     per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfinx_contact.attributes import Guarded, frozen
 
-class Wear:
+
+class Wear(Guarded):
     """Wear that feeds back: after every step worn depth opens the gap of the next one.
 
     The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the work of friction along principal
@@ -21,6 +23,8 @@ class Wear:
         ValueError: a coefficient that is negative, not finite or not real, or more than two.
     """
 
+    _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
+
     def __init__(self, coefficient):
         array = np.asarray(coefficient)
         real = array.dtype.kind in "iuf" and array.shape in ((), (1,), (2,))
@@ -29,7 +33,8 @@ class Wear:
                 "wear coefficient must be a number or a pair of numbers >= 0, volume per work; got "
                 f"{coefficient!r}."
             )
-        self.coefficient = array.astype(np.float64)
+        self.coefficient = frozen(array.astype(np.float64))
+        self._made = True
 
     def depth(self, work: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length."""

@@ -9,7 +9,7 @@ every run, so neither the ranks' shares nor their number need be those that wrot
 from __future__ import annotations
 
 import os
-from collections import deque
+import zipfile
 
 import numpy as np
 from mpi4py import MPI
@@ -17,36 +17,45 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import FreeState
 from dolfinx_contact.collective import raised_together
-from dolfinx_contact.solvers.condensed import KEPT
 
 
-def save(problem, path) -> None:
-    """Write the history of a ``ContactProblem``.  Collective."""
-    comm, nodes = problem.body.comm, _nodes(problem)
+def save(path, body, contacts, states, past) -> None:
+    """Write the history of a problem.  Collective.
+
+    Args:
+        path: File name.
+        body: The body.
+        contacts: Its contacts.
+        states: The last displacement and the one before, owned degrees of freedom.
+        past: Earlier steps of the condensed solver.
+    """
+    comm, nodes = body.comm, _nodes(body, contacts)
+    with raised_together(comm):
+        _check_path(path)
+    body.refresh()
     mine = nodes | {"ranks": np.array([len(nodes["nodes"])])}
-    for name, array in zip(("u", "before"), problem._states):
-        mine[name] = _rows(problem, array)
-    if problem.body.known:
-        known = problem.body.known
-        mine |= {"digest": known.digest[None], "load": _rows(problem, known.load)}
-        mine["free" if known.exact else "rough"] = _rows(problem, known.displacement)
-    for k, contact in enumerate(problem.contacts):
+    for name, array in zip(("u", "before"), states):
+        mine[name] = _rows(body, array)
+    if body.known:
+        known = body.known
+        mine |= {"digest": known.digest[None], "load": _rows(body, known.load)}
+        mine["free" if known.exact else "rough"] = _rows(body, known.displacement)
+    for k, contact in enumerate(contacts):
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
-    kept = problem._memory.get("past")
-    if kept:
+    if past:
         mine["past_nodes"] = np.concatenate([a for name, a in nodes.items() if name != "nodes"])
-    everything = comm.gather(mine, root=0)
+    stiffness, everything = body.stiffness_norm(), comm.gather(mine, root=0)
     with raised_together(comm):
         if comm.rank == 0:
             same = {name for name in mine if name.endswith("_plane")}  # on all ranks
             file = {
                 name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
                 for name in mine
-            }
-            if kept:
-                last = kept[-1]
-                alike = [past for past in kept if past[0].size == last[0].size]
-                file["past"] = np.array([past[:2] for past in alike])
+            } | {"stiffness": np.array(stiffness)}
+            if past:
+                last = past[-1]
+                alike = [step for step in past if step[0].size == last[0].size]
+                file["past"] = np.array([step[:2] for step in alike])
                 file["past_tied"] = last[2]
             unfinished = f"{path}.unfinished"
             with open(unfinished, "wb") as stream:
@@ -54,47 +63,78 @@ def save(problem, path) -> None:
             os.replace(unfinished, path)
 
 
-def load(problem, path) -> None:
-    """Take the history of a ``ContactProblem`` from a file.  Collective.
+def load(path, body, contacts) -> tuple[list[np.ndarray], list]:
+    """Give contacts and body the history in a file.  Collective.
+
+    Returns:
+        The last displacement and the one before, and the earlier steps of the condensed solver.
 
     Raises:
         ValueError: the file is no checkpoint of this problem.
     """
-    comm, count = problem.body.comm, len(problem.contacts)
-    asked = comm.gather(_nodes(problem), root=0)
+    comm = body.comm
+    with raised_together(comm):
+        _check_path(path)
+    body.refresh()
+    stiffness, asked = body.stiffness_norm(), comm.gather(_nodes(body, contacts), root=0)
     parts, past = None, ()
     with raised_together(comm):
         if comm.rank == 0:
-            with np.load(path) as opened:
-                file = dict(opened)
-            if not {"u", "before", "nodes", "ranks"} <= file.keys():
-                raise ValueError(f"{path} is no checkpoint.")
-            for prefix in ["", *(f"contact{k}_" for k in range(count))]:
-                name, size = f"{prefix}nodes", sum(len(nodes[f"{prefix}nodes"]) for nodes in asked)
-                if name not in file or len(file[name]) != size:
-                    found = len(file[name]) if name in file else "none"
-                    raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
+            file = _opened(path)
+            _check_file(path, file, asked, stiffness)
             orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
             parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
             if "past" in file:
-                names = [f"contact{k}_nodes" for k in range(count)]
+                names = [f"contact{k}_nodes" for k in range(len(contacts))]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
                 at = _positions(file["past_nodes"], np.argsort(file["past_nodes"]), order)
                 past = _past(file["past"], int(file.get("past_tied", 0)), at)
     mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
+    own = [
+        {n.removeprefix(prefix): a for n, a in mine.items() if n.startswith(prefix)}
+        for prefix in (f"contact{k}_" for k in range(len(contacts)))
+    ]
     with raised_together(comm):
-        for k, contact in enumerate(problem.contacts):
-            prefix = f"contact{k}_"
-            contact.load({n[len(prefix) :]: a for n, a in mine.items() if n.startswith(prefix)})
-    problem._states = [mine["u"].ravel(), mine["before"].ravel()]
-    kept = problem._memory.setdefault("past", deque(maxlen=KEPT))
-    kept.clear()
-    kept.extend(past)
-    problem.body.known = None
+        for contact, saved in zip(contacts, own):
+            contact.check_saved(saved)
+    for contact, saved in zip(contacts, own):
+        contact.load(saved)
+    body.known = None
     if comm.allreduce("digest" in mine, op=MPI.LAND):
         exact = "free" in mine
         free = mine["free" if exact else "rough"].ravel()
-        problem.body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+        body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+    return [mine["u"].ravel(), mine["before"].ravel()], past
+
+
+def _check_path(path) -> None:
+    if not isinstance(path, (str, os.PathLike)):
+        raise ValueError(f"path must be a file name, got {path!r}.")
+
+
+def _opened(path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path) as opened:
+            return dict(opened)
+    except (ValueError, EOFError, TypeError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path} is no checkpoint: {error}.") from None
+
+
+def _check_file(path, file, asked, stiffness: float) -> None:
+    """Raise a ``ValueError`` unless the file has as many nodes and the same stiffness as the problem that asks."""
+    if not {"u", "before", "nodes", "ranks"} <= file.keys():
+        raise ValueError(f"{path} is no checkpoint.")
+    for name in asked[0]:
+        size = sum(len(nodes[name]) for nodes in asked)
+        if name not in file or len(file[name]) != size:
+            found = len(file[name]) if name in file else "none"
+            raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
+    saved = float(file.get("stiffness", stiffness))  # older checkpoints do not have it
+    if not abs(saved - stiffness) <= 1e-9 * stiffness:
+        raise ValueError(
+            f"checkpoint {path} was written with another stiffness (norm {saved:.12g}, here {stiffness:.12g}): set "
+            "the moduli and boundary conditions that the run had, then load."
+        )
 
 
 def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
@@ -106,16 +146,16 @@ def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
     return [(q, force, tied) for q, force in ordered]
 
 
-def _nodes(problem) -> dict[str, np.ndarray]:
+def _nodes(body, contacts) -> dict[str, np.ndarray]:
     """Original indices of this rank's nodes, of the body and of each contact."""
-    original = compat.original_nodes(problem.u.function_space)
-    contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(problem.contacts)}
-    return {"nodes": original} | contacts
+    original = compat.original_nodes(body.V)
+    of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
+    return {"nodes": original} | of_contacts
 
 
-def _rows(problem, array: np.ndarray) -> np.ndarray:
+def _rows(body, array: np.ndarray) -> np.ndarray:
     """Values of owned degrees of freedom, a row a node."""
-    return array.reshape(-1, problem.u.function_space.dofmap.index_map_bs)
+    return array.reshape(-1, body.V.dofmap.index_map_bs)
 
 
 def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:

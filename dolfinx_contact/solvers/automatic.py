@@ -32,7 +32,8 @@ class BoundAutomatic:
     def __init__(self, body, contacts, stiffness, memory):
         self._arguments, self._bound = (body, contacts, stiffness, memory), {}
         nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
-        enough = fits(body.comm, nodes, components(contacts), body.K.getSize()[0])
+        self._components = components(contacts)
+        enough = fits(body.comm, nodes, self._components, body.K.getSize()[0])
         self._solvers = [CondensedNewton(), FixedPoint()]
         self._why = f"{nodes} contact nodes, at most {CROSSOVER}"
         if nodes > CROSSOVER:
@@ -51,6 +52,13 @@ class BoundAutomatic:
         """Free both.  Collective."""
         for bound in self._bound.values():
             bound.destroy()
+
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``."""
+        for solver in list(self._bound):
+            if not self._bound[solver].renew_law():
+                self._bound.pop(solver).destroy()
+        return components(self._arguments[1]) == self._components
 
     def solve(self, step) -> SolverResult:
         """See ``BoundSolver``."""

@@ -40,6 +40,10 @@ class BoundSolver(Protocol):
     def destroy(self) -> None:
         """Free what PETSc holds.  Collective."""
 
+    # Optional, without it the solver is bound anew:
+    # def renew_law(self) -> bool
+    #     Take what the contacts' friction is now; whether what was set up is of use.  Collective.
+
 
 class Solver(Protocol):
     """Options of a solver; one object may be used for many problems."""

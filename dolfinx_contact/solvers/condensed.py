@@ -66,11 +66,21 @@ class CondensedBody:
             self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
             del W  # copied
             self.operator.prepare()  # pays after some ten iterations
+        self._axes = [contact.friction.axes for contact in self._contacts]
         self.friction = self._gathered_friction()
         self._scales = self._gathered_stiffness(stiffness) | {"tied_stiffness": a}
 
     def destroy(self) -> None:
         """Nothing to free: the body owns the factorisation."""
+
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""
+        now = [contact.friction.axes for contact in self._contacts]
+        turned = not all(map(np.array_equal, now, self._axes))
+        if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
+            return False
+        self.friction = self._gathered_friction()
+        return True
 
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
         """One load step by Newton's method on the condensed problem.

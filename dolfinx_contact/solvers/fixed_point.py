@@ -94,6 +94,12 @@ class BoundFixedPoint:
             self.preconditioner.destroy()
         self.preconditioner, self._factor = None, 0.0
 
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``: of the law the preconditioner knows its springs alone."""
+        if self.preconditioner is not None and not self.preconditioner.same_springs():
+            self.destroy()
+        return True
+
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact.petsc.linear_solver import stage
@@ -26,10 +27,11 @@ class ContactPreconditioner:
     """
 
     def __init__(self, body, contacts, maps):
-        self._body, self._contacts = body, contacts
+        self._body, self._contacts, self._maps = body, contacts, maps
+        self._spring_rates = self._rates()
         self._layer, self._linearised = None, False
         with stage("contact: set-up of springs"):
-            S, A = self._springs(maps), body.K.copy()
+            S, A = self._springs(), body.K.copy()
             A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             modes = [body.rigid_modes()]
             if body.exact:  # else the motions of contacts are found when they are needed
@@ -57,11 +59,20 @@ class ContactPreconditioner:
         if self._layer is not None:
             self._layer.destroy()
 
-    def _springs(self, maps):
+    def _rates(self) -> list[np.ndarray]:
+        """The maps' springs under the present laws, of each contact."""
+        both = zip(self._contacts, self._maps)
+        return [map.springs(contact.friction, contact.points.dim) for contact, map in both]
+
+    def same_springs(self) -> bool:
+        """Whether the present laws have the springs that are set up.  Collective."""
+        same = all(map(np.array_equal, self._rates(), self._spring_rates))
+        return self._body.comm.allreduce(same, op=MPI.LAND)
+
+    def _springs(self):
         """The maps' springs, a PETSc matrix with entries at contact nodes alone."""
         K, S = self._body.K, None
-        for contact, map in zip(self._contacts, maps):
-            springs = map.springs(contact.friction, contact.points.dim)
+        for contact, springs in zip(self._contacts, self._spring_rates):
             blocks = springs[:, :, None] * np.eye(contact.points.dim)
             matrix = contact.points.matrix(blocks).tocsr()
             S = matrix if S is None else S + matrix

@@ -1,0 +1,36 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Attributes of the user's objects: those that may be set, and read-only arrays."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+import numpy as np
+
+
+def frozen(array: np.ndarray) -> np.ndarray:
+    """The array itself, from now on read-only: what is computed from it cannot be changed behind its back."""
+    array.flags.writeable = False
+    return array
+
+
+class Guarded:
+    """An object that, once made, takes no attributes but those it has room for.
+
+    A misspelt one would be kept and never read, and one that results were computed from would no longer fit them.
+    """
+
+    _settable: tuple[str, ...] = ()
+    _remedy: str = ""  # what to do instead of setting one of the others
+
+    def __setattr__(self, name, value):
+        if name in self._settable or name.startswith("_") or "_made" not in self.__dict__:
+            object.__setattr__(self, name, value)
+            return
+        kind = type(self).__name__
+        if name in dir(self):
+            raise AttributeError(f"{kind}.{name} cannot be set: {self._remedy}")
+        near = get_close_matches(name, [known for known in dir(self) if known[0] != "_"], 1)
+        meant = f", did you mean {near[0]!r}?" if near else "."
+        raise AttributeError(f"{kind} has no attribute {name!r}{meant}")

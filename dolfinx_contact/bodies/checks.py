@@ -1,0 +1,40 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Whether an assembled stiffness is that of a material: moduli of the wrong sign are found before a step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def check_diagonal(diagonal: np.ndarray, V) -> None:
+    """Raise a ``ValueError`` if an entry is not finite or not positive."""
+    if not np.isfinite(diagonal).all():
+        raise ValueError(
+            "the stiffness contains NaN or infinity: check the material parameters in F (nu = 0.5 has no stiffness)."
+        )
+    if not (diagonal > 0.0).all():
+        dof = int(np.argmin(diagonal))
+        x = V.tabulate_dof_coordinates()[dof // V.dofmap.index_map_bs]
+        raise ValueError(
+            f"the stiffness of the node at {x.tolist()} is {diagonal[dof]:g}, which must be positive: check the sign "
+            "of F (internal minus external work) and the moduli (0 < E, nu < 0.5)."
+        )
+
+
+def check_dilation(body) -> None:
+    """Raise a ``ValueError`` if the body gains energy by growing, as with Poisson's ratio above 0.5.  Collective.
+
+    Args:
+        body: ElasticBody, its stiffness assembled, nothing held yet.
+    """
+    gdim = body.V.mesh.geometry.dim
+    growth = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim].ravel() / body.extent
+    energy, scale = body.total(
+        [growth @ body.multiply(growth), growth @ (body.diagonal() * growth)]
+    )
+    if energy < -1e-10 * scale:
+        raise ValueError(
+            f"a body that grows evenly gains energy ({energy:g}): check the moduli, Poisson's ratio must be "
+            "below 0.5."
+        )

@@ -1,0 +1,92 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What users give to a contact, checked: space, facets, plane, friction and wear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact import compat
+from dolfinx_contact.contact.plane import RigidPlane
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.wear import Wear
+
+
+def check_space(V) -> None:
+    mesh = V.mesh
+    gdim, tdim = mesh.geometry.dim, mesh.topology.dim
+    components = V.dofmap.index_map_bs
+    if components == 1 and V.element.num_sub_elements > 1:
+        raise ValueError(
+            "V is a mixed space: contact needs a space of displacements alone, "
+            f'functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
+        )
+    if gdim != tdim or gdim not in (2, 3):
+        raise ValueError(
+            f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both."
+        )
+    if components != gdim:
+        raise ValueError(
+            f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
+            f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
+        )
+    if compat.lagrange_degree(V) != 1:
+        raise ValueError(
+            f"V must be continuous Lagrange of degree 1 (other orders are not supported yet), "
+            f"got {V.ufl_element()}."
+        )
+
+
+def checked_facets(facets, index_map, boundary) -> np.ndarray:
+    array = np.asarray(facets)
+    if array.size == 0:
+        return np.zeros(0, dtype=np.int32)
+    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(
+            f"facets must be a one-dimensional array of integers, got shape {array.shape} of "
+            f"{array.dtype}."
+        )
+    available = index_map.size_local + index_map.num_ghosts
+    if array.min() < 0 or array.max() >= available:
+        raise ValueError(
+            f"facets range from {array.min()} to {array.max()}, but this rank has facets "
+            f"0 to {available - 1}: pass local indices, of the mesh's own facets."
+        )
+    inside = np.setdiff1d(array[array < index_map.size_local], boundary)
+    if inside.size:
+        raise ValueError(
+            f"facets {inside[:5].tolist()} ({inside.size} in all) are not on the boundary: pass "
+            "facets of dimension tdim - 1 found by locate_entities_boundary or facet tags."
+        )
+    return array.astype(np.int32)
+
+
+def check_law(plane, friction, gdim: int) -> None:
+    if not isinstance(plane, RigidPlane):
+        raise ValueError(f"plane must be a RigidPlane, got {type(plane).__name__}: {plane!r}.")
+    if not isinstance(friction, Friction):
+        raise ValueError(
+            f"friction must be a Friction, got {type(friction).__name__}: {friction!r}."
+        )
+    if plane.point.size != gdim:
+        raise ValueError(f"{plane} has {plane.point.size} dimensions, the mesh {gdim}.")
+    friction.law(gdim)  # refuses what has no meaning in two dimensions
+    if gdim == 3 and plane.axis is None and not friction.isotropic:
+        raise ValueError(
+            f"plane.axis is None, but {friction} depends on the direction: give RigidPlane the first "
+            "principal friction direction, axis=(...)."
+        )
+
+
+def check_coefficients(friction, n: int) -> None:
+    for name in ("mu", "p", "axes"):
+        shape = np.shape(getattr(friction, name))
+        if len(shape) == 2 and shape[0] != n:
+            raise ValueError(
+                f"friction.{name} has {shape[0]} rows, this rank owns {n} contact nodes."
+            )
+
+
+def check_wear(wear) -> None:
+    if not (wear is None or isinstance(wear, Wear)):
+        raise ValueError(f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}.")

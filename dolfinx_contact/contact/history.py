@@ -1,0 +1,127 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What the nodes of a contact do, did at the end of the last step, and have summed up since the start."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from dolfinx_contact.attributes import Guarded, frozen
+
+
+class Status(IntEnum):
+    """What a contact node does, which is the branch that the projection took."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
+class State(NamedTuple):
+    """All that a step leaves to the next one; arrays over the owned contact nodes, local frame."""
+
+    displacement: np.ndarray  # of the node relative to the plane, (n, gdim)
+    reaction: np.ndarray  # (n, gdim)
+    gap: np.ndarray  # (n,)
+    slip_increment: np.ndarray  # (n, gdim - 1)
+    status: np.ndarray  # (n,)
+
+
+SUMS = ("dissipation", "slip_path", "wear_depth")
+
+
+class ContactHistory(Guarded):
+    """States and sums of ``n`` nodes.  All arrays are read-only: the next step starts from them."""
+
+    def begin(self, state: State) -> None:
+        """Forget everything: this is the state, and all sums are zero."""
+        self._sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
+        self._last = State(*map(frozen, state))
+        self.restore()
+
+    def take(self, **arrays: np.ndarray) -> None:
+        """Replace parts of the present state."""
+        self._present = self._present._replace(**{k: frozen(a) for k, a in arrays.items()})
+
+    def restore(self) -> None:
+        """Return to the last converged state."""
+        self._present = self._last
+
+    def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
+        """Make the present state the last converged one, and add to the sums what the step did."""
+        added = dict(zip(SUMS, (work, path, depth)))
+        self._sums = {name: frozen(self._sums[name] + added[name]) for name in SUMS}
+        self._last = self._present
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Last converged state and sums as arrays by name; this rank's nodes."""
+        return self._last._asdict() | self._sums
+
+    def check_saved(self, saved) -> None:
+        """Raise a ``ValueError`` if an array is missing or of another size."""
+        for name, array in ContactHistory.save(self).items():
+            if name not in saved or saved[name].shape != array.shape:
+                found = saved[name].shape if name in saved else "nothing"
+                raise ValueError(
+                    f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
+                    "for another mesh or another contact."
+                )
+
+    def load(self, saved) -> None:
+        """Take back what ``save`` returned, with the same nodes on this rank."""
+        self._last = State(*(frozen(np.array(saved[name])) for name in State._fields))
+        self._sums = {name: frozen(np.array(saved[name])) for name in SUMS}
+        self.restore()
+
+    @property
+    def last(self) -> State:
+        """The state at the end of the last step that converged."""
+        return self._last
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement of the nodes relative to the plane, ``shape=(n, gdim)``, local frame, length."""
+        return self._present.displacement
+
+    @property
+    def reaction(self) -> np.ndarray:
+        """Force of the plane on the body, ``shape=(n, gdim)``, local frame."""
+        return self._present.reaction
+
+    @property
+    def previous_reaction(self) -> np.ndarray:
+        """Reactions of the last converged step, ``shape=(n, gdim)``, local frame."""
+        return self._last.reaction
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Distance to the plane, ``shape=(n,)``; negative is penetration."""
+        return self._present.gap
+
+    @property
+    def slip_increment(self) -> np.ndarray:
+        """Slip relative to the plane since the last step, ``shape=(n, gdim - 1)``, local frame."""
+        return self._present.slip_increment
+
+    @property
+    def status(self) -> np.ndarray:
+        """A ``Status`` per node, ``shape=(n,)``."""
+        return self._present.status
+
+    @property
+    def dissipation(self) -> np.ndarray:
+        """Work of friction since the start, ``shape=(n,)``, force times length; it never decreases."""
+        return self._sums["dissipation"]
+
+    @property
+    def slip_path(self) -> np.ndarray:
+        """Length of the path slipped while in contact since the start, ``shape=(n,)``."""
+        return self._sums["slip_path"]
+
+    @property
+    def wear_depth(self) -> np.ndarray:
+        """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
+        return self._sums["wear_depth"]

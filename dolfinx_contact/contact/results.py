@@ -1,0 +1,80 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What can be read from a contact after a step: certificates, forces, pressures, functions for output."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact.attributes import frozen
+from dolfinx_contact.contact import fields
+from dolfinx_contact.contact.history import ContactHistory, Status
+
+
+class ContactResults(ContactHistory):
+    """Results of the present state of a ``Contact``, which has laws, frame and nodes."""
+
+    _area: np.ndarray | None = None
+
+    @property
+    def load_function(self) -> np.ndarray:
+        """f = ||M^-1 r_t|| - r_n, ``shape=(n,)``, force units [dSFMH07, Eq. (1)]."""
+        return self.law.load_function(self.reaction)
+
+    @property
+    def bipotential_gap(self) -> np.ndarray:
+        """Certificate b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
+
+        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``;
+        penetration is reported by itself.
+        """
+        return self.law.bipotential_gap(
+            self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
+        )
+
+    @property
+    def slip_residual(self) -> np.ndarray:
+        """What of the slip increments the slip rule leaves unexplained, ``shape=(n, gdim - 1)``, length.
+
+        ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
+        on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
+        """
+        slip, mu = self.slip_increment, self.friction.mu[..., :1]
+        against = self.friction.against_slip(self.reaction[:, :-1])
+        length = np.linalg.norm(slip, axis=1, keepdims=True)
+        slips = (self.status == Status.SLIP)[:, None]
+        bound = (self.status != Status.OPEN)[:, None] & (mu > 0)
+        return np.where(bound, slip + slips * length * against, 0.0)
+
+    def force(self) -> np.ndarray:
+        """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
+        return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of the contact surface that belongs to each node, ``shape=(n,)``, reference state.
+
+        The integral of the node's shape function over the facets; a length in two dimensions.
+        Collective at the first call.
+        """
+        if self._area is None:
+            areas = fields.areas(self.V, self.facets)
+            self._area = frozen(areas[self.points.dofs[:, 0]])
+        return self._area
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Normal reaction over nodal area, ``shape=(n,)``, force per area.  Collective at first."""
+        return self.reaction[:, -1] / self.area
+
+    def function(self, values, name: str = "f", elsewhere: float = 0.0):
+        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
+        return fields.scalar(self.V, self.nodes, values, name, elsewhere)
+
+    def reaction_function(self):
+        """Nodal reactions in global components as a Function on ``V``, zero elsewhere."""
+        function = fem.Function(self.V, name="reaction")
+        self.points.add_forces(self.reaction, function.x.array[: self.points.size])
+        function.x.scatter_forward()
+        return function

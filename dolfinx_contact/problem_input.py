@@ -1,0 +1,160 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What users give to a problem, checked: unknown, contacts, boundary conditions, solver, tolerance."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from dolfinx_contact import compat
+from dolfinx_contact.checks import positive
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.solvers.automatic import Automatic
+
+LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
+
+
+def checked_contacts(contacts, u) -> tuple[Contact, ...]:
+    """The contacts, each on the space of ``u``, no node in two of them."""
+    if isinstance(contacts, Contact):
+        contacts = [contacts]
+    if not isinstance(contacts, (list, tuple)):
+        raise ValueError(
+            f"contacts must be a list of dc.Contact objects, got {contacts!r}: [] for none."
+        )
+    taken = np.zeros(0, dtype=np.int64)
+    for contact in contacts:
+        if not isinstance(contact, Contact):
+            raise ValueError(
+                f"contacts must hold dc.Contact objects, got {type(contact).__name__}."
+            )
+        if contact.V != u.function_space:
+            raise ValueError(
+                "a contact lives on another space or mesh than u: build it on u.function_space."
+            )
+        check_mesh(contact)
+        twice = np.intersect1d(taken, contact.nodes)
+        if twice.size:
+            raise ValueError(
+                f"{twice.size} node(s) are in two contacts, the first at "
+                f"{contact.x[np.searchsorted(contact.nodes, twice[0])].tolist()}: separate their facets."
+            )
+        taken = np.union1d(taken, contact.nodes)
+    return tuple(contacts)
+
+
+def check_mesh(contact: Contact) -> None:
+    """Raise a ``ValueError`` if the mesh is no longer where it was when the contact was made."""
+    if contact.mesh_has_moved():
+        raise ValueError(
+            "the mesh was moved or scaled after the contact was made, whose gaps and areas no longer fit: move it "
+            "first, then make Contact and ContactProblem. A plane moves by plane.displacement."
+        )
+
+
+def checked_conditions(bcs, V) -> list:
+    """The boundary conditions, each on ``V`` or a part of it."""
+    if compat.is_condition(bcs):
+        raise ValueError(f"bcs must be a list of boundary conditions: write bcs=[bc], not {bcs!r}.")
+    if not isinstance(bcs, (list, tuple)):
+        raise ValueError(f"bcs must be a list of boundary conditions, got {bcs!r}: [] for none.")
+    for bc in bcs:
+        if not compat.is_condition(bc):
+            raise ValueError(f"bcs must hold what dirichletbc returns, got {bc!r}.")
+        if not compat.condition_lives_on(bc, V):
+            raise ValueError(
+                "a boundary condition lives on another space than u: build it on u.function_space or a part of it, "
+                "V.sub(i)."
+            )
+    return list(bcs)
+
+
+def checked_solver(solver):
+    """A solver, or the automatic choice for None."""
+    if isinstance(solver, type):
+        raise ValueError(f"solver {solver.__name__} is a class: write solver={solver.__name__}().")
+    if solver is not None and not callable(getattr(solver, "bind", None)):
+        raise ValueError(
+            f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
+        )
+    return Automatic() if solver is None else solver
+
+
+def checked_tolerance(tol) -> float:
+    """A tolerance that rounding allows to reach."""
+    try:
+        value = positive("tol", tol, finite=True)
+    except ValueError:
+        value = np.nan
+    if not value >= 1e-13:
+        raise ValueError(
+            f"tol must be a finite number of at least 1e-13 (rounding forbids less), got {tol!r}."
+        )
+    return value
+
+
+def checked_options(options) -> dict | None:
+    """PETSc options, a dictionary."""
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(
+            f'petsc_options must be a dictionary such as {{"pc_type": "lu"}}, got {options!r}.'
+        )
+    return options
+
+
+def hold(contacts, body) -> None:
+    """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
+
+    Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
+    """
+    left_out = [np.zeros((0, 3))]
+    with raised_together(body.comm):
+        for contact in contacts:
+            held, closed = _held_directions(contact, body.fixed)
+            contact.points.hold(held, closed)
+            left_out.append(contact.x[closed])
+    where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
+    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
+    if len(where) == 0:
+        return
+    low, high = where.min(axis=0).tolist(), where.max(axis=0).tolist()
+    if len(where) == nodes:
+        raise ValueError(
+            f"the normal displacement of all {nodes} contact nodes, from {low} to {high}, is fixed by boundary "
+            "conditions: contact and conditions contradict each other, take the facets out of one."
+        )
+    warnings.warn(
+        f"{len(where)} of {nodes} contact nodes, between {low} and {high}, are left out: boundary conditions give "
+        "their displacement along the normal, so that they cannot touch. Take their facets out of the contact, or "
+        "them out of the conditions, if that is not meant.",
+        stacklevel=4,
+    )
+
+
+def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential directions that boundary conditions fix, ``shape=(n, gdim - 1)``; nodes whose normal is fixed."""
+    left = contact.points.free_of(fixed)
+    closed = left[:, -1] < 1e-12
+    # What is left of each local direction without its fixed components: all, nothing, or a part.
+    partly = (left > 1e-12) & (left < 1 - 1e-12) & ~closed[:, None]
+    if partly.any():
+        node = np.argmax(partly.any(axis=1))
+        raise NotImplementedError(
+            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along "
+            "none of the axes of its contact: let plane.axis be along or across that direction."
+        )
+    return (left[:, :-1] < 0.5) | closed[:, None], closed
+
+
+def check_size(body, x: np.ndarray) -> None:
+    """Warn of a displacement far larger than the body.  Collective."""
+    largest = body.largest(np.abs(x))
+    if largest > LARGE * body.extent:
+        warnings.warn(
+            f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
+            f"{body.extent:.3g}: check the units of lengths, loads and moduli. (Elasticity is linear here.)",
+            stacklevel=4,
+        )

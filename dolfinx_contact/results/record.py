@@ -1,0 +1,113 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The record of a load step, and what is raised when it fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Counts(NamedTuple):
+    """Number of contact nodes by status, over all ranks."""
+
+    open: int
+    stick: int
+    slip: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """Record of a load step, the same on all ranks.
+
+    Attributes:
+        error: What is out of balance, off the law or penetrates, over the forces that act; see
+            ``dolfinx_contact.error``.
+        slip_error: Defect of the slip rule, as a force over the forces that act; see the same place.
+        rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
+        forward_error: How far the reactions may still be from the exact ones, over the same forces: an
+            estimate from the solver's last correction.
+        bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
+        penetration: Largest penetration, >= 0, length.
+        iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
+            started (the last step's, or its continuation), already was the solution.
+        seconds: Wall time of the step.
+        counts: Contact nodes open, sticking and slipping.
+        solver: The solver that was used, and why it was chosen where the user did not.
+        tried: What the solver tried, in order, where it has more than one method.
+    """
+
+    error: float
+    slip_error: float
+    rounding: float
+    forward_error: float
+    bipotential_gap: float
+    penetration: float
+    iterations: int
+    seconds: float
+    counts: Counts
+    solver: str
+    tried: tuple = ()
+
+    def __str__(self) -> str:
+        """One line: errors, iterations, nodes by status."""
+        return (
+            f"error {self.error:.3e}, slip error {self.slip_error:.3e}, forward error {self.forward_error:.3e}, "
+            f"rounding {self.rounding:.1e}, after {self.iterations} iterations ({self.counts.open} open, "
+            f"{self.counts.stick} sticking, {self.counts.slip} slipping nodes)"
+        )
+
+
+class NotConverged(RuntimeError):
+    """A step did not reach its tolerance; the problem is back in its last converged state.
+
+    Attributes:
+        step: Record of the step, with what was tried.
+        displacement: The best one found, owned degrees of freedom; not a solution.
+        reactions: Of each contact in that state, local frame.
+    """
+
+    def __init__(self, message: str, step: Step, displacement, reactions):
+        super().__init__(message)
+        self.step, self.displacement, self.reactions = step, displacement, reactions
+
+    def __reduce__(self):
+        # An exception is taken apart into its message alone, and could not be put together on the other side.
+        return type(self), (str(self), self.step, self.displacement, self.reactions)
+
+
+def counts(body, contacts) -> Counts:
+    """Contact nodes open, sticking and slipping in the present state.  Collective."""
+    here = sum(np.bincount(contact.status, minlength=3) for contact in contacts)
+    return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
+
+
+def record(body, contacts, errors, found, seconds: float) -> Step:
+    """Record of the contacts' present state.  Collective.
+
+    Args:
+        body: The body.
+        contacts: Its contacts.
+        errors: ``Errors`` of the state.
+        found: ``SolverResult``.
+        seconds: That the step took on this rank.
+    """
+    gap, penetration = 0.0, 0.0
+    for contact in contacts:
+        gap += contact.bipotential_gap.sum()
+        penetration = max(penetration, -contact.gap.min(initial=0.0))
+    return Step(
+        error=errors.error,
+        slip_error=errors.slip_error,
+        rounding=errors.rounding,
+        forward_error=found.forward_error,
+        bipotential_gap=float(body.total(gap)),
+        penetration=body.largest(np.array([penetration])),
+        iterations=found.iterations,
+        seconds=body.largest(np.array([seconds])),
+        counts=counts(body, contacts),
+        solver=found.chosen,
+        tried=found.tried,
+    )
