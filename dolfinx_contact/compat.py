@@ -154,3 +154,17 @@ def condition_lives_on(bc, V) -> bool:
     """Whether a boundary condition is one on ``V`` or a part of it."""
     space = bc.function_space
     return V._cpp_object.contains(getattr(space, "_cpp_object", space))
+
+
+def free_garbage(comm) -> None:
+    """Free what Python's collector left to PETSc since 3.18: it can free parallel objects on all ranks at once only.
+
+    Collective.
+    """
+    if hasattr(PETSc, "garbage_cleanup"):
+        PETSc.garbage_cleanup(comm)
+
+
+def may_free_alone(comm) -> bool:
+    """Whether this rank may free PETSc objects without the others: it has none, and PETSc still runs."""
+    return not PETSc.Sys.isFinalized() and comm.size == 1

@@ -11,6 +11,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.checks import RoundingWarning
@@ -61,8 +62,11 @@ class ContactProblem(Guarded):
         monitor: None, or a function ``f(iteration, error, counts)`` that is called on all ranks whenever a
             solver evaluates the residual of the whole body, with the largest error and ``Counts``.
 
-    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0.  ``close``, or ``with``, frees
-    what PETSc holds.
+    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0.
+
+    ``close``, or ``with dc.ContactProblem(...) as problem``, frees what PETSc holds.  On one rank a problem that is no
+    longer used is freed by itself.  On several ranks PETSc frees on all of them at once only: there the next problem on
+    the same mesh does it, and a run that makes many meshes has to close its problems.
 
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
@@ -147,6 +151,11 @@ class ContactProblem(Guarded):
         """Free what PETSc holds: matrices, factors, levels.  Collective; results stay, no step can follow."""
         self._unbind()
         self.body.close()
+
+    def __del__(self):
+        # On several ranks only the next problem on the mesh can, see ``free_garbage``: Python collects when it likes.
+        if "_made" in self.__dict__ and compat.may_free_alone(self.body.comm):
+            self._unbind()
 
     def __enter__(self) -> ContactProblem:
         return self

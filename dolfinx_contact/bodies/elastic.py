@@ -45,6 +45,7 @@ class ElasticBody:
     def __init__(self, F, u, bcs, J=None, petsc_options=None, petsc_options_prefix=None):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
+        compat.free_garbage(self.comm)  # of bodies that nobody closed
         with raised_together(self.comm):
             derivative = linear_part(F, u, J)
         self._residual_form = fem.form(F)
@@ -135,6 +136,10 @@ class ElasticBody:
         if self.K is not None:
             self.K.destroy()
         self.K, self.closed = None, True
+
+    def __del__(self):
+        if not getattr(self, "closed", True) and compat.may_free_alone(self.comm):
+            self.close()
 
     # -- loads and residuals -------------------------------------------------------------------
 
