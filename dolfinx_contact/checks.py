@@ -15,6 +15,8 @@ class RoundingWarning(UserWarning):
 
 def finite(name: str, value) -> np.ndarray:
     """A float64 array of finite numbers, or a ``ValueError``."""
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...).")
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "iuf":

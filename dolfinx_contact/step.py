@@ -108,9 +108,7 @@ class LoadStep:
             change = self.errors.change
             self._judge(x, -self.body.residual(x))
             self.errors = self.errors._replace(change=change)
-        if self._monitor is not None:
-            self._monitor(self._evaluations, self.errors.largest)
-        self._evaluations += 1
+        self._tell()
         return left, self.errors
 
     def measure(self, x: np.ndarray) -> Errors:
@@ -125,6 +123,7 @@ class LoadStep:
             for contact, map in zip(self._asked(self.free(forces)), maps):
                 contact.respond(x, map)
             self._judge(x, forces)
+            self._tell()
         return self.errors
 
     def measure_open(self, x: np.ndarray) -> Errors:
@@ -134,6 +133,12 @@ class LoadStep:
             contact.release()
         self._judge(x, -self.body.residual(x))
         return self.errors
+
+    def _tell(self) -> None:
+        """Tell the user's monitor the errors of another state."""
+        if self._monitor is not None:
+            self._monitor(self._evaluations, self.errors.largest)
+        self._evaluations += 1
 
     def _asked(self, forces: np.ndarray):
         """The contacts, each with the reactions that balance the forces at its nodes."""

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfinx_contact.collective import raised_together
+
 
 def check_diagonal(diagonal: np.ndarray, V) -> None:
     """Raise a ``ValueError`` if an entry is not finite or not positive."""
@@ -38,3 +40,16 @@ def check_dilation(body) -> None:
             f"a body that grows evenly gains energy ({energy:g}): check the moduli, Poisson's ratio must be "
             "below 0.5."
         )
+
+
+def check_constants(constants, comm) -> None:
+    """Raise a ``ValueError`` if a constant of a form differs between ranks, which would solve different problems."""
+    mine = [np.array(constant.value) for constant in constants]
+    first = comm.bcast(mine, root=0)
+    with raised_together(comm):
+        for here, there in zip(mine, first):
+            if not np.array_equal(here, there, equal_nan=True):
+                raise ValueError(
+                    f"a constant in F differs between ranks: here {here.tolist()}, on rank 0 {there.tolist()}. Give the "
+                    "same on all."
+                )

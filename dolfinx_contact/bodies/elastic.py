@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
-from dolfinx_contact.bodies.checks import check_diagonal, check_dilation
+from dolfinx_contact.bodies.checks import check_constants, check_diagonal, check_dilation
 from dolfinx_contact.bodies.forms import digest_of, linear_part
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.collective import raised_together
@@ -52,6 +52,7 @@ class ElasticBody:
         self._stiffness_form = fem.form(derivative)
         self._parameters = [*derivative.coefficients(), *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
+        self._constants = list(F.constants())
         self._work = fem.Function(self.V)
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
@@ -72,6 +73,7 @@ class ElasticBody:
         Returns:
             How often it was assembled so far: a number that changes with the matrix.
         """
+        check_constants(self._constants, self.comm)
         digest = digest_of(self._parameters)
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies

@@ -43,4 +43,9 @@ def bipotential_gap(r, gap, slip_increment, friction: Friction):
     slip = as_nodes("slip_increment", slip_increment, dim - 1, len(r))
     law = friction.law(dim)
     outside = law.load_function(r) > 16 * np.finfo(float).eps * np.abs(r[:, -1])
-    return np.where(outside | (gap < 0), np.inf, law.bipotential_gap(r, gap, slip))
+    value = law.bipotential_gap(r, gap, slip)
+    slippery = (friction.mu == 0).all(axis=-1)
+    if slippery.any():  # the cone is the half line: what divides by mu says nothing there
+        off = (r[:, :-1] != 0).any(axis=1) | (r[:, -1] < 0)
+        outside, value = np.where(slippery, (off, r[:, -1] * gap), (outside, value))
+    return np.where((outside != 0) | (gap < 0), np.inf, value)

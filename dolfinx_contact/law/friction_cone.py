@@ -11,6 +11,9 @@ import numpy as np
 
 from dolfinx_contact.law.friction import Friction
 
+# Numbers above this are projected in another unit, so that no sum of theirs overflows.
+HUGE, HUGE_UNIT = 1e300, 2.0**20
+
 
 def as_nodes(name: str, value, components: int | None, nodes: int | None = None) -> np.ndarray:
     """``value`` as a float64 array with one row per node, without a copy where it is one already.
@@ -19,6 +22,8 @@ def as_nodes(name: str, value, components: int | None, nodes: int | None = None)
         ValueError: The shape is not ``(n, components)`` (``(n,)`` for None), or the type is not
             real or has more digits than float64.
     """
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...)")
     array = np.asarray(value)
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
         raise ValueError(
@@ -32,7 +37,7 @@ def as_nodes(name: str, value, components: int | None, nodes: int | None = None)
         raise ValueError(f"{name} must have shape ({wanted}{tail}), not {array.shape}")
     array = array.astype(np.float64, copy=False)
     if any(stride % 8 for stride in array.strides) or not array.flags.aligned:
-        array = np.ascontiguousarray(array)
+        array = array.copy()
     return array
 
 
@@ -47,12 +52,19 @@ def project_cone(tau, mu):
 
     Returns:
         The projected points, ``shape=(n, 3)``. A row of ``tau`` that is infinite or NaN gives a row
-        of NaN; the others are not touched by it. (For a frictionless cone only ``tau_n`` counts.)
+        of NaN, a projection beyond the range of double precision infinity; the others are not touched by it. (For a frictionless cone only ``tau_n`` counts.)
 
     Raises:
         ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.
     """
-    return Friction(mu).law(3).project(as_nodes("tau", tau, 3))[0]
+    tau, law = as_nodes("tau", tau, 3), Friction(mu).law(3)
+    largest, smallest = (f.reduce(tau, axis=None, initial=0.0) for f in (np.fmax, np.fmin))
+    if max(largest, -smallest) <= HUGE:
+        return law.project(tau)[0]
+    huge = np.isfinite(tau).all(axis=1) & (np.abs(tau) > HUGE).any(axis=1)
+    scale = np.where(huge, HUGE_UNIT, 1.0)[:, None]
+    with np.errstate(over="ignore"):
+        return law.project(tau / scale)[0] * scale
 
 
 def load_function(r, mu):

@@ -114,7 +114,7 @@ def _check_path(path) -> None:
 
 def _opened(path) -> dict[str, np.ndarray]:
     try:
-        with np.load(path) as opened:
+        with open(path, "rb") as stream, np.load(stream) as opened:
             return dict(opened)
     except (ValueError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is no checkpoint: {error}.") from None

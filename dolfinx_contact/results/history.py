@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.collective import raised_together
+
 
 class History:
     """Records totals and tracked nodes after every step, and writes them to a CSV file as it goes.
@@ -35,8 +37,13 @@ class History:
     """
 
     def __init__(self, problem, path=None, points=(), contact: int = 0, resume: int = 0):
-        self.problem, self.path = problem, None if path is None else Path(path)
-        self.comm = problem.body.comm
+        self.problem, self.comm = problem, problem.body.comm
+        with raised_together(self.comm):
+            self.path = None if path is None else Path(path)
+            if contact not in range(len(problem.contacts)):
+                raise ValueError(f"contact {contact!r}: the problem has {len(problem.contacts)}.")
+            if not isinstance(resume, (int, np.integer)) or resume < 0:
+                raise ValueError(f"resume must be a number of rows, 0 or more, got {resume!r}.")
         self._tracked = problem.contacts[contact]
         points, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
         if points.size and (points.ndim != 2 or points.shape[1] != gdim):
@@ -44,11 +51,19 @@ class History:
         self._nodes = [self._nearest(point) for point in points]
         self.positions = np.array([self._at(node, self._tracked.x) for node in self._nodes])
         self.rows = self._read(resume) if resume else []
-        if self.path is not None and self.comm.rank == 0:
-            self._write(self.rows)
+        self._written = 0
+        if self.rows:
+            self._write()
 
     def record(self, step, **columns) -> dict:
-        """Append a row for ``step``, the record of the last solve; ``columns`` come first.  Collective."""
+        """Append a row for ``step``, the record of the last solve; ``columns`` come first.  Collective.
+
+        A row that could not be written, on a full disk for instance, is kept and written with the next one.
+
+        Raises:
+            ValueError: other columns than in the first row.
+            OSError: on all ranks, if the file cannot be written.
+        """
         row = {"step": len(self.rows) + 1, **columns}
         for name in ("error", "slip_error", "bipotential_gap", "iterations", "seconds"):
             row[name] = getattr(step, name)
@@ -57,9 +72,12 @@ class History:
             row.update((f"contact{k}_{name}", value) for name, value in self._totals(contact))
         for k, node in enumerate(self._nodes):
             row.update((f"node{k}_{name}", value) for name, value in self._state(node))
+        with raised_together(self.comm):
+            if self.rows and list(row) != list(self.rows[0]):
+                other = sorted(set(row) ^ set(self.rows[0])) or "in another order"
+                raise ValueError(f"the columns are not those of the first row: {other}.")
         self.rows.append(row)
-        if self.path is not None and self.comm.rank == 0:
-            self._write([row], append=len(self.rows) > 1)
+        self._write()
         return row
 
     def column(self, name: str) -> np.ndarray:
@@ -99,25 +117,44 @@ class History:
         mine = values[index].tolist() if self.comm.rank == owner else None
         return self.comm.bcast(mine, root=owner)
 
-    def _write(self, rows, append=False) -> None:
-        if not append and not rows:
-            return
-        with open(self.path, "a" if append else "w", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=rows[0].keys())
-            if not append:
-                writer.writeheader()
-            writer.writerows(rows)
+    def _write(self) -> None:
+        """Write the rows that the file does not have yet.  Collective."""
+        with raised_together(self.comm):
+            if self.path is not None and self.comm.rank == 0:
+                new = not self._written
+                with open(self.path, "w" if new else "a", newline="") as file:
+                    writer = csv.DictWriter(file, fieldnames=self.rows[0].keys())
+                    if new:
+                        writer.writeheader()
+                    writer.writerows(self.rows[self._written :])
+        self._written = len(self.rows)
 
     def _read(self, count: int) -> list[dict]:
         rows = None
-        if self.comm.rank == 0 and self.path is not None and self.path.exists():
+        with raised_together(self.comm):
+            if self.comm.rank == 0:
+                rows = self._rows_of_file(count)
+        return self.comm.bcast(rows, root=0)
+
+    def _rows_of_file(self, count: int) -> list[dict]:
+        if self.path is None or not self.path.exists():
+            raise ValueError(f"cannot resume after {count} steps: {self.path} has no file.")
+        try:
             with open(self.path, newline="") as file:
-                rows = [{k: _number(v) for k, v in row.items()} for row in csv.DictReader(file)]
-        rows = self.comm.bcast(rows, root=0)
-        if rows is None or len(rows) < count:
-            found = "no file" if rows is None else f"{len(rows)} rows"
-            raise ValueError(f"cannot resume after {count} steps: {self.path} has {found}.")
-        return rows[:count]
+                rows = list(csv.DictReader(file, strict=True))
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise ValueError(f"cannot resume: {self.path} is no table: {error}.") from None
+        if len(rows) < count:
+            raise ValueError(
+                f"cannot resume after {count} steps: {self.path} has {len(rows)} rows."
+            )
+        for k, row in enumerate(rows[:count], start=1):
+            if None in row or None in row.values() or row.get("step") != str(k):
+                raise ValueError(
+                    f"cannot resume: row {k} of {self.path} is broken or not that of step {k}. Resume after fewer steps, "
+                    "or without the file."
+                )
+        return [{k: _number(v) for k, v in row.items()} for row in rows[:count]]
 
 
 def _number(text: str):

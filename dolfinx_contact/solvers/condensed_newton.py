@@ -80,6 +80,9 @@ class CondensedNotConverged(RuntimeError):
             "solution at all."
         )
 
+    def __reduce__(self):
+        return type(self), (self.best,)
+
 
 class CondensedNewton:
     """Options of the globalised semismooth Newton method and its fallbacks.
@@ -104,11 +107,14 @@ class CondensedNewton:
         max_seconds: float = math.inf,
         fallbacks: bool = True,
     ):
-        self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol)
-        self.max_iterations = int(positive("max_iterations", max_iterations))
-        self.newton_iterations = int(positive("newton_iterations", newton_iterations))
+        self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol, finite=True)
+        self.max_iterations = int(positive("max_iterations", max_iterations, whole=True))
+        self.newton_iterations = int(positive("newton_iterations", newton_iterations, whole=True))
         self.max_seconds = positive("max_seconds", max_seconds)
         self.fallbacks = bool(fallbacks)
+
+    def __repr__(self) -> str:
+        return f"CondensedNewton({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
 
     def solve_condensed(
         self, operator, friction: Friction, q, tol, starts=(), **scales
@@ -209,40 +215,9 @@ def solve_condensed(
         CondensedNotConverged: no method reached ``tol``; carries the best state and what was tried.
             That is also the answer to a problem without solution.
     """
-    q = finite("q", q)
-    dim = q.shape[1] if q.ndim == 2 else 3
-    if dim not in (2, 3) or q.ndim > 2 or q.size % dim:
-        raise ValueError(f"q must have shape (n, 3), (n, 2) or (3n,), not {q.shape}.")
-    q = q.reshape(-1, dim)
-    W = finite("W", W.toarray() if hasattr(W, "toarray") else W)
-    if W.shape != (q.size, q.size):
-        raise ValueError(
-            f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
-        )
-    if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction, not {friction!r}.")
-    if friction.mu.ndim == 2 and len(friction.mu) != len(q):
-        raise ValueError(
-            f"friction has coefficients for {len(friction.mu)} contacts, q has {len(q)}."
-        )
-    friction.law(dim)  # refuses what has no meaning in two dimensions
-    if (np.diag(W)[dim - 1 :: dim] < 0).any():
-        raise ValueError(
-            "W has a negative normal diagonal entry: a contact must give way to its reaction."
-        )
-    if r0 is not None:
-        r0 = finite("r0", r0)
-        if r0.size != q.size:
-            raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
-    solver = CondensedNewton() if solver is None else solver
-    if not isinstance(solver, CondensedNewton):
-        raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
-    if max_seconds is not None:
-        options = vars(solver) | {"max_seconds": max_seconds}
-        solver = CondensedNewton(**options)
-    tol = positive("tol", tol)
-    if tol < 1e-13:
-        raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
+    q, W, r0 = _checked_problem(q, W, friction, r0)
+    dim = q.shape[1]
+    solver, tol = _checked_options(solver, tol, max_seconds)
     turns = principal_axes(friction, len(q), dim)
     starts = () if r0 is None else [np.einsum("nij,nj->ni", turns, r0.reshape(q.shape))]
     if friction.axes is not None:
@@ -255,6 +230,53 @@ def solve_condensed(
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
+
+
+def _checked_problem(q, W, friction, r0) -> tuple:
+    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together."""
+    q = finite("q", q)
+    dim = q.shape[1] if q.ndim == 2 else 3
+    if dim not in (2, 3) or q.ndim not in (1, 2) or q.size % dim:
+        raise ValueError(f"q must have shape (n, 3), (n, 2) or (3n,), not {q.shape}.")
+    if q.size == 0:
+        raise ValueError(f"q is empty, of shape {q.shape}: there is no contact to solve for.")
+    q = q.reshape(-1, dim)
+    W = finite("W", W.toarray() if hasattr(W, "toarray") else W)
+    if W.shape != (q.size, q.size):
+        raise ValueError(
+            f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
+        )
+    if not isinstance(friction, Friction):
+        raise ValueError(f"friction must be a Friction, not {friction!r}.")
+    for name, rows in (("coefficients", friction.mu), ("axes", friction.axes)):
+        if rows is not None and rows.ndim == 2 and len(rows) != len(q):
+            raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")
+    friction.law(dim)  # refuses what has no meaning in two dimensions
+    diagonal = np.diag(W)
+    if (diagonal < 0).any():
+        at = max(np.flatnonzero(diagonal < 0), key=lambda k: k % dim)  # a normal one, if there is
+        direction = "normal" if at % dim == dim - 1 else "tangential"
+        raise ValueError(
+            f"W has a negative {direction} diagonal entry, {diagonal[at]:g} at contact {at // dim}: a contact must give "
+            "way to its reaction."
+        )
+    if r0 is not None:
+        r0 = finite("r0", r0)
+        if r0.size != q.size:
+            raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
+    return q, W, r0
+
+
+def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
+    solver = CondensedNewton() if solver is None else solver
+    if not isinstance(solver, CondensedNewton):
+        raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
+    if max_seconds is not None:
+        solver = CondensedNewton(**vars(solver) | {"max_seconds": max_seconds})
+    tol = positive("tol", tol, finite=True)
+    if tol < 1e-13:
+        raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
+    return solver, tol
 
 
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
