@@ -101,6 +101,10 @@ class Contact(ContactResults):
         self.reset()
         self._made = True
 
+    def __repr__(self) -> str:
+        friction = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
+        return f"<Contact of {self.nodes.size} nodes on this rank, {self.plane!r}, {friction}, wear={self.wear!r}>"
+
     def reset(self) -> None:
         """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
         n, gdim = self.points.count, self.points.dim

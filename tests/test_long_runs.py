@@ -1,0 +1,268 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Clusters, pools and long runs: nothing hangs, leaks or goes on in different directions on different ranks.
+
+A test that hangs here means that one rank raised and another waits for it.
+"""
+
+import gc
+import logging
+import multiprocessing
+
+import numpy as np
+import pytest
+import scenes
+
+import dolfinx_contact as dc
+
+COMM = scenes.COMM
+LAST = COMM.rank == COMM.size - 1
+SEVERAL = pytest.mark.skipif(COMM.size == 1, reason="needs more than one rank")
+
+
+def pressed(**options):
+    scene = scenes.block(cells=(2, 2, 2), **options)
+    scene.move_top(0.001, 0.0, -0.01)
+    scene.problem.solve()
+    return scene
+
+
+def fails(_):
+    dc.solve_condensed(-1e-3 * np.ones((3, 3)) + np.eye(3), np.array([[5.0, 0.0, -1.0]]), dc.Friction(3.0), dc.CondensedNewton(max_iterations=1, fallbacks=False, newton_iterations=1), tol=1e-13)  # fmt: skip
+
+
+@pytest.mark.skipif(COMM.size > 1, reason="starts processes of its own")
+def test_a_pool_of_processes_gets_the_failure():
+    """What a worker raises arrives, instead of leaving the pool waiting for ever."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        with pytest.raises(dc.CondensedNotConverged, match="not converged") as caught:
+            pool.map_async(fails, [0]).get(timeout=60)
+    assert caught.value.best.reaction.shape == (1, 3)
+
+
+def memory() -> float:
+    """Resident memory, MB."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096 / 1e6
+
+
+@pytest.mark.parametrize(
+    "end, solver",
+    [
+        ("dropped", dc.CondensedNewton()),
+        *(
+            pytest.param(end, solver, marks=pytest.mark.slow)
+            for end, solver in (
+                ("dropped", dc.FixedPoint()),
+                ("closed", dc.CondensedNewton()),
+                ("closed", dc.FixedPoint()),
+            )
+        ),
+    ],
+)
+def test_problems_leave_nothing_behind(end, solver):
+    """Two hundred problems of 735 unknowns, closed or just dropped, take no more memory than one."""
+    scene = scenes.block(cells=(6, 6, 4), solver=solver)
+    assert scene.V.dofmap.index_map.size_global * 3 == 735
+    scene.move_top(0.001, 0.0, -0.01)
+
+    def once():
+        problem = dc.ContactProblem(scene.F, scene.u, scene.contact, bcs=scene.bcs, solver=solver)
+        problem.solve()
+        if end == "closed":
+            problem.close()
+
+    for _ in range(10):
+        once()
+    gc.collect()
+    before = memory()
+    for _ in range(200):
+        once()
+    assert memory() - before < 10.0
+
+
+@pytest.mark.slow
+def test_changed_moduli_leave_nothing_behind():
+    """A modulus that changes in every step takes no more memory than one that stays."""
+    scene = scenes.block(cells=(6, 6, 4))
+    scene.move_top(0.001, 0.0, -0.01)
+    for k in range(210):
+        scene.modulus.value = 210e3 * (1 + 1e-4 * k)
+        scene.problem.solve()
+        if k == 10:
+            gc.collect()
+            before = memory()
+    assert memory() - before < 10.0
+
+
+def test_a_closed_problem_says_so():
+    """After close, or with, results stay and nothing can be solved; closing twice is closing."""
+    scene = pressed()
+    reaction = scene.contact.reaction
+    with scene.problem as problem:
+        assert problem is scene.problem
+    scene.problem.close()
+    assert scene.contact.reaction is reaction
+    for verb in (scene.problem.solve, scene.problem.reset, lambda: scene.problem.save("x.npz")):
+        with pytest.raises(ValueError, match="has been closed"):
+            verb()
+
+
+def test_a_table_that_cannot_be_written_is_an_error_on_all_ranks(tmp_path):
+    """A folder that is not there, on the rank that writes, raises on all; the row is kept and written later."""
+    scene, folder = pressed(), COMM.bcast(tmp_path, root=0) / "later"
+    history = dc.History(scene.problem, folder / "run.csv")
+    step = scene.problem.solve()
+    with pytest.raises(FileNotFoundError):
+        history.record(step)
+    COMM.barrier()
+    if COMM.rank == 0:
+        folder.mkdir()
+    history.record(step)
+    COMM.barrier()
+    assert dc.History(scene.problem, folder / "run.csv", resume=2).rows == history.rows
+    with pytest.raises(ValueError, match="columns are not those of the first row.*'load'"):
+        history.record(step, load=1.0)
+    assert len(history.rows) == 2
+
+
+@pytest.mark.parametrize(
+    "content", ["step,a\n1\n2,3,4\n", "step,a\n7,1\n", "\xff\x00", "", "a,b\n1,2\n"]
+)
+def test_a_broken_table_is_not_resumed(tmp_path, content):
+    """Rows that are torn, or not those of the steps, are refused on all ranks."""
+    scene, path = pressed(), COMM.bcast(tmp_path, root=0) / "run.csv"
+    if COMM.rank == 0:
+        path.write_bytes(content.encode("latin-1"))
+    COMM.barrier()
+    with pytest.raises(ValueError, match="cannot resume"):
+        dc.History(scene.problem, path, resume=1)
+    COMM.barrier()
+    if COMM.rank == 0:
+        assert path.read_bytes() == content.encode("latin-1")  # left as it is
+
+
+@pytest.mark.parametrize("arguments, message", [({"contact": 1}, "contact 1: the problem has 1"), ({"resume": 1.5}, "resume must be"), ({"resume": -1}, "resume must be")])  # fmt: skip
+def test_tables_refuse(arguments, message):
+    """Contacts and rows that are not there are named."""
+    with pytest.raises(ValueError, match=message):
+        dc.History(pressed().problem, **arguments)
+
+
+class Odd(Exception):
+    """An error that cannot be made from a message, as other packages have them."""
+
+    def __init__(self, one, two):
+        super().__init__(one, two)
+
+
+@pytest.mark.parametrize("kind", [RuntimeError, Odd])
+@pytest.mark.parametrize("solver", [dc.CondensedNewton(), dc.FixedPoint()])
+def test_a_monitor_that_raises_on_one_rank_ends_the_step_on_all(kind, solver):
+    """Its error is that of the step, and the last converged state is in place."""
+    scene = pressed(solver=solver)
+    u = scene.u.x.array.copy()
+
+    def monitor(*_):
+        if LAST:
+            raise kind("no", "more") if kind is Odd else kind("no more")
+
+    scene.problem.monitor = monitor
+    scene.move_top(0.002, 0.0, -0.02)
+    with pytest.raises((kind, RuntimeError), match="no"):
+        scene.problem.solve()
+    assert np.array_equal(scene.u.x.array, u)
+    scene.problem.monitor = None
+    scene.problem.solve()
+
+
+@SEVERAL
+@pytest.mark.parametrize(
+    "what", ["tol", "solver", "max_seconds", "contacts", "petsc_options", "monitor", "bcs"]
+)
+def test_arguments_that_differ_between_ranks_are_refused(what):
+    """What must be the same on all ranks is compared before it leads them apart."""
+    scene = scenes.block(cells=(2, 2, 2))
+    changes = {
+        "tol": {"tol": 1e-7},
+        "solver": {"solver": dc.FixedPoint()},
+        "max_seconds": {"solver": dc.CondensedNewton(max_seconds=10.0)},
+        "contacts": {"contacts": []},
+        "petsc_options": {"petsc_options": {"pc_type": "lu"}},
+        "bcs": {"bcs": []},
+        "monitor": {},
+    }[what]
+    base = {
+        "contacts": [scene.contact],
+        "bcs": scene.bcs,
+        "solver": dc.CondensedNewton(),
+        "tol": 1e-8,
+    }
+    with pytest.raises(ValueError, match="differs between ranks"):
+        problem = dc.ContactProblem(scene.F, scene.u, **base | (changes if LAST else {}))
+        problem.monitor = print if LAST else None
+        problem.solve()
+
+
+@SEVERAL
+@pytest.mark.parametrize("what", ["tol", "solver", "load", "modulus"])
+def test_what_differs_between_ranks_from_a_step_on_is_refused(what):
+    """So is what is changed between steps on one rank; put right, the run goes on."""
+    scene = pressed(solver=dc.FixedPoint())
+    old = scene.problem.tol, scene.problem.solver
+    if LAST:
+        if what == "tol":
+            scene.problem.tol = 1e-7
+        elif what == "solver":
+            scene.problem.solver = dc.FixedPoint(max_seconds=10.0)
+        elif what == "load":
+            scene.force.value[2] = -1.0
+        else:
+            scene.modulus.value = 200e3
+    with pytest.raises(ValueError, match="differs between ranks"):
+        scene.problem.solve()
+    scene.problem.tol, scene.problem.solver = old
+    scene.force.value[2], scene.modulus.value = 0.0, 210e3
+    scene.problem.solve()
+
+
+@pytest.mark.parametrize("solver", [None, dc.CondensedNewton(), dc.FixedPoint()])
+def test_every_solver_calls_the_monitor(solver):
+    """With the errors of the states it judges, the last of which is that of the record."""
+    scene, seen = scenes.block(cells=(2, 2, 2), solver=solver), []
+    scene.problem.monitor = lambda *line: seen.append(line)
+    scene.move_top(0.001, 0.0, -0.01)
+    step = scene.problem.solve()
+    assert [line[0] for line in seen] == sorted({line[0] for line in seen})
+    assert min(line[1] for line in seen) <= scene.problem.tol
+    assert seen[-1][2] == step.counts
+    assert step.iterations > 0
+
+
+def test_a_step_is_a_line_of_the_log(caplog):
+    """Standard logging has one line a step on rank 0, with what failed, too; nothing without being asked."""
+    scene = scenes.block(cells=(2, 2, 2))
+    with caplog.at_level(logging.INFO, logger="dolfinx_contact"):
+        for top in ((0, 0, -0.005), (0.001, 0, -0.01)):
+            scene.move_top(*top)
+            scene.problem.solve()
+        scene.problem.solver = dc.FixedPoint(max_iterations=1, newton=False)
+        scene.move_top(0.003, 0, -0.02)
+        with pytest.raises(dc.NotConverged):
+            scene.problem.solve()
+    lines = [record.getMessage() for record in caplog.records if record.name == "dolfinx_contact"]
+    assert len(lines) == (3 if COMM.rank == 0 else 0)
+    if COMM.rank == 0:
+        assert lines[0].startswith("step solved: error") and "CondensedNewton" in lines[0]
+        assert lines[2].startswith("step failed: NotConverged: not converged")
+
+
+def test_reprs_have_sizes_and_settings():
+    """What is printed in an interactive session says what it is."""
+    scene = scenes.block(cells=(2, 2, 2), solver=dc.CondensedNewton(max_seconds=5.0))
+    assert "81 unknowns" in repr(scene.problem) and "max_seconds=5.0" in repr(scene.problem)
+    nodes = len(scene.contact.nodes)
+    assert f"{nodes} nodes" in repr(scene.contact) and "Friction(mu=(0.3, 0.15)" in repr(
+        scene.contact
+    )
+    assert repr(dc.FixedPoint(depth=3)).startswith("FixedPoint(map='return', rho=None, depth=3")
