@@ -6,6 +6,7 @@ import from here what moved between releases, and read as present-day DOLFINx ev
 
 from __future__ import annotations
 
+import ctypes
 from types import SimpleNamespace
 
 import dolfinx
@@ -168,3 +169,14 @@ def free_garbage(comm) -> None:
 def may_free_alone(comm) -> bool:
     """Whether this rank may free PETSc objects without the others: it has none, and PETSc still runs."""
     return not PETSc.Sys.isFinalized() and comm.size == 1
+
+
+def option_was_read(name: str) -> bool:
+    """Whether PETSc has asked for an option of its database, which petsc4py does not tell; True if nobody knows."""
+    try:
+        used = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
+    except (OSError, AttributeError, TypeError):
+        return True
+    used.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.POINTER(ctypes.c_int)]
+    found = ctypes.c_int(0)
+    return used(None, name.encode(), ctypes.byref(found)) != 0 or bool(found.value & 1)

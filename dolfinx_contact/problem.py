@@ -19,6 +19,7 @@ from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.problem_input import (
     check_mesh,
+    check_planes,
     check_size,
     checked_conditions,
     checked_contacts,
@@ -102,6 +103,8 @@ class ContactProblem(Guarded):
         self.u, self.monitor = u, None
         self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
         hold(self.contacts, self.body)
+        check_planes(self.contacts, self.body)
+        self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
         self._laws = self._present_laws()
@@ -195,7 +198,7 @@ class ContactProblem(Guarded):
         for contact in self.contacts:
             contact.advance()
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
-        check_size(self.body, found.x)
+        self._large = self._large or check_size(self.body, found.x)
         if max(done.error, done.slip_error, done.forward_error) > self.tol:
             warnings.warn(
                 f"double precision allows no smaller error here than at present, tol is {self.tol:.1e}: {done}.",

@@ -14,6 +14,7 @@ from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
 
+DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
 
 
@@ -130,7 +131,7 @@ def hold(contacts, body) -> None:
         f"{len(where)} of {nodes} contact nodes, between {low} and {high}, are left out: boundary conditions give "
         "their displacement along the normal, so that they cannot touch. Take their facets out of the contact, or "
         "them out of the conditions, if that is not meant.",
-        stacklevel=4,
+        stacklevel=3,
     )
 
 
@@ -149,12 +150,31 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple[np.ndarray, n
     return (left[:, :-1] < 0.5) | closed[:, None], closed
 
 
-def check_size(body, x: np.ndarray) -> None:
-    """Warn of a displacement far larger than the body.  Collective."""
+def check_planes(contacts, body) -> None:
+    """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
+    for contact in contacts:
+        plane, gdim = contact.plane, contact.points.dim
+        x = body.V.tabulate_dof_coordinates()[:, :gdim]
+        height = (x - plane.point - plane.displacement) @ plane.normal
+        highest, deepest = (body.highest(values) for values in (height, -height))
+        inside = body.largest(-contact.gap)
+        if highest < DEEP * deepest:
+            said = f"the body lies on the other side of {plane} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
+        elif inside > DEEP * body.extent:
+            said = f"the body starts {inside:.3g} deep inside {plane}, more than a tenth of its size: check point and normal, or move the plane by plane.displacement step by step"  # fmt: skip
+        else:
+            continue
+        warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
+
+
+def check_size(body, x: np.ndarray) -> bool:
+    """Warn of a displacement far larger than the body; whether it was.  Collective."""
     largest = body.largest(np.abs(x))
-    if largest > LARGE * body.extent:
-        warnings.warn(
-            f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
-            f"{body.extent:.3g}: check the units of lengths, loads and moduli. (Elasticity is linear here.)",
-            stacklevel=4,
-        )
+    if largest <= LARGE * body.extent:
+        return False
+    warnings.warn(
+        f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
+        f"{body.extent:.3g}: check the units of lengths, loads and moduli. (Elasticity is linear here.)",
+        stacklevel=3,
+    )
+    return True

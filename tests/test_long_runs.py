@@ -266,3 +266,40 @@ def test_reprs_have_sizes_and_settings():
         scene.contact
     )
     assert repr(dc.FixedPoint(depth=3)).startswith("FixedPoint(map='return', rho=None, depth=3")
+
+
+def warned(make, message):
+    """What ``make`` returns, after one warning that says this."""
+    with pytest.warns(UserWarning, match=message) as said:
+        made = make()
+    assert len(said) == 1
+    return made
+
+
+def test_a_normal_that_faces_the_wrong_way_is_warned_of():
+    """Seen from a plane turned over the whole body lies below it: said once, when the problem is made."""
+    scene = scenes.block(cells=(2, 2, 2))
+    for point, message in (((0, 0, 0), "turn the normal"), ((0, 0, 0.3), "starts .* deep inside")):
+        normal = (0, 0, -1) if point == (0, 0, 0) else (0, 0, 1)
+        plane = dc.RigidPlane(point, normal, (1, 0, 0))
+        contact = dc.Contact(scene.V, scene.facets, plane, dc.Friction(0.3))
+        warned(lambda: dc.ContactProblem(scene.F, scene.u, contact, bcs=scene.bcs), message)  # noqa: B023
+
+
+def test_a_displacement_far_larger_than_the_body_is_warned_of():
+    """Units that do not fit together show in the first step, and are named once."""
+    scene = scenes.block(cells=(2, 2, 2))
+    scene.move_top(0, 0, 100.0)
+    warned(scene.problem.solve, "times the size of the body, 1: check the units")
+    scene.move_top(0, 0, 101.0)
+    scene.problem.solve()
+
+
+def test_misspelt_petsc_options_are_warned_of():
+    """An option that PETSc never reads is named once; those that it reads are not."""
+    options = {"ksp_type": "cg", "ksp_rtol": 1e-12, "pc_type": "jacobi", "ksp_max_itt": 3}
+    scene = scenes.block(cells=(2, 2, 2), petsc_options=options, solver=dc.FixedPoint())
+    scene.move_top(0, 0, -0.01)
+    warned(scene.problem.solve, r"petsc_options \['ksp_max_itt'\] were not read")
+    scene.modulus.value = 200e3
+    scene.problem.solve()

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from dolfinx_contact.collective import raised_together
@@ -53,3 +55,14 @@ def check_constants(constants, comm) -> None:
                     f"a constant in F differs between ranks: here {here.tolist()}, on rank 0 {there.tolist()}. Give the "
                     "same on all."
                 )
+
+
+def warn_of_unread(options: list[str]) -> None:
+    """Warn of PETSc options that were not asked for; those of levels are only where there are levels."""
+    unread = [name for name in options if not name.startswith(("mg_levels_", "mg_coarse_"))]
+    if unread:
+        warnings.warn(
+            f"petsc_options {unread} were not read by PETSc: they are misspelt, or do not belong to this solver and "
+            "preconditioner. `-help` lists those there are.",
+            stacklevel=2,
+        )

@@ -15,7 +15,12 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
-from dolfinx_contact.bodies.checks import check_constants, check_diagonal, check_dilation
+from dolfinx_contact.bodies.checks import (
+    check_constants,
+    check_diagonal,
+    check_dilation,
+    warn_of_unread,
+)
 from dolfinx_contact.bodies.forms import digest_of, linear_part
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.collective import raised_together
@@ -63,7 +68,7 @@ class ElasticBody:
         self._assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
-        self.closed = False
+        self.closed = self._said = False
         self.known: FreeState | None = None  # the last one
         self.extent = rigid_motion.extent(self.V)
 
@@ -219,6 +224,10 @@ class ElasticBody:
         """Largest entry over all ranks, at least zero."""
         return self.comm.allreduce(float(x.max(initial=0.0)), op=MPI.MAX)
 
+    def highest(self, x: np.ndarray) -> float:
+        """Largest entry over all ranks, which may be below zero."""
+        return self.comm.allreduce(float(x.max(initial=-np.inf)), op=MPI.MAX)
+
     def norm(self, x: np.ndarray) -> float:
         """Euclidean norm over all ranks, safe against under- and overflow of squares."""
         largest = self.largest(np.abs(x))
@@ -234,9 +243,15 @@ class ElasticBody:
 
     def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
         """K^-1 b; the solver is set up at the first call and kept while K stands."""
+        return self._own_solver().solve(b, rough, start)
+
+    def _own_solver(self) -> LinearSolver:
         if self._elastic is None:
             self._elastic = self.solver(self.K)
-        return self._elastic.solve(b, rough, start)
+            if self.options is not None and not self._said:
+                self._said = True
+                warn_of_unread(self._elastic.unread)
+        return self._elastic
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:
         """Displacement under ``b`` alone; where ``b`` is an earlier one times a factor, so is the answer.
@@ -280,9 +295,7 @@ class ElasticBody:
     @property
     def ksp(self):
         """The linear solver of K, for many right-hand sides at a time."""
-        if self._elastic is None:
-            self._elastic = self.solver(self.K)
-        return self._elastic.ksp
+        return self._own_solver().ksp
 
     @property
     def exact(self) -> bool:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 import numpy as np
 from petsc4py import PETSc
 
+from dolfinx_contact import compat
+
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
 # Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
@@ -67,6 +69,9 @@ class LinearSolver:
         prefix: Prefix of the options.
         near_nullspace: Function that returns the rigid motions, ``shape=(n, 6 or 3)``, orthonormal, zero
             at fixed degrees of freedom; called only where the preconditioner is no factorisation.
+
+    Attributes:
+        unread: Names of options that PETSc did not ask for.
     """
 
     def __init__(self, A, options, prefix: str, near_nullspace):
@@ -88,6 +93,7 @@ class LinearSolver:
             database[key] = value
         self.ksp.setFromOptions()
         self.ksp.setUp()  # reads the options of the levels, which must still be there
+        self.unread = [key for key in ours if not compat.option_was_read(f"{prefix}{key}")]
         for key in ours:
             del database[key]
         self._right, self._left = A.createVecs()
