@@ -1,11 +1,11 @@
-"""What users are told: mistakes, raised by all ranks together so that none waits for another for
-ever, and what rounding does not let be reached."""
+"""What all ranks do together: mistakes are raised on all, so that none waits for another for ever; sums and norms."""
 
 from __future__ import annotations
 
 import pickle
 from contextlib import contextmanager
 
+import numpy as np
 from mpi4py import MPI
 
 
@@ -59,3 +59,34 @@ def _told(error) -> tuple[type, str]:
     except Exception:
         return RuntimeError, f"{kind.__name__}: {error}"
     return kind, str(error)
+
+
+class OverRanks:
+    """Sums, norms and comparisons over the ranks of ``self.comm``.  Collective."""
+
+    comm: MPI.Comm
+
+    def total(self, array: np.ndarray) -> np.ndarray:
+        """Sum of an array over all ranks."""
+        result = np.array(array, dtype=np.float64)
+        self.comm.Allreduce(MPI.IN_PLACE, result, op=MPI.SUM)
+        return result
+
+    def largest(self, x: np.ndarray) -> float:
+        """Largest entry over all ranks, at least zero."""
+        return self.comm.allreduce(float(x.max(initial=0.0)), op=MPI.MAX)
+
+    def highest(self, x: np.ndarray) -> float:
+        """Largest entry over all ranks, which may be below zero."""
+        return self.comm.allreduce(float(x.max(initial=-np.inf)), op=MPI.MAX)
+
+    def norm(self, x: np.ndarray) -> float:
+        """Euclidean norm over all ranks, safe against under- and overflow of squares."""
+        largest = self.largest(np.abs(x))
+        if largest == 0.0 or not np.isfinite(largest):
+            return largest
+        return largest * float(np.sqrt(self.total(np.sum((x / largest) ** 2))))
+
+    def same(self, x: np.ndarray, y: np.ndarray) -> bool:
+        """Whether two arrays are equal on all ranks."""
+        return self.comm.allreduce(np.array_equal(x, y), op=MPI.LAND)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections import deque
 from time import perf_counter
 
@@ -14,13 +13,13 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.problem_input import (
-    check_mesh,
+    check_alive,
     check_planes,
     check_size,
+    check_step,
     checked_conditions,
     checked_contacts,
     checked_options,
@@ -29,18 +28,23 @@ from dolfinx_contact.problem_input import (
     hold,
 )
 from dolfinx_contact.results import checkpoint
-from dolfinx_contact.results.record import Counts, NotConverged, Step, counts, record
+from dolfinx_contact.results.record import (
+    Counts,
+    NotConverged,
+    Step,
+    counts,
+    record,
+    warn_of_rounding,
+)
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.condensed import KEPT
 from dolfinx_contact.step import LoadStep
+from dolfinx_contact.trial import may_touch, presses, refined
 
 LOG = logging.getLogger("dolfinx_contact")
 
 
 NOTHING = "none: nothing touches"
-
-# Penetration over the largest displacement that three digits of it leave no doubt about.
-CERTAIN = 0.1
 
 
 class ContactProblem(Guarded):
@@ -178,8 +182,10 @@ class ContactProblem(Guarded):
                 nothing holds.  After any exception the last converged state is in place.
         """
         start = perf_counter()
+        self._check_owned()
         try:
             self._check_input()
+            self._renew_laws()
             step, found = self._search()
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not self._converged(step.errors, done):
@@ -199,12 +205,7 @@ class ContactProblem(Guarded):
             contact.advance()
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
-        if max(done.error, done.slip_error, done.forward_error) > self.tol:
-            warnings.warn(
-                f"double precision allows no smaller error here than at present, tol is {self.tol:.1e}: {done}.",
-                RoundingWarning,
-                stacklevel=2,
-            )
+        warn_of_rounding(done, self.tol)
         return done
 
     def save(self, path) -> None:
@@ -266,10 +267,10 @@ class ContactProblem(Guarded):
         step = self.load_step()
         with stage("contact: elastic solve"):
             trial = self.body.free_state(step.b, rough=True)
-            if not (self.body.known.exact or self._presses(trial)):
+            if not (self.body.known.exact or presses(self.body, self.contacts, trial)):
                 trial = self.body.free_state(step.b)  # whether anything touches takes all digits
-        if not self._may_touch(trial):
-            trial = self._refined(step, trial)
+        if not may_touch(self.body, self.contacts, trial):
+            trial = refined(self.body, step, trial)
             if step.errors.within(self.tol):
                 return step, SolverResult(trial, 0, 0.0, NOTHING)
         with stage("contact: iterations"):
@@ -281,17 +282,6 @@ class ContactProblem(Guarded):
         """Whether all errors are at most the tolerance, or nothing is left above rounding."""
         near = record.forward_error <= self.tol or errors.within(0.0)
         return near and errors.within(self.tol)
-
-    def _refined(self, step: LoadStep, x: np.ndarray) -> np.ndarray:
-        """The displacement without reactions, with another digit where what is left of ``b`` counts."""
-        errors = step.measure_open(x)
-        if errors.largest <= self.tol:
-            return x
-        finer = x + self.body.solve(step.b - self.body.multiply(x))
-        if step.measure_open(finer).largest < errors.largest:
-            return finer
-        step.measure_open(x)
-        return x
 
     def _unbind(self) -> None:
         """Forget what was set up for a stiffness that has changed.  Collective."""
@@ -312,23 +302,6 @@ class ContactProblem(Guarded):
 
         return watch
 
-    def _presses(self, trial: np.ndarray) -> bool:
-        """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
-        deepest = 0.0
-        for contact in self.contacts:
-            contact.move(trial)
-            deepest = max(deepest, -contact.gap.min(initial=0.0))
-        deepest, largest = (self.body.largest(a) for a in (np.array([deepest]), np.abs(trial)))
-        return deepest > CERTAIN * largest
-
-    def _may_touch(self, trial: np.ndarray) -> bool:
-        """Whether a displacement without reactions penetrates a plane by more than rounding."""
-        deepest = 0.0
-        for contact in self.contacts:
-            contact.move(trial)
-            deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
-        return self.body.largest(np.array([deepest])) > 1.0
-
     def _set_stiffness(self) -> None:
         """Take what errors and solvers want to know of the stiffness at the contact nodes."""
         body = self.body
@@ -342,36 +315,21 @@ class ContactProblem(Guarded):
     # -- helpers -------------------------------------------------------------------------------
 
     def _check_owned(self) -> None:
-        """Raise a ``ValueError`` if this problem can no longer go on."""
-        if self.body.closed:
-            raise ValueError("this ContactProblem has been closed: make a new one.")
-        if not all(contact.belongs_to(self) for contact in self.contacts):
-            raise ValueError(
-                "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
-                "go on with that one, or make a Contact for each."
-            )
+        check_alive(self, self.body, self.contacts)
 
     def _check_input(self) -> None:
-        comm = self.body.comm
-        laws = comm.bcast([contact.described() for contact in self.contacts], root=0)
-        with raised_together(comm):
-            self._check_owned()
-            for contact, described in zip(self.contacts, laws):
-                contact.check(described)
-            for contact in self.contacts[:1]:  # of one mesh, all of them
-                check_mesh(contact)
-            if not np.isfinite(self.u.x.array).all():
-                raise ValueError(
-                    "u contains NaN or infinity: it is the guess of this step, set it anew."
-                )
-        agree(comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
+        check_step(self.u, self.body.comm, self.contacts)
+        agree(self.body.comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
+
+    def _renew_laws(self) -> None:
+        """Let the solver know of friction that was exchanged since the last step.  Collective."""
         laws = self._present_laws()
         changed = any(one is not other for one, other in zip(laws, self._laws))
-        if comm.allreduce(changed, op=MPI.LOR):
-            self._laws = laws
+        if self.body.comm.allreduce(changed, op=MPI.LOR):
             renew = getattr(self._bound, "renew_law", None)
             if renew is None or not renew():
                 self._unbind()
+            self._laws = laws
 
     def _present_laws(self) -> list:
         return [contact.friction for contact in self.contacts]

@@ -167,6 +167,31 @@ def check_planes(contacts, body) -> None:
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
 
 
+def check_alive(problem, body, contacts) -> None:
+    """Raise a ``ValueError`` if a problem can no longer go on."""
+    if body.closed:
+        raise ValueError("this ContactProblem has been closed: make a new one.")
+    if not all(contact.belongs_to(problem) for contact in contacts):
+        raise ValueError(
+            "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
+            "go on with that one, or make a Contact for each."
+        )
+
+
+def check_step(u, comm, contacts) -> None:
+    """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
+    first = comm.bcast([contact.described() for contact in contacts], root=0)
+    with raised_together(comm):
+        for contact, described in zip(contacts, first):
+            contact.check(described)
+        for contact in contacts[:1]:  # of one mesh, all of them
+            check_mesh(contact)
+        if not np.isfinite(u.x.array).all():
+            raise ValueError(
+                "u contains NaN or infinity: it is the guess of this step, set it anew."
+            )
+
+
 def check_size(body, x: np.ndarray) -> bool:
     """Warn of a displacement far larger than the body; whether it was.  Collective."""
     largest = body.largest(np.abs(x))

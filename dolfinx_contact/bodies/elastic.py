@@ -23,14 +23,14 @@ from dolfinx_contact.bodies.checks import (
 )
 from dolfinx_contact.bodies.forms import digest_of, linear_part
 from dolfinx_contact.bodies.free_state import FreeState
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.collective import OverRanks, raised_together
 from dolfinx_contact.petsc.linear_solver import LinearSolver, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
 
 
-class ElasticBody:
+class ElasticBody(OverRanks):
     """F(u) = K u - f on the free degrees of freedom, u given on the others.
 
     Args:
@@ -213,31 +213,6 @@ class ElasticBody:
         self._right.array_w[:] = x
         self.K.mult(self._right, self._left)
         return self._left.array_r.copy()
-
-    def total(self, array: np.ndarray) -> np.ndarray:
-        """Sum of an array over all ranks."""
-        result = np.array(array, dtype=np.float64)
-        self.comm.Allreduce(MPI.IN_PLACE, result, op=MPI.SUM)
-        return result
-
-    def largest(self, x: np.ndarray) -> float:
-        """Largest entry over all ranks, at least zero."""
-        return self.comm.allreduce(float(x.max(initial=0.0)), op=MPI.MAX)
-
-    def highest(self, x: np.ndarray) -> float:
-        """Largest entry over all ranks, which may be below zero."""
-        return self.comm.allreduce(float(x.max(initial=-np.inf)), op=MPI.MAX)
-
-    def norm(self, x: np.ndarray) -> float:
-        """Euclidean norm over all ranks, safe against under- and overflow of squares."""
-        largest = self.largest(np.abs(x))
-        if largest == 0.0 or not np.isfinite(largest):
-            return largest
-        return largest * float(np.sqrt(self.total(np.sum((x / largest) ** 2))))
-
-    def same(self, x: np.ndarray, y: np.ndarray) -> bool:
-        """Whether two arrays are equal on all ranks."""
-        return self.comm.allreduce(np.array_equal(x, y), op=MPI.LAND)
 
     # -- solves --------------------------------------------------------------------------------
 

@@ -14,7 +14,6 @@ from dolfinx_contact import compat
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import (
-    check_coefficients,
     check_law,
     check_space,
     check_wear,
@@ -119,47 +118,6 @@ class Contact(ContactResults):
                 np.full(n, Status.OPEN, dtype=np.uint8),
             )
         )
-
-    @property
-    def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks."""
-        return self._friction
-
-    @friction.setter
-    def friction(self, friction: Friction) -> None:
-        check_law(self.plane, friction, self.V.mesh.geometry.dim)
-        self._friction, self._law = friction, friction.law(self.V.mesh.geometry.dim)
-
-    @property
-    def law(self):
-        """The kernel's law of this friction."""
-        return self._law
-
-    @property
-    def wear(self) -> Wear | None:
-        """The law of wear.  Another one may be assigned between steps, on all ranks."""
-        return self._wear
-
-    @wear.setter
-    def wear(self, wear: Wear | None) -> None:
-        check_wear(wear)
-        self._wear = wear
-
-    def described(self) -> dict[str, str]:
-        """Plane and laws, but coefficients per node, in words: the same on all ranks."""
-        law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
-        moved = repr(self.plane.displacement.tolist())
-        return {"plane": repr(self.plane), "plane.displacement": moved, "friction": law, "wear": repr(self.wear)}  # fmt: skip
-
-    def check(self, first: dict[str, str]) -> None:
-        """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""
-        for name, value in self.described().items():
-            if value != first[name]:
-                raise ValueError(
-                    f"{name} differs between ranks: here {value}, on rank 0 {first[name]}. Planes and laws must not "
-                    "differ between ranks."
-                )
-        check_coefficients(self.friction, self.nodes.size)
 
     def belong_to(self, problem) -> None:
         """From now on ``problem`` makes this contact's history."""
@@ -334,32 +292,3 @@ class Contact(ContactResults):
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
         self.settle(work.sum(axis=1), path, depth)
         self._settled_by = self.friction
-
-    def save(self) -> dict[str, np.ndarray]:
-        """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
-        return super().save() | self._laws() | {"plane": self.plane.displacement}
-
-    def check_saved(self, saved) -> None:
-        """Raise a ``ValueError`` if an array is missing or of another size, or another law or plane was saved."""
-        super().check_saved(saved)
-        for name, array in self._laws().items():
-            if name in saved and not np.allclose(saved[name], array, 1e-12, 0.0, equal_nan=True):
-                what = {"laws": "friction", "rigid_plane": "plane or wear"}[name]
-                raise ValueError(
-                    f"checkpoint: it was written with another {what}: here {self.friction}, {self.plane}, "
-                    f"wear {self.wear}. Set what the run had, then load."
-                )
-
-    def load(self, saved) -> None:
-        """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
-        super().load(saved)
-        self.plane.displacement = saved["plane"]
-
-    def _laws(self) -> dict[str, np.ndarray]:
-        """Coefficients and axes of all nodes; plane and wear."""
-        axes = (1.0, 0.0) if self.friction.axes is None else self.friction.axes
-        rows = (self.friction.mu, self.friction.p, axes)
-        laws = np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
-        wear = np.nan if self.wear is None else self.wear.coefficient
-        parts = (self.plane.point, self.frame.ravel(), np.broadcast_to(wear, 2))
-        return {"laws": laws, "rigid_plane": np.concatenate(parts)}

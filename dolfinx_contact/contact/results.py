@@ -9,10 +9,11 @@ from dolfinx import fem
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.contact import fields
-from dolfinx_contact.contact.history import ContactHistory, Status
+from dolfinx_contact.contact.history import Status
+from dolfinx_contact.contact.laws import ContactLaws
 
 
-class ContactResults(ContactHistory):
+class ContactResults(ContactLaws):
     """Results of the present state of a ``Contact``, which has laws, frame and nodes."""
 
     _area: np.ndarray | None = None

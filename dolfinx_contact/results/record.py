@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+
+from dolfinx_contact.checks import RoundingWarning
 
 
 class Counts(NamedTuple):
@@ -111,3 +114,13 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         solver=found.chosen,
         tried=found.tried,
     )
+
+
+def warn_of_rounding(step: Step, tol: float) -> None:
+    """Warn, in the name of who called ``solve``, of errors above the tolerance that rounding leaves."""
+    if max(step.error, step.slip_error, step.forward_error) > tol:
+        warnings.warn(
+            f"double precision allows no smaller error here than at present, tol is {tol:.1e}: {step}.",
+            RoundingWarning,
+            stacklevel=3,
+        )

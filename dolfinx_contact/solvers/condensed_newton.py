@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dolfinx_contact import _kernel
-from dolfinx_contact.checks import RoundingWarning, finite, positive
+from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.solvers.condensed_input import checked_problem
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ def solve_condensed(
         CondensedNotConverged: no method reached ``tol``; carries the best state and what was tried.
             That is also the answer to a problem without solution.
     """
-    q, W, r0 = _checked_problem(q, W, friction, r0)
+    q, W, r0 = checked_problem(q, W, friction, r0)
     dim = q.shape[1]
     solver, tol = _checked_options(solver, tol, max_seconds)
     turns = principal_axes(friction, len(q), dim)
@@ -230,41 +231,6 @@ def solve_condensed(
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
-
-
-def _checked_problem(q, W, friction, r0) -> tuple:
-    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together."""
-    q = finite("q", q)
-    dim = q.shape[1] if q.ndim == 2 else 3
-    if dim not in (2, 3) or q.ndim not in (1, 2) or q.size % dim:
-        raise ValueError(f"q must have shape (n, 3), (n, 2) or (3n,), not {q.shape}.")
-    if q.size == 0:
-        raise ValueError(f"q is empty, of shape {q.shape}: there is no contact to solve for.")
-    q = q.reshape(-1, dim)
-    W = finite("W", W.toarray() if hasattr(W, "toarray") else W)
-    if W.shape != (q.size, q.size):
-        raise ValueError(
-            f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
-        )
-    if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction, not {friction!r}.")
-    for name, rows in (("coefficients", friction.mu), ("axes", friction.axes)):
-        if rows is not None and rows.ndim == 2 and len(rows) != len(q):
-            raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")
-    friction.law(dim)  # refuses what has no meaning in two dimensions
-    diagonal = np.diag(W)
-    if (diagonal < 0).any():
-        at = max(np.flatnonzero(diagonal < 0), key=lambda k: k % dim)  # a normal one, if there is
-        direction = "normal" if at % dim == dim - 1 else "tangential"
-        raise ValueError(
-            f"W has a negative {direction} diagonal entry, {diagonal[at]:g} at contact {at // dim}: a contact must give "
-            "way to its reaction."
-        )
-    if r0 is not None:
-        r0 = finite("r0", r0)
-        if r0.size != q.size:
-            raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
-    return q, W, r0
 
 
 def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:

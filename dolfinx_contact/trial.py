@@ -1,0 +1,41 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The displacement without reactions: whether it presses on a plane, and whether it is the solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Penetration over the largest displacement that three digits of it leave no doubt about.
+CERTAIN = 0.1
+
+
+def presses(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
+    deepest = 0.0
+    for contact in contacts:
+        contact.move(trial)
+        deepest = max(deepest, -contact.gap.min(initial=0.0))
+    deepest, largest = (body.largest(a) for a in (np.array([deepest]), np.abs(trial)))
+    return deepest > CERTAIN * largest
+
+
+def may_touch(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions penetrates a plane by more than rounding."""
+    deepest = 0.0
+    for contact in contacts:
+        contact.move(trial)
+        deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
+    return body.largest(np.array([deepest])) > 1.0
+
+
+def refined(body, step, x: np.ndarray) -> np.ndarray:
+    """The displacement without reactions, with another digit where what is left of ``b`` counts."""
+    errors = step.measure_open(x)
+    if errors.largest <= step.tol:
+        return x
+    finer = x + body.solve(step.b - body.multiply(x))
+    if step.measure_open(finer).largest < errors.largest:
+        return finer
+    step.measure_open(x)
+    return x
