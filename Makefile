@@ -19,16 +19,16 @@ made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
 punch: .venv/ready
-	.venv/bin/python demos/demo_punch.py --output results/punch $(ARGS)
+	.venv/bin/python -m demos.demo_punch --output results/punch $(ARGS)
 
 stress: .venv/ready
-	.venv/bin/python benchmarks/stress.py --output results/stress $(ARGS)
+	.venv/bin/python -m benchmarks.stress --output results/stress $(ARGS)
 
 report: .venv/ready
-	.venv/bin/python benchmarks/report.py --size $(if $(QUICK),quick,full) $(ARGS)
+	.venv/bin/python -m benchmarks.report --size $(if $(QUICK),quick,full) $(ARGS)
 
 study: .venv/ready
-	.venv/bin/python demos/study_punch.py --output results/study $(if $(EXPLORE),--explore) $(ARGS)
+	.venv/bin/python -m studies.punch --output results/study $(if $(EXPLORE),--explore) $(ARGS)
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" $(ARGS)

@@ -6,25 +6,21 @@ Existence is certain for an elastic body, uniqueness is not. Every step is conde
 solved from many random starts; each answer is judged by NumPy functions of the tests. The fixed point then
 does the step from the same history, which is Newton's; solution 0 is the one that Newton's method found there.
 
-    python benchmarks/solutions.py        # the block of tests/test_solutions.py, and the coarse punch
+    python -m benchmarks.solutions        # the block of tests/test_solutions.py, and the coarse punch
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from pathlib import Path
 from types import SimpleNamespace
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "demos"))
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
-import judge
 import numpy as np
-import scenes
-from punch import CASES, Parameters, Punch, programme
+
+from mechanics import judge, scenes
+from studies.punch import CASES, Parameters, Punch, programme
 
 TOL, APART = 1e-10, 1e-6  # solutions differ by more than APART of the largest reaction
 CROSSED = dict(mu=(1.0, 0.1), p=(0.01, 1.0))

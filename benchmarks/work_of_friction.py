@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Work of friction against the increments: the punch, and one node on a spring; tables of docs/dissipation.md.
 
-    python benchmarks/work_of_friction.py [increments ...]      (default 15 30 60 120 240 480; some minutes)
+    python -m benchmarks.work_of_friction [increments ...]      (default 15 30 60 120 240 480; some minutes)
 
 Four rules get the same states: the library's; `chord`, mean normal force times the work per way and force of the
 chord; `mean`, mean force times slip (trapezoidal); `end`, force of the end of the step times slip.
@@ -11,15 +11,13 @@ chord; `mean`, mean force times slip (trapezoidal); `end`, force of the end of t
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 import numpy as np
-from punch import CASES, Parameters, Punch, programme
 from scipy.optimize import brentq
 
 import dolfinx_contact as dc
 from dolfinx_contact.law.dissipation import work_of_friction
+from studies.punch import CASES, Parameters, Punch, programme
 
 RULES = ("library", "chord", "mean", "end")
 

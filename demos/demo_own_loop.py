@@ -3,7 +3,7 @@
 For those who have a solver already and want contact in it: ``contact.update`` turns displacements
 into reactions, ``contact.assemble_reaction`` adds them to a residual. Without acceleration the loop
 takes well over a thousand iterations a step on a coarse punch, each one back-solve; its answer is
-checked against ``dc.ContactProblem``.
+checked against ``dc.ContactProblem``.  From the root of the clone: ``python -m demos.demo_own_loop``.
 """
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -15,7 +15,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from punch import Parameters, Punch
+
+from studies.punch import Parameters, Punch
 
 
 class OwnLoop:

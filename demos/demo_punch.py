@@ -5,7 +5,9 @@
 # effect drives the contact nodes outwards against a friction that differs along and across the
 # grooves. Stick zones, slip outwards and, when unloading, reverse slip are what [dSFMH07, Section
 # 3] shows. This demo writes numbers, a picture and ParaView files; the scene itself is in
-# `punch.py`. As a command it has options: try `--help`. Any number of MPI ranks.
+# `studies/punch`, so it runs from the root of the clone: `python -m demos.demo_punch`, with options
+# (try `--help`), on any number of MPI ranks. As a notebook it needs that root on the path: start
+# Jupyter there with `PYTHONPATH=$PWD`.
 #
 # ## Notation
 #
@@ -38,12 +40,12 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from punch import CASES, Parameters, Punch, programme
-from punch_fields import FieldWriter
-from punch_figure import draw, gather
 from tqdm import tqdm
 
 import dolfinx_contact as dc
+from studies.punch import CASES, Parameters, Punch, programme
+from studies.punch.contact_map import draw, gather
+from studies.punch.fields import FieldWriter
 
 # %% [markdown]
 # ## Code
@@ -102,7 +104,7 @@ def table(records: list[dict]) -> str:
 def arguments(argv=None) -> argparse.Namespace:
     default = Parameters()
     parser = argparse.ArgumentParser(
-        description="The punch of [dSFMH07, Section 3]; the scene itself is in punch.py. Runs on any "
+        description="The punch of [dSFMH07, Section 3]; the scene is in studies/punch. Runs on any "
         "number of MPI ranks.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )

@@ -7,11 +7,12 @@ import warnings
 
 import numpy as np
 import pytest
-from condensed_scenes import judge, random_problem
+from condensed_scenes import judge
 
 from dolfinx_contact import CondensedNewton, Friction, _kernel
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged, solve_condensed
+from mechanics.condensed import random_problem
 
 TOL = 1e-8
 

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: MIT
 """solve_condensed on plain arrays: every answer is judged by NumPy code that shares nothing with it."""
 
-import judge
 import numpy as np
 import pytest
 import scipy.sparse
 import twin_solver
-from condensed_scenes import random_problem
 
 from dolfinx_contact import Friction
 from dolfinx_contact.solvers.condensed_newton import (
@@ -15,6 +13,8 @@ from dolfinx_contact.solvers.condensed_newton import (
     CondensedNotConverged,
     solve_condensed,
 )
+from mechanics import judge
+from mechanics.condensed import random_problem
 
 TOL = 1e-8
 

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
@@ -19,13 +18,13 @@ from mpi4py import MPI
 pytest.importorskip("gmsh")
 pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 import demo_own_loop
 import demo_punch
-from punch import Parameters, Punch, programme
-from punch_fields import FieldWriter
-from punch_figure import draw, gather
-from punch_mesh import CONTACT, TOP, punch_mesh
+
+from studies.punch import Parameters, Punch, programme
+from studies.punch.contact_map import draw, gather
+from studies.punch.fields import FieldWriter
+from studies.punch.mesh import CONTACT, TOP, punch_mesh
 
 COMM = MPI.COMM_WORLD
 COARSE = dict(divisions=2, layers=1)

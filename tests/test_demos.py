@@ -2,7 +2,6 @@
 
 import importlib
 import re
-import sys
 from pathlib import Path
 
 import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
@@ -12,7 +11,6 @@ import pytest
 from mpi4py import MPI
 
 DEMOS = Path(__file__).parents[1] / "demos"
-sys.path.insert(0, str(DEMOS))
 TESTED_ELSEWHERE = {"demo_punch"}  # a command with options: test_demo_punch.py
 NOTEBOOKS = sorted(
     path.stem

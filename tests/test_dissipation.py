@@ -1,8 +1,5 @@
 """Work of friction: never negative, exact for rigid sliding, and how it converges in the increments."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scenes
@@ -270,8 +267,7 @@ def test_wear_depth_never_decreases():
 def test_increments_of_the_punch(case):
     """The first cycle's work in 15 increments is within 2 % of that in 120, in 60 within 0.2 %."""
     pytest.importorskip("gmsh")
-    sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-    from punch import Parameters, Punch, programme
+    from studies.punch import Parameters, Punch, programme
 
     work = {}
     for factor in (1, 4, 8):

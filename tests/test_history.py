@@ -246,7 +246,6 @@ def test_checkpoints_of_other_problems_are_refused(tmp_path):
 KILLED = """
 import sys, os, signal
 import dolfinx_contact
-sys.path.insert(0, {tests!r})
 import scenes, numpy as np
 from pathlib import Path
 state = Path({state!r})
@@ -274,6 +273,9 @@ def test_killed_run_continues_to_the_same_bits(tmp_path):
     # Started under mpiexec, a child must not take itself for a rank of this run.
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
     alone = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
+    here = Path(__file__).parent
+    path = here, here.parent, alone.get("PYTHONPATH", "")  # of scenes, and of what they are made of
+    alone["PYTHONPATH"] = os.pathsep.join(map(str, path))
     results = []
     for name, kills in (("straight", [-1]), ("killed", [0, 2, -1])):
         folder = tmp_path / name
@@ -281,7 +283,6 @@ def test_killed_run_continues_to_the_same_bits(tmp_path):
         script = folder / "run.py"
         script.write_text(
             KILLED.format(
-                tests=str(Path(__file__).parent),
                 state=str(folder / "state.npz"),
                 count=str(folder / "count"),
                 result=str(folder / "result.npy"),

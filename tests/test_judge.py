@@ -5,11 +5,12 @@
 from functools import partial
 from types import SimpleNamespace
 
-import judge
 import numpy as np
 import pytest
-from condensed_scenes import random_pair, random_problem
-from judge_solver import ByStiffness
+
+from mechanics import judge
+from mechanics.condensed import random_pair, random_problem
+from mechanics.judge_solver import ByStiffness
 
 TOL = 1e-8
 LAWS = {"A": (0.2, 0.2), "B": ((0.3, 0.15), (0.3, 0.15)), "C": ((0.3, 0.15), (0.05, 0.2))}

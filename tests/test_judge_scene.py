@@ -2,21 +2,17 @@
 # SPDX-License-Identifier: MIT
 """The judge on DOLFINx scenes: the library's answers spoiled, a stiffness of the wrong sign, outcomes of the matrix."""
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import dolfinx_contact as dc
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
-import stress
-from judge import Verdict
-from judge_scene import SceneJudge
-from stress_bodies import build
-from stress_scenes import LAWS
+from benchmarks.stress import matrix as stress
+from benchmarks.stress.scenes import LAWS
+from mechanics.judge import Verdict
+from mechanics.judge_scene import SceneJudge
+from mechanics.scenes import build
 
 TOL = 1e-8
 

@@ -1,13 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The report (benchmarks/report.py): complete, self-contained, resumable."""
+"""The report (python -m benchmarks.report): complete, self-contained, resumable."""
 
 import json
 import re
 import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from mpi4py import MPI
@@ -15,10 +13,9 @@ from mpi4py import MPI
 pytest.importorskip("gmsh")
 pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
-import report
-import report_run
-from report_run import Measurement, compute, current, stored
+from benchmarks import measurement
+from benchmarks.measurement import Measurement, compute, current, stored
+from benchmarks.report import __main__ as report
 
 pytestmark = [
     pytest.mark.slow,
@@ -37,9 +34,12 @@ def made(tmp_path_factory):
     process = subprocess.run
 
     def started(command, **options):
-        if report_run.__file__ not in map(str, command) or "report_ladder:imports" in command:
+        if (
+            "benchmarks.measurement" not in map(str, command)
+            or "benchmarks.report.ladder:imports" in command
+        ):
             return process(command, **options)
-        report_run.measure(*map(str, command[2:]))
+        measurement.measure(*map(str, command[3:]))
         return subprocess.CompletedProcess(command, 0, "", "")
 
     with pytest.MonkeyPatch.context() as patch:
@@ -88,14 +88,14 @@ def test_a_stopped_report_continues(made, tmp_path):
     """A measurement is made once for its settings and code; one that failed is kept as such and tried again."""
     file = next((made / "measurements").glob("*/*.json"))
     before = file.stat().st_mtime_ns
-    good = Measurement("one", "report_run:ladder", dict(first=1, last=2))
+    good = Measurement("one", "benchmarks.measurement:ladder", dict(first=1, last=2))
     assert stored(good, tmp_path) is None
     record = compute(good, tmp_path)
     assert stored(good, tmp_path) == record and len(record["result"]) == 2
-    assert current(record) and "benchmarks/report_run.py" in record["made_with"]
-    assert not current(record | dict(made_with={"benchmarks/report_run.py": "of another day"}))
+    assert current(record) and "benchmarks/measurement.py" in record["made_with"]
+    assert not current(record | dict(made_with={"benchmarks/measurement.py": "of another day"}))
     assert stored(replace(good, settings=dict(first=1, last=3)), tmp_path) is None
-    bad = Measurement("two", "report_run:ladder", dict(first=1))
+    bad = Measurement("two", "benchmarks.measurement:ladder", dict(first=1))
     assert "last" in compute(bad, tmp_path)["failed"] and stored(bad, tmp_path) is None
     assert file.stat().st_mtime_ns == before
     found = report.run({"section": [bad, good]}, tmp_path, minutes=-1.0)

@@ -1,22 +1,17 @@
 """Both solvers come to the same answer where there is one, and a step with several solutions has several."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "demos"))
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import scenes
-import solutions
-from punch import Parameters, Punch, programme
 
+from benchmarks import solutions
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID
+from studies.punch import Parameters, Punch, programme
 
 pytestmark = pytest.mark.skipif(scenes.COMM.size > 1, reason="programs for one rank")
 

@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: MIT
 """A tenth of the stress matrix (benchmarks/stress.py): answers that the judge confirms, or exceptions."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
-import stress
-from stress_scenes import hard_scenes, scenes, small
+from benchmarks.stress import matrix as stress
+from benchmarks.stress.__main__ import main
+from benchmarks.stress.scenes import hard_scenes, scenes, small
 
 LONG = ("six cycles", "1000 tiny steps")
 # Four solutions are known, and rounding decides whether a start leads to one, see docs/solvers.md.
@@ -58,15 +55,15 @@ def test_an_interrupted_run_continues(tmp_path):
     """What is done is not done again, and the tables come from all of it."""
     pytest.importorskip("matplotlib")
     options = ["--output", str(tmp_path), "--solver", "default"]
-    first = stress.main([*options, "--every", "200"])
+    first = main([*options, "--every", "200"])
     lines = (tmp_path / "stress.jsonl").read_text().splitlines()
     (tmp_path / "stress.jsonl").write_text("\n".join(lines[:1]) + "\n")
-    again = stress.main([*options, "--every", "200"])
+    again = main([*options, "--every", "200"])
     assert again[0] == first[0] and len(again) == len(first)
     assert [r["outcome"] for r in again] == [r["outcome"] for r in first]
     assert {"stress.json", "stress.csv", "stress.png"} <= {f.name for f in tmp_path.iterdir()}
     before = (tmp_path / "stress.jsonl").read_text()
-    assert len(stress.main([*options, "--every", "200", "--small"])) == len(first)
+    assert len(main([*options, "--every", "200", "--small"])) == len(first)
     assert (
         tmp_path / "stress.jsonl"
     ).read_text() == before  # small bodies have a table of their own

@@ -22,17 +22,16 @@ from mpi4py import MPI
 pytest.importorskip("gmsh")
 pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-import study_punch
-from punch import Parameters, Punch, programme
-from punch_figure import ContactMap
-from study_measures import hysteresis, plateau, zones
-from study_run import EnergyBalance, Run, compute
-from study_work import TERMS, comparison, mesh_orders
+from studies.punch import Parameters, Punch, programme
+from studies.punch import __main__ as study_punch
+from studies.punch.contact_map import ContactMap
+from studies.punch.measures import hysteresis, plateau, zones
+from studies.punch.run import EnergyBalance, Run, compute
+from studies.punch.work import TERMS, comparison, mesh_orders
 
 COMM = MPI.COMM_WORLD
 ALONE = COMM.size == 1
-DEMOS = Path(__file__).parents[1] / "demos"
+ROOT = Path(__file__).parents[1]
 COARSE = ["--divisions", "2", "--layers", "1", "--cycles", "2"]
 FIGURES = "fig3 fig4 fig5 fig6 fig7 fig4_node1 fig7_node1 unloading1 unloading_last".split()
 FIGURES += "dissipation wear cycles energy".split() + ["convergence"] * ALONE
@@ -272,11 +271,11 @@ def test_killed_study_continues_to_the_same_bits(tmp_path):
     """Killed at any moment, twice, and started again, it ends with the numbers of one never killed."""
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
     alone = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
-    command = [sys.executable, DEMOS / "study_punch.py", *COARSE, "--cases", "C", "--data-only"]
+    command = [sys.executable, "-m", "studies.punch", *COARSE, "--cases", "C", "--data-only"]
 
     def start(directory):
         return subprocess.Popen(
-            [*command, "--output", directory], stderr=subprocess.PIPE, env=alone
+            [*command, "--output", directory], stderr=subprocess.PIPE, env=alone, cwd=ROOT
         )
 
     for step in (4, 17):

@@ -7,10 +7,10 @@ import scenes
 import twin_solver
 import ufl
 from dolfinx import fem
-from judge_scene import SceneJudge
 from mpi4py import MPI
 
 from dolfinx_contact.compat import bc_dofs
+from mechanics.judge_scene import SceneJudge
 
 CASES = {
     "A": ((4, 4, 2), 0.2, None),

@@ -1,0 +1,1 @@
+"""Measurements; each program runs from the root of the clone: ``python -m benchmarks.NAME --help``."""

@@ -1,0 +1,231 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Measurements of the report: each in a process of its own, kept on disk, and what they measure with."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+OWN = [ROOT / name for name in ("dolfinx_contact", "benchmarks", "studies", "mechanics")]
+LIMIT = 1800  # seconds of wall time after which a measurement counts as failed
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A function ``module:name``, called with ``settings`` in a fresh process."""
+
+    name: str
+    function: str
+    settings: dict
+    late: bool = False  # takes long: after all that does not
+
+
+def stored(measurement: Measurement, directory: Path) -> dict | None:
+    """The record that is on disk, if it was made with these settings and did not fail."""
+    file = directory / f"{measurement.name}.json"
+    record = json.loads(file.read_text()) if file.exists() else {}
+    return record if "result" in record and record["settings"] == _plain(measurement.settings) else None  # fmt: skip
+
+
+def current(record: dict) -> bool:
+    """Whether all that a record was made with, our modules and the compiled kernel, is still the same."""
+    return all(digest(ROOT / file) == was for file, was in record["made_with"].items())
+
+
+def _plain(settings: dict) -> dict:
+    return json.loads(json.dumps(settings))
+
+
+def compute(measurement: Measurement, directory: Path) -> dict:
+    """Measure, and keep the record.
+
+    A process that fails or is killed leaves a record with what it said under ``failed``; it is tried again
+    in the next run.
+    """
+    file = directory / f"{measurement.name}.json"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_suffix(".unfinished")
+    unfinished.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "benchmarks.measurement", measurement.function]
+    command += [json.dumps(measurement.settings), unfinished]
+    record = dict(settings=_plain(measurement.settings), commit=commit(), date=now(), load=[os.getloadavg()[0]])  # fmt: skip
+    start = perf_counter()
+    try:
+        done = subprocess.run(command, cwd=ROOT, env=alone(), capture_output=True, text=True, timeout=LIMIT)  # fmt: skip
+        said = done.stderr[-600:] or f"exit status {done.returncode}"
+    except subprocess.TimeoutExpired:
+        said = f"stopped after {LIMIT} s"
+    record.update(seconds=perf_counter() - start)
+    record["load"].append(os.getloadavg()[0])
+    if unfinished.exists():
+        record |= json.loads(unfinished.read_text())
+        unfinished.unlink()
+    else:
+        record["failed"] = said
+    file.write_text(json.dumps(record, indent=1) + "\n")
+    return record
+
+
+def measure(function: str, settings: str, output: str) -> None:
+    """What the process of a measurement does."""
+    module, name = function.split(":")
+    asked = getattr(importlib.import_module(module), name)
+    before = made_with()  # a file may change while it is being measured
+    result = asked(**json.loads(settings))
+    Path(output).write_text(json.dumps(dict(result=result, made_with=made_with() | before)))
+
+
+def made_with() -> dict[str, str]:
+    """Digest of every file of this project, and of its compiled kernel, that this process has imported."""
+    files = {Path(file) for m in list(sys.modules.values()) if (file := getattr(m, "__file__", None))}  # fmt: skip
+    own = {f for f in files if any(d in f.parents for d in OWN) or f.name.startswith("_kernel")}
+    return {os.path.relpath(file, ROOT): digest(file) for file in sorted(own)}
+
+
+@functools.cache
+def digest(file: Path) -> str:
+    """Of the content; of a file that is not there, of nothing."""
+    return hashlib.sha256(file.read_bytes() if file.exists() else b"").hexdigest()[:16]
+
+
+def alone() -> dict[str, str]:
+    """Environment of a process of its own: one thread, and nothing of an MPI launcher."""
+    launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
+    return kept | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+# -- what a measurement ran on -----------------------------------------------------------------------
+
+
+def package() -> str:
+    return version("dolfinx_contact")
+
+
+@functools.cache
+def commit() -> str:
+    """The last commit that changed the library, which is what is measured; a + marks changes beyond it."""
+    library = ["--", "dolfinx_contact", "cpp"]
+
+    def git(*asked):
+        return subprocess.run(["git", *asked, *library], cwd=ROOT, capture_output=True, text=True).stdout  # fmt: skip
+
+    found = git("log", "-1", "--format=%h").strip()
+    return found + "+" * bool(git("status", "--porcelain").strip()) if found else "unknown"
+
+
+def now() -> str:
+    return datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def machine() -> dict:
+    """Processor, memory, compiler and versions."""
+    cpu = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
+    compiler = subprocess.run(
+        [os.environ.get("CXX", "c++"), "--version"], capture_output=True, text=True
+    )
+    from petsc4py import PETSc
+
+    from dolfinx_contact.compat import version as dolfinx
+
+    return dict(
+        processor=cpu[0].split(":")[1].strip() if cpu else platform.processor(),
+        cores=os.cpu_count(),
+        memory_gb=round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
+        system=platform.platform(), compiler=compiler.stdout.splitlines()[0] if compiler.stdout else "",
+        python=platform.python_version(), numpy=np.__version__, dolfinx=dolfinx,
+        petsc=".".join(map(str, PETSc.Sys.getVersion())), dolfinx_contact=package(), commit=commit(),
+    )  # fmt: skip
+
+
+# -- what measurements measure with --------------------------------------------------------------------
+
+
+class Memory:
+    """Peak of resident memory of this process since the object was made, beyond what it had then."""
+
+    def __init__(self):
+        Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
+        self.before = self._status("VmRSS")
+
+    def added(self) -> int:
+        """Bytes."""
+        return self._status("VmHWM") - self.before
+
+    @staticmethod
+    def _status(name: str) -> int:
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith(name):
+                return 1024 * int(line.split()[1])
+        raise RuntimeError(f"/proc/self/status has no {name}")
+
+
+@contextmanager
+def counted():
+    """Counts what the library does with its matrices, in a dictionary by name."""
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.petsc.linear_solver import LinearSolver
+    from dolfinx_contact.solvers.condensed import CondensedBody
+    from dolfinx_contact.step import LoadStep
+
+    targets = (
+        ("set-ups of a linear solver", LinearSolver, "__init__"),
+        ("back-solves", LinearSolver, "solve"),
+        ("back-solves", LinearSolver, "apply"),
+        ("multiplications with K", ElasticBody, "multiply"),
+        ("assemblies of F", ElasticBody, "internal_force"),
+        ("residuals", LoadStep, "residual"),
+        ("condensed operators", CondensedBody, "__init__"),
+    )
+    counts = dict.fromkeys((name for name, *_ in targets), 0)
+    kept = [(owner, method, getattr(owner, method)) for _, owner, method in targets]
+
+    def counting(name, function):
+        @functools.wraps(function)
+        def call(*args, **kwargs):
+            counts[name] += 1
+            return function(*args, **kwargs)
+
+        return call
+
+    for name, owner, method in targets:
+        setattr(owner, method, counting(name, getattr(owner, method)))
+    try:
+        yield counts
+    finally:
+        for owner, method, function in kept:
+            setattr(owner, method, function)
+
+
+def spread(values) -> dict:
+    """Median, least and largest of repeated measurements, and how many there were."""
+    values = np.asarray(values, dtype=float)
+    return dict(
+        median=float(np.median(values)), least=float(values.min()), largest=float(values.max()),
+        repetitions=int(values.size),
+    )  # fmt: skip
+
+
+def ladder(first: int, last: int) -> list[float]:
+    """Tolerances 10^-first ... 10^-last."""
+    return [float(f"1e-{k}") for k in range(first, last + 1)]
+
+
+if __name__ == "__main__":
+    measure(*sys.argv[1:])

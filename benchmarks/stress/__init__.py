@@ -1,0 +1,1 @@
+"""The stress matrix: every scene times every solver."""

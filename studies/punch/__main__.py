@@ -1,0 +1,161 @@
+"""The study of [dSFMH07, Section 3]: six cycles of cases A, B and C, all figures on one page.
+
+Every step is kept; a study that was stopped continues where it was, and one with other numbers
+begins anew.  With --explore also what the paper's text leaves open: ends of unloading, support of
+the top face, increments, mesh.  The page is OUTPUT/study.html.  Runs on any number of MPI ranks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from mpi4py import MPI
+from tqdm import tqdm
+
+from studies.punch.model import CASES, Parameters, programme
+from studies.punch.run import Run, compute
+
+COMM = MPI.COMM_WORLD
+
+
+def variants(base: Parameters, cycles: int, unload_to, levels) -> dict[str, Parameters]:
+    """What the paper leaves open, one change at a time.
+
+    Args:
+        base: What is changed.
+        cycles: Of the variants, but for meshes: those run one cycle.
+        unload_to: Ends of unloading, mm.
+        levels: How often the mesh is refined, for each variant; -1 coarsens it.
+    """
+    few = replace(base, cycles=cycles)
+    runs = {f"unload to {low:g} mm": replace(few, unload_to=low) for low in unload_to}
+    deeper = tuple(base.depth * (0.6 - 0.4 * k / max(cycles - 1, 1)) for k in range(cycles))
+    runs["deeper every cycle"] = replace(few, unload_to=deeper)
+    runs["top free"] = replace(few, top="free")
+    for factor in (2, 4):
+        increments = factor * base.loading, factor * base.unloading
+        name = "{}+{} increments".format(*increments)
+        runs[name] = replace(few, loading=increments[0], unloading=increments[1])
+    for level in levels:
+        name = f"mesh refined {level}x" if level > 0 else "mesh coarsened"
+        runs[name] = replace(base, cycles=1, refine=base.refine + level)
+    return runs
+
+
+def plan(options) -> dict[str, dict[str, Parameters]]:
+    """Parameters by variant and case; the paper's own programme is ``base``."""
+    unload_to = tuple(options.unload_to)
+    base = Parameters(
+        cycles=options.cycles,
+        unload_to=unload_to if len(unload_to) > 1 else unload_to[0],
+        loading=options.loading,
+        unloading=options.unloading,
+        top=options.top,
+        tol=options.tol,
+        refine=options.refine,
+        point=tuple(options.point[0]) if options.point else None,
+    )
+    runs = {"base": base}
+    if options.explore:
+        ends = [low for low in options.explore_unload_to if low != base.unload_to]
+        halves = (
+            options.divisions * 2**options.refine % 4 == options.layers * 2**options.refine % 2 == 0
+        )
+        levels = [-1] * halves + list(range(1, options.explore_refine + 1))
+        runs.update(variants(base, options.explore_cycles, ends, levels))
+    return {
+        name: {case: replace(parameters, case=case) for case in options.cases}
+        for name, parameters in runs.items()
+    }
+
+
+def compute_all(runs, output: Path, points, mesh_options):
+    """Compute what is missing, with one progress bar for everything.
+
+    Returns:
+        Complete runs by variant and case, read by rank 0; and those that did not converge.
+    """
+    failures = []
+    total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
+    hidden = True if COMM.rank != 0 else None  # None: where there is no terminal
+    with tqdm(total=total, unit="step", disable=hidden, smoothing=0.1) as bar:
+        for name, cases in runs.items():
+            for case, parameters in cases.items():
+                bar.set_description(f"case {case}, {name}")
+                directory = directory_of(output, name, case)
+                reason = compute(parameters, directory, points, bar, **mesh_options)
+                if reason:  # a variant less, not a study less
+                    failures.append({"variant": name, "case": case, "not_converged": reason})
+    if COMM.rank != 0:
+        return {}, failures
+    failed = [(failure["variant"], failure["case"]) for failure in failures]
+    complete = {
+        name: {
+            case: Run(directory_of(output, name, case))
+            for case in cases
+            if (name, case) not in failed
+        }
+        for name, cases in runs.items()
+    }
+    return {name: cases for name, cases in complete.items() if cases}, failures
+
+
+def directory_of(output: Path, name: str, case: str) -> Path:
+    return output / "runs" / name.replace(" ", "_") / case
+
+
+def arguments(argv=None) -> argparse.Namespace:
+    default = Parameters()
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    add = parser.add_argument
+    add("--cases", nargs="+", choices=CASES, default=list(CASES), help="Table 1 of the paper")
+    add("--cycles", type=int, default=6, help="of loading and unloading")
+    add("--loading", type=int, default=default.loading, help="increments of a loading")
+    add("--unloading", type=int, default=default.unloading, help="increments of an unloading")
+    unload_to = dict(type=float, nargs="+", metavar="MM")
+    add("--unload-to", **unload_to, default=[default.unload_to], help="end of unloading: one for "
+        "all cycles, or one for each")  # fmt: skip
+    add("--top", choices=("bonded", "free"), default=default.top, help="top face, sideways")
+    add("--tol", type=float, default=default.tol, help="error at which a step ends")
+    add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
+    add("--divisions", type=int, default=8, help="of the sides of the mesh's blocks")
+    add("--layers", type=int, default=4, help="of the mesh")
+    add("--point", type=float, nargs=2, action="append", metavar=("X", "Y"),
+        help="P, mm (default: 3/4 R at 45 degrees); again for more tracked nodes")  # fmt: skip
+    add("--wear-coefficient", type=float, default=3e-8, metavar="K",
+        help="worn volume per work of friction, mm^3/(N mm)")  # fmt: skip
+    add("--explore", action="store_true", help="compute what the paper leaves open, too")
+    add("--explore-cycles", type=int, default=3, help="cycles of its variants")
+    add("--explore-unload-to", **unload_to, default=[0.0, 0.01, 0.02, 0.05], help="its unloadings")
+    add("--explore-refine", type=int, default=1, help="its finer meshes; each costs ten times more")
+    add("--data-only", action="store_true", help="compute, but draw nothing and write no page")
+    add("--output", type=Path, metavar="DIR", default=Path("results/study"), help="what is written")
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> None:
+    logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
+    options = arguments(argv)
+    mesh_options = dict(divisions=options.divisions, layers=options.layers)
+    more_points = [tuple(point) for point in (options.point or [])[1:]]
+    runs, failures = compute_all(plan(options), options.output, more_points, mesh_options)
+    said = ["{variant}, case {case}, {not_converged}".format(**failure) for failure in failures]
+    if any(failure["variant"] == "base" for failure in failures):
+        sys.exit("\n".join(said) if COMM.rank == 0 else 1)
+    if options.data_only or COMM.rank != 0:
+        return
+    from studies.punch.page import report  # draws: not needed by the other ranks
+
+    print(*said, "drawing", sep="\n")
+    report(runs, options.output, options.wear_coefficient, failures)
+    print(f"page      {options.output / 'study.html'}\nfigures   {options.output / 'figures'}")
+
+
+if __name__ == "__main__":
+    main()

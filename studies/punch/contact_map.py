@@ -1,0 +1,211 @@
+"""Pictures of the contact disc on the mesh's own faces: no interpolation that invents zones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from studies.punch.mesh import CONTACT
+
+# isort: split
+import numpy as np
+from dolfinx import fem
+from matplotlib import rc_context
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+OPEN, STICK, SLIP, REVERSE = 0, 1, 2, 3
+ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
+    STICK: Patch(facecolor="#4a90c4", edgecolor="black", label="stick, $f<0$"),
+    SLIP: Patch(facecolor="#f0a33a", edgecolor="#f0a33a", label="slip, $f=0$"),
+    OPEN: Patch(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
+}
+INWARD = Patch(facecolor="#c25700", edgecolor="#c25700", label="reverse slip, inwards, $f=0$")
+
+
+class ContactMap(NamedTuple):
+    """The contact disc with all its nodes on one rank; rows of nodes and of faces in any order."""
+
+    x: np.ndarray  # (n, 2) mm
+    faces: np.ndarray  # (m, 4) nodes of the quadrilaterals, counter-clockwise
+    reaction: np.ndarray  # (n, 3) N, local frame
+    slip_increment: np.ndarray  # (n, 2) mm
+    status: np.ndarray  # (n,)
+    load_function: np.ndarray  # (n,) N
+
+    def quarters(self) -> np.ndarray:
+        """Four quarters of each face, ``shape=(m, 4, 4, 2)``: quarter i belongs to its node i.
+
+        The quarters around a node are the piece of the disc that its force stands for.
+        """
+        corner = self.x[self.faces]
+        after = (corner + np.roll(corner, -1, axis=1)) / 2
+        before = np.roll(after, 1, axis=1)
+        centre = np.broadcast_to(corner.mean(axis=1, keepdims=True), corner.shape)
+        return np.stack([corner, after, centre, before], axis=2)
+
+    def area(self) -> np.ndarray:
+        """Area of the quarters around each node, ``shape=(n,)``, mm^2."""
+        x, y = np.moveaxis(self.quarters(), -1, 0)
+        quarter = ((x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)).sum(-1)) / 2
+        return np.bincount(self.faces.ravel(), quarter.ravel(), minlength=len(self.x))
+
+    def borders(self) -> np.ndarray:
+        """Lines between quarters of different status, ``shape=(k, 2, 2)``."""
+        quarters = self.quarters()
+        differs = self.status[self.faces] != self.status[np.roll(self.faces, -1, axis=1)]
+        return quarters[differs][:, 1:3]
+
+    def rim(self) -> np.ndarray:
+        """Edges of one face only, ``shape=(k, 2, 2)``: the edge of the disc."""
+        edges = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        return self.x[edges[first[count == 1]]]
+
+    def mean_pressure(self) -> float:
+        """Normal reaction over the area of the disc, MPa; 1 where nothing touches."""
+        return self.reaction[:, 2].sum() / self.area().sum() or 1.0
+
+
+def gather(punch) -> ContactMap | None:
+    """The present state of ``punch.contact`` on rank 0; None on the others.  Collective."""
+    contact, V, comm = punch.contact, punch.V, punch.comm
+    owned = punch.mesh.topology.index_map(2).size_local
+    facets = punch.facet_tags.find(CONTACT)
+    position = V.tabulate_dof_coordinates()[:, :2]
+    faces = []
+    for facet in facets[facets < owned]:
+        nodes = fem.locate_dofs_topological(V, 2, np.array([facet], dtype=np.int32), remote=False)
+        spoke = position[nodes] - position[nodes].mean(axis=0)
+        faces.append(nodes[np.argsort(np.arctan2(spoke[:, 1], spoke[:, 0]))])
+    numbering = V.dofmap.index_map
+    faces = np.array(faces, dtype=np.int32).reshape(-1, 4)
+    mine = (
+        numbering.local_to_global(contact.nodes.astype(np.int32)),
+        numbering.local_to_global(faces.ravel()).reshape(-1, 4),
+        contact.x[:, :2],
+        contact.reaction,
+        contact.slip_increment,
+        contact.status,
+        contact.load_function,
+    )
+    parts = comm.gather(mine)
+    if parts is None:
+        return None
+    node, faces, x, *values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(node)
+    faces = np.searchsorted(node[order], faces)
+    return ContactMap(x[order], faces, *(value[order] for value in values))
+
+
+def draw(maps, title, file, point=None) -> None:
+    """Draw contact maps side by side and write a picture.
+
+    Above, the load function f with stick, slip and open zones and the slip of the last increment;
+    below, pressure and tangential traction. Forces are divided by the area of their node; f and
+    pressure also by the mean pressure, so that one scale serves loaded and unloaded punches.
+
+    Args:
+        maps: Pairs of a title and a ContactMap, one column each.
+        title: Of the whole picture.
+        file: Path of the picture; its suffix is the format.
+        point: Position of P, to be marked, mm.
+    """
+    with rc_context({"font.size": 14, "hatch.linewidth": 0.6}):
+        figure = Figure(figsize=(4.6 * len(maps) + 1.2, 10.0), layout="constrained")
+        axes = figure.subplots(2, len(maps), squeeze=False)
+        for (above, below), (name, disc) in zip(axes.T, maps, strict=True):
+            zones = draw_zones(above, disc)
+            pressure = draw_tractions(below, disc)
+            above.set_title(name)
+            if point is not None:
+                spot = dict(boxstyle="circle,pad=0.15", facecolor="white")
+                above.text(*point[:2], "P", bbox=spot, ha="center", va="center", fontsize=12)
+        scale = dict(shrink=0.8, aspect=25)
+        label = "{} / mean pressure".format
+        figure.colorbar(zones, ax=axes[0], label=label("load function $f$"), extend="min", **scale)
+        figure.colorbar(pressure, ax=axes[1], label=label("pressure"), extend="max", **scale)
+        figure.legend(handles=[*ZONES.values()], loc="outside lower center", ncols=3, frameon=False)
+        figure.suptitle(title)
+        figure.savefig(file, dpi=150)
+
+
+def draw_zones(axes, disc: ContactMap, inward=None):
+    """Map of f with zones and slip vectors; returns what a colour bar needs.
+
+    Args:
+        axes: Where to draw.
+        disc: What to draw.
+        inward: Nodes whose slip has a colour of its own, ``shape=(n,)``; None for none.
+    """
+    status = disc.status[disc.faces.ravel()]
+    zones = {SLIP: ZONES[SLIP], OPEN: ZONES[OPEN]}
+    if inward is not None:
+        inward = np.asarray(inward)[disc.faces.ravel()] & (status == SLIP)
+        status = np.where(inward, REVERSE, status)
+        zones[REVERSE] = INWARD
+    f = disc.load_function / disc.area() / disc.mean_pressure()
+    image = _colour(axes, disc, f, status == STICK, cmap="Blues_r", clim=(-1.2, 0))
+    for zone, patch in zones.items():
+        axes.add_collection(
+            PolyCollection(
+                disc.quarters().reshape(-1, 4, 2)[status == zone],
+                facecolor=patch.get_facecolor(),
+                edgecolor=patch.get_edgecolor(),
+                hatch=patch.get_hatch(),
+                linewidth=0 if zone == OPEN else 0.6,
+            )
+        )
+    axes.add_collection(LineCollection(disc.borders(), colors="black", linewidths=1.8))
+    _arrows(axes, disc, 1e3 * disc.slip_increment, disc.status == SLIP, "slip {:g} µm")
+    _frame(axes, disc)
+    return image
+
+
+def draw_tractions(axes, disc: ContactMap):
+    """Pressure with the tangential tractions on it; returns what a colour bar needs."""
+    traction = disc.reaction / disc.area()[:, None]
+    pressure = traction[:, 2] / disc.mean_pressure()
+    everywhere = np.ones(disc.faces.size, dtype=bool)
+    image = _colour(axes, disc, pressure, everywhere, cmap="Greys", clim=(0, 2))
+    _arrows(axes, disc, traction[:, :2], disc.status != OPEN, "traction {:g} MPa")
+    _frame(axes, disc)
+    return image
+
+
+def _colour(axes, disc, values, shown, **colours):
+    """Quarters in the colour of their node's value."""
+    values, quarters = values[disc.faces.ravel()][shown], disc.quarters().reshape(-1, 4, 2)[shown]
+    order = np.argsort(-values.round(9), kind="stable")  # edges overlap: alike on all sides
+    image = PolyCollection(quarters[order], array=values[order], **colours)
+    # without edges, or with pixels rounded, the background would shine through seams
+    image.set(edgecolor="face", linewidth=0.6, snap=False)
+    axes.add_collection(image)
+    return image
+
+
+def _arrows(axes, disc, vectors, shown, label) -> None:
+    """Vectors at nodes, the longest a sixth of the radius, with a key; fewer on fine meshes."""
+    x, vectors, radius = disc.x[shown], vectors[shown], np.abs(disc.x).max()
+    longest = np.linalg.norm(vectors, axis=1).max(initial=0.0)
+    if longest == 0.0:
+        return
+    if len(disc.x) > 500:
+        square = np.round(x / (0.09 * radius))  # of a lattice, keep the node nearest to its middle
+        nearest = np.argsort(np.linalg.norm(x / (0.09 * radius) - square, axis=1).round(6))
+        _, first = np.unique(square[nearest], axis=0, return_index=True)
+        x, vectors = x[nearest[first]], vectors[nearest[first]]
+    style = dict(angles="xy", scale_units="xy", scale=6 * longest / radius, width=4.5e-3)
+    arrows = axes.quiver(*x.T, *vectors.T, **style)
+    key = float(f"{longest:.1g}")
+    text = dict(labelpos="N", labelsep=0.05, fontproperties=dict(size=12))
+    axes.quiverkey(arrows, 0.87, 0.01, key, label.format(key), **text)
+
+
+def _frame(axes, disc: ContactMap) -> None:
+    axes.add_collection(LineCollection(disc.rim(), colors="black", linewidths=0.8))
+    size = 1.18 * np.abs(disc.x).max()
+    axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")
+    axes.set_axis_off()

@@ -1,0 +1,210 @@
+"""An elastic cylinder pressed cyclically on a rigid plane with orthotropic friction.
+
+A steel punch of radius and height 10 mm stands on a plane; its top face goes 0.1 mm down in five
+increments and up again in ten. Poisson's effect drives the contact nodes outwards against
+friction, which is isotropic (case A), orthotropic with the associated slip rule (B), or orthotropic
+with a slip rule of its own (C) [dSFMH07, Section 3].
+
+Units: mm, N, MPa.
+
+[dSFMH07]: G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, "Comportement hystérétique du frottement
+anisotrope", 18e Congrès Français de Mécanique, 2007.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact.compat import functionspace
+from dolfinx_contact.compat import version as dolfinx_version
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import locate_entities
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from studies.punch.mesh import CONTACT, TOP, punch_mesh
+
+CASES = {  # [dSFMH07, Table 1]
+    "A": dict(mu=(0.20, 0.20), p=(0.20, 0.20)),
+    "B": dict(mu=(0.30, 0.15), p=(0.30, 0.15)),
+    "C": dict(mu=(0.30, 0.15), p=(0.05, 0.20)),
+}
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """A run of the punch: what the paper gives, and what its text leaves open."""
+
+    case: str = "C"
+    cycles: int = 1
+    tol: float = 1e-10
+    refine: int = 0
+    depth: float = 0.1  # displacement of the top face when loaded
+    loading: int = 5  # increments
+    unloading: int = 10
+    radius: float = 10.0
+    height: float = 10.0
+    young: float = 210e3
+    poisson: float = 0.3
+    lowest: float | None = None  # height of the elements on the plane, mm; None: all are as high
+    # Left open by the paper:
+    unload_to: float | tuple[float, ...] = 0.02  # top face when unloaded; or one per cycle
+    top: str = "bonded"  # "bonded": the top face does not move sideways; "free": it does
+    point: tuple[float, float] | None = None  # P is the contact node nearest to this
+
+    @property
+    def target(self) -> tuple[float, float]:
+        """Where P is looked for: off both friction axes, at three quarters of the radius."""
+        return self.point or (0.75 * self.radius / 2**0.5, 0.75 * self.radius / 2**0.5)
+
+
+class Punch:
+    """Body, plane, friction and supports; ``press`` computes one load step after another.
+
+    Args:
+        parameters: What to compute.
+        comm: MPI communicator.
+        solver: As in ``dc.ContactProblem``.
+        mesh_options: Further arguments of ``punch_mesh``, such as ``divisions``.
+    """
+
+    def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, solver=None, **mesh_options):
+        self.parameters, self.comm = parameters, comm
+        shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
+        punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
+        self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
+        self.V = functionspace(self.mesh, ("Lagrange", 1, (3,)))
+        self.u = fem.Function(self.V, name="displacement")
+        self.approach = fem.Constant(self.mesh, PETSc.ScalarType(0))  # u_z of the top face
+
+        # 2 x 2 x 2 Gauss points, as usual for bricks of eight nodes
+        dx = ufl.dx(domain=self.mesh, metadata={"quadrature_degree": 3})
+        v = ufl.TestFunction(self.V)
+        self.F = ufl.inner(self.stress(self.u), ufl.sym(ufl.grad(v))) * dx
+        self.bcs = self._supports()
+
+        plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+        friction = dc.Friction(**CASES[parameters.case])
+        self.contact = dc.Contact(self.V, punch.facet_tags.find(CONTACT), plane, friction)
+        self.problem = dc.ContactProblem(
+            self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol
+        )
+        self.tracked = self._nearest_node(parameters.target)
+
+    def stress(self, u):
+        """Hooke's law, as a UFL expression."""
+        E, nu = self.parameters.young, self.parameters.poisson
+        strain = ufl.sym(ufl.grad(u))
+        lame = E * nu / ((1 + nu) * (1 - 2 * nu))
+        return lame * ufl.tr(strain) * ufl.Identity(3) + E / (1 + nu) * strain
+
+    def _supports(self):
+        """The top face goes down; sideways it is bonded, or held by as little as possible."""
+        fdim, R, H = 2, self.parameters.radius, self.parameters.height
+        self.mesh.topology.create_connectivity(0, 3)
+
+        def fix(component, dim, entities, value=None):
+            V = self.V.sub(component)
+            value = fem.Constant(self.mesh, PETSc.ScalarType(0)) if value is None else value
+            return fem.dirichletbc(value, fem.locate_dofs_topological(V, dim, entities), V)
+
+        def node_at(*point):
+            def close(x):
+                return np.linalg.norm(x.T - point, axis=1) < 1e-6 * R
+
+            return locate_entities(self.mesh, 0, close)
+
+        top = self.facet_tags.find(TOP)
+        down = fix(2, fdim, top, self.approach)
+        if self.parameters.top == "bonded":
+            return [down, fix(0, fdim, top), fix(1, fdim, top)]
+        if self.parameters.top == "free":
+            centre, rim = node_at(0, 0, H), node_at(R, 0, H)
+            return [down, fix(0, 0, centre), fix(1, 0, centre), fix(1, 0, rim)]
+        raise ValueError(f'top must be "bonded" or "free", got {self.parameters.top!r}.')
+
+    def _nearest_node(self, target) -> int | None:
+        """Index of the contact node nearest to ``target`` on the rank that owns it, else None."""
+        distance = np.linalg.norm(self.contact.x[:, :2] - target, axis=1)
+        mine = distance.min(initial=np.inf)
+        _, owner = self.comm.allreduce((mine, self.comm.rank), op=MPI.MINLOC)
+        return int(distance.argmin()) if owner == self.comm.rank else None
+
+    def press(self, displacement: float) -> dict:
+        """Move the top face to ``displacement`` mm below its first position; one load step.
+
+        Returns:
+            What the JSON file says about the step; forces in N, the same on all ranks.
+        """
+        self.approach.value = -displacement
+        step = self.problem.solve()
+        contact = self.contact
+        tangential = np.linalg.norm(contact.reaction[:, :2], axis=1).sum()
+        return {
+            "displacement": displacement,
+            "normal_reaction": float(contact.force() @ contact.plane.normal),
+            "tangential_reaction_sum": float(self.comm.allreduce(tangential)),
+            "open": int(step.counts.open),
+            "stick": int(step.counts.stick),
+            "slip": int(step.counts.slip),
+            "error": float(step.error),
+            "bipotential_gap": float(step.bipotential_gap),
+            "iterations": int(step.iterations),
+            "seconds": float(step.seconds),
+            "point_reaction": self._at_point(contact.reaction),
+            "point_slip_increment": self._at_point(contact.slip_increment),
+        }
+
+    def _at_point(self, values) -> list[float]:
+        """Row of the tracked node P, on all ranks."""
+        mine = None if self.tracked is None else values[self.tracked].tolist()
+        return next(row for row in self.comm.allgather(mine) if row is not None)
+
+    def head(self) -> dict:
+        """What was computed, and by what."""
+        return {
+            "case": self.parameters.case,
+            "parameters": asdict(self.parameters),
+            "friction": CASES[self.parameters.case],
+            "versions": {
+                "dolfinx": dolfinx_version,
+                "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+                "dolfinx_contact": version("dolfinx_contact"),
+            },
+            "unknowns": self.V.dofmap.index_map.size_global * self.V.dofmap.index_map_bs,
+            "contact_nodes": self.comm.allreduce(self.contact.nodes.size),
+            "point": self._at_point(self.contact.x),
+            "ranks": self.comm.size,
+        }
+
+
+def programme(parameters: Parameters) -> list[float]:
+    """Displacements of the top face at the end of every load step [dSFMH07, Fig. 2].
+
+    Raises:
+        ValueError: an unloading that is none, fewer than one cycle or increment, or a list
+            ``unload_to`` with another number of entries than cycles.
+    """
+    for name in ("cycles", "loading", "unloading"):
+        if getattr(parameters, name) < 1:
+            raise ValueError(f"{name} must be at least 1, got {getattr(parameters, name)}.")
+    lows, high = np.ravel(parameters.unload_to).tolist(), parameters.depth
+    if not all(0 <= low < high for low in lows):
+        shown = lows[0] if len(lows) == 1 else lows
+        raise ValueError(f"unload_to must lie in [0, depth), got {shown} with depth {high}.")
+    if len(lows) not in (1, parameters.cycles):
+        raise ValueError(
+            f"unload_to must be one number or one per cycle ({parameters.cycles}), got {lows}."
+        )
+    start, steps = 0.0, []
+    for low in lows if len(lows) > 1 else lows * parameters.cycles:
+        steps += np.linspace(start, high, parameters.loading + 1)[1:].tolist()
+        steps += np.linspace(high, low, parameters.unloading + 1)[1:].tolist()
+        start = low
+    return steps
