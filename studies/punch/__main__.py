@@ -150,7 +150,7 @@ def main(argv=None) -> None:
         sys.exit("\n".join(said) if COMM.rank == 0 else 1)
     if options.data_only or COMM.rank != 0:
         return
-    from studies.punch.page import report  # draws: not needed by the other ranks
+    from studies.punch.report import report  # draws: not needed by the other ranks
 
     print(*said, "drawing", sep="\n")
     report(runs, options.output, options.wear_coefficient, failures)

@@ -147,7 +147,7 @@ def draw_zones(axes, disc: ContactMap, inward=None):
         status = np.where(inward, REVERSE, status)
         zones[REVERSE] = INWARD
     f = disc.load_function / disc.area() / disc.mean_pressure()
-    image = _colour(axes, disc, f, status == STICK, cmap="Blues_r", clim=(-1.2, 0))
+    image = paint(axes, disc, f, status == STICK, cmap="Blues_r", clim=(-1.2, 0))
     for zone, patch in zones.items():
         axes.add_collection(
             PolyCollection(
@@ -160,7 +160,7 @@ def draw_zones(axes, disc: ContactMap, inward=None):
         )
     axes.add_collection(LineCollection(disc.borders(), colors="black", linewidths=1.8))
     _arrows(axes, disc, 1e3 * disc.slip_increment, disc.status == SLIP, "slip {:g} µm")
-    _frame(axes, disc)
+    frame_disc(axes, disc)
     return image
 
 
@@ -169,13 +169,13 @@ def draw_tractions(axes, disc: ContactMap):
     traction = disc.reaction / disc.area()[:, None]
     pressure = traction[:, 2] / disc.mean_pressure()
     everywhere = np.ones(disc.faces.size, dtype=bool)
-    image = _colour(axes, disc, pressure, everywhere, cmap="Greys", clim=(0, 2))
+    image = paint(axes, disc, pressure, everywhere, cmap="Greys", clim=(0, 2))
     _arrows(axes, disc, traction[:, :2], disc.status != OPEN, "traction {:g} MPa")
-    _frame(axes, disc)
+    frame_disc(axes, disc)
     return image
 
 
-def _colour(axes, disc, values, shown, **colours):
+def paint(axes, disc, values, shown, **colours):
     """Quarters in the colour of their node's value."""
     values, quarters = values[disc.faces.ravel()][shown], disc.quarters().reshape(-1, 4, 2)[shown]
     order = np.argsort(-values.round(9), kind="stable")  # edges overlap: alike on all sides
@@ -204,7 +204,8 @@ def _arrows(axes, disc, vectors, shown, label) -> None:
     axes.quiverkey(arrows, 0.87, 0.01, key, label.format(key), **text)
 
 
-def _frame(axes, disc: ContactMap) -> None:
+def frame_disc(axes, disc: ContactMap) -> None:
+    """Edge of the disc, and axes of its size."""
     axes.add_collection(LineCollection(disc.rim(), colors="black", linewidths=0.8))
     size = 1.18 * np.abs(disc.x).max()
     axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
-from studies.punch.figures import COLOURS, NAMES, STYLE, Figures, write_csv
+from mechanics.convergence import richardson
+from studies.punch.figures import COLOURS, NAMES, Figures, write_csv
 from studies.punch.measures import total
 from studies.punch.run import Run
 
@@ -20,17 +18,16 @@ TERMS = {  # column of the history: label and style
 }
 
 
-def relative_residual(run: Run, name: str = "residual") -> np.ndarray:
+def relative_residual(run: Run) -> np.ndarray:
     """What the balance of each step leaves open, over its largest term."""
     terms = [run.table[key] for key in ("platen_work", *TERMS)]
-    return np.abs(run.table[name]) / np.abs(terms).max(axis=0)
+    return np.abs(run.table["residual"]) / np.abs(terms).max(axis=0)
 
 
 def energy(figures: Figures) -> None:
     """Terms of the balance, accumulated, and what it leaves open per step."""
     runs = figures.runs
-    with rc_context(STYLE):
-        figure = Figure(figsize=(4.8 * len(runs), 11), layout="constrained")
+    with figures.drawn("energy", (4.8 * len(runs), 11)) as figure:
         axes = figure.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
         for (above, middle, below), (case, run) in zip(axes.T, runs.items()):
             at = np.arange(len(run.table["step"]) + 1) / run.unloaded(1)
@@ -41,21 +38,18 @@ def energy(figures: Figures) -> None:
                 above.plot(at, values, style, color=colour, label=label)
                 if key not in ("elastic_change", "half_du_K_du"):
                     middle.plot(at, values, style, color=colour)
-            above.set(title=NAMES[case], ylabel="accumulated [N mm]")
-            middle.set(ylabel="the small terms [N mm]")
             below.semilogy(at[1:], np.maximum(relative_residual(run), 1e-17), ".", color="black")
             below.axhline(run.parameters.tol, color="#d55e00", linewidth=1)
             below.text(0, 6 * run.parameters.tol, "tolerance of a step", color="#d55e00")
+            above.set(title=NAMES[case], ylabel="accumulated [N mm]")
+            middle.set(ylabel="the small terms [N mm]")
             below.set(xlabel="cycles", ylabel="|open balance| / largest term", ylim=(1e-17, 1e-7))
             for ax in (above, middle, below):
                 ax.grid(alpha=0.3)
                 ax.label_outer()
         handles = axes[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
-        figure.suptitle(
-            "Energy balance: the work of the platen is the sum of the next four terms of the legend"
-        )
-        figures.save(figure, "energy")
+        figure.suptitle("The work of the platen is the sum of the next four terms of the legend")
     names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual",
              "platen_work_mean", "dissipation_mean", "closing_mean", "residual_mean")  # fmt: skip
     rows = [
@@ -75,48 +69,37 @@ def cycle_table(runs: dict[str, Run], wear: float) -> list[dict]:
             work, before = total(run, c), total(run, c - 1) if c > 1 else np.nan
             ends = [run.fields(run.unloaded(k))["displacement"] for k in (c - 1, c) if k]
             drift = np.linalg.norm((ends[-1] - ends[0])[:, :2], axis=1).max() if c > 1 else np.nan
-            rows.append(
-                {
-                    "case": case,
-                    "cycle": c,
-                    "dissipation_Nmm": work,
-                    "of_previous_cycle": work / before,
-                    "end_of_step_rule_Nmm": float(run.table["dissipation_end"][steps].sum()),
-                    "worn_volume_mm3": wear * work,
-                    "largest_drift_um": 1e3 * drift,
-                    "seconds": float(run.table["seconds"][steps].sum()),
-                }
-            )
+            rows.append(dict(
+                case=case, cycle=c, dissipation_Nmm=work, of_previous_cycle=work / before,
+                end_of_step_rule_Nmm=float(run.table["dissipation_end"][steps].sum()), worn_volume_mm3=wear * work,
+                largest_drift_um=1e3 * float(drift), seconds=float(run.table["seconds"][steps].sum()),
+            ))  # fmt: skip
     return rows
 
 
 def cycles(figures: Figures, wear: float) -> list[dict]:
     """Work of friction per cycle and how it settles, and the drift of the nodes."""
     rows = cycle_table(figures.runs, wear)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(14, 4.4), layout="constrained")
+    with figures.drawn("cycles", (14, 4.4)) as figure:
         work, settled, drift = figure.subplots(1, 3)
         for case in figures.runs:
             mine = [row for row in rows if row["case"] == case]
-            n, D = [row["cycle"] for row in mine], [row["dissipation_Nmm"] for row in mine]
-            style = dict(color=COLOURS[case], marker="osD"["ABC".index(case)], label=NAMES[case])
-            work.plot(n, D, **style)
-            change = [abs(row["of_previous_cycle"] - 1) for row in mine]
-            settled.semilogy(n[1:], change[1:], **style)
-            drift.semilogy(n[1:], [row["largest_drift_um"] for row in mine][1:], **style)
+            n, style = [row["cycle"] for row in mine], _style(case)
+            work.plot(n, [row["dissipation_Nmm"] for row in mine], label=NAMES[case], **style)
+            settled.semilogy(n[1:], [abs(row["of_previous_cycle"] - 1) for row in mine[1:]], **style)  # fmt: skip
+            drift.semilogy(n[1:], [row["largest_drift_um"] for row in mine[1:]], **style)
         work.set(title="Work of friction per cycle", ylabel="N mm", ylim=(0, None))
         settled.set(title="Its change to the cycle before", ylabel="relative")
         drift.set(title="Largest drift of a node per cycle", ylabel="µm")
-        drift.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        drift.yaxis.set_major_formatter("{x:g}")
-        drift.yaxis.set_minor_formatter(NullFormatter())
         for ax in (work, settled, drift):
             ax.set(xlabel="cycle", xticks=range(1, figures.cycles + 1))
             ax.grid(alpha=0.3)
         work.legend()
-        figures.save(figure, "cycles")
-    write_csv(figures.directory / "cycles.csv", rows)
     return rows
+
+
+def _style(case: str) -> dict:
+    return dict(color=COLOURS[case], marker="osD"["ABC".index(case)])
 
 
 def maps(figures: Figures, wear: float) -> None:
@@ -128,117 +111,78 @@ def maps(figures: Figures, wear: float) -> None:
             (run.dissipation(last) - run.dissipation(last - 1)) / run.area
         )
         columns["all cycles"] = lambda run: run.dissipation(last) / run.area
-    title = "Work of friction per area"
-    figures.densities("dissipation", title, columns, "N mm / mm²")
-
-    def depth(run):
-        return 1e6 * wear * run.dissipation(last) / run.area
-
+    figures.densities("dissipation", "Work of friction per area", columns, "N mm / mm²")
     title = f"Worn depth after {last} cycles, coefficient {wear:g} mm³/(N mm)"
+    depth = {"depth_nm": lambda run: 1e6 * wear * run.dissipation(last) / run.area}
     volumes = {
         case: f"{wear * run.dissipation(last).sum():.3g} mm³" for case, run in figures.runs.items()
     }
-    figures.densities("wear", title, {"depth_nm": depth}, "nm", across=volumes)
+    figures.densities("wear", title, depth, "nm", across=volumes)
 
 
 def comparison(runs: dict[str, dict[str, Run]], failures=()) -> list[dict]:
     """Work of friction in the first cycle, with both rules, for all variants, the failed ones too."""
-    base, rows = runs["base"], []
+    rows = []
     for name, cases in runs.items():
         for case, run in cases.items():
-            first, last = slice(0, run.unloaded(1)), run.parameters.cycles
-            work = total(run, 1)
-            rows.append(
-                {
-                    "variant": name,
-                    "case": case,
-                    "first_cycle_Nmm": work,
-                    "of_base": work / total(base[case], 1),
-                    "end_of_step_rule_Nmm": float(run.table["dissipation_end"][first].sum()),
-                    "last_cycle": last,
-                    "last_cycle_Nmm": total(run, last),
-                    "contact_nodes": len(run.x),
-                    "iterations_per_step": float(run.table["iterations"].mean()),
-                    "seconds_per_step": float(run.table["seconds"].mean()),
-                    "not_converged": "",
-                }
-            )
-    for failure in failures:
-        rows.append(dict.fromkeys(rows[0], np.nan) | failure)
-    return rows
+            first, own, work = slice(0, run.unloaded(1)), run.parameters, total(run, 1)
+            rows.append(dict(
+                variant=name, case=case, first_cycle_Nmm=work, of_base=work / total(runs["base"][case], 1),
+                end_of_step_rule_Nmm=float(run.table["dissipation_end"][first].sum()), last_cycle=own.cycles,
+                last_cycle_Nmm=total(run, own.cycles), increments=own.loading + own.unloading, contact_nodes=len(run.x),
+                iterations_per_step=float(run.table["iterations"].mean()),
+                seconds_per_step=float(run.table["seconds"].mean()), not_converged="",
+            ))  # fmt: skip
+    return rows + [dict.fromkeys(rows[0], np.nan) | failure for failure in failures]
 
 
 def mesh_orders(runs: dict[str, dict[str, Run]]) -> list[dict]:
-    """Work of friction in the first cycle against the mesh, whose width halves from row to row.
-
-    With changes a = D1 - D0 and b = D2 - D1 between three meshes the observed order is log2(a / b) and the
-    limit, if that order lasted, D2 + b^2 / (a - b) [L. F. Richardson 1911]; nan where changes do not fall.
-    """
+    """Work of friction in the first cycle against the mesh, whose width halves from row to row; Richardson's order
+    and limit from three meshes, nan where their changes do not fall."""
     rows = []
     for case in runs["base"]:
         meshes = [cases[case] for name, cases in runs.items()
                   if case in cases and name.startswith(("base", "mesh "))]  # fmt: skip
         work = {run.parameters.refine: total(run, 1) for run in meshes}
         for run in sorted(meshes, key=lambda run: run.parameters.refine):
-            level, order, limit = run.parameters.refine, np.nan, np.nan
-            before, change = (
-                work.get(k, np.nan) - work.get(k - 1, np.nan) for k in (level - 1, level)
-            )
-            if before * change > 0 and abs(before) > abs(change):
-                order = float(np.log2(before / change))
-                limit = work[level] + change**2 / (before - change)
-            rows.append(
-                {
-                    "case": case,
-                    "refine": level,
-                    "contact_nodes": len(run.x),
-                    "first_cycle_Nmm": work[level],
-                    "change_relative": change / work.get(level - 1, np.nan),
-                    "observed_order": order,
-                    "limit_at_that_order_Nmm": limit,
-                }
-            )
+            level = run.parameters.refine
+            last = [work[k] for k in (level - 2, level - 1, level) if k in work]
+            limit, order = richardson([4, 2, 1], last, (1e-9, 60)) if len(last) == 3 else (0, None)
+            before = work.get(level - 1, np.nan)
+            rows.append(dict(
+                case=case, refine=level, contact_nodes=len(run.x), first_cycle_Nmm=work[level],
+                change_relative=(work[level] - before) / before, observed_order=order or np.nan,
+                limit_at_that_order_Nmm=limit if order else np.nan,
+            ))  # fmt: skip
     return rows
 
 
-def convergence(figures: Figures, rows: list[dict], runs) -> bool:
-    """Dissipation of the first cycle against increments and mesh; False if there is nothing."""
-    base = next(iter(runs["base"].values())).parameters
-    panels = [("increments per cycle", []), ("contact nodes", [])]
-    for name, cases in runs.items():
-        parameters = next(iter(cases.values())).parameters
-        steps = parameters.loading + parameters.unloading
-        same = (parameters.top, parameters.unload_to) == (base.top, base.unload_to)
-        if same and parameters.refine == base.refine:
-            panels[0][1].append((steps, name))
-        if same and steps == base.loading + base.unloading:
-            panels[1][1].append((len(next(iter(cases.values())).x), name))
-    if max(len({size for size, _ in shown}) for _, shown in panels) < 2:
-        return False
-    of = {(row["variant"], row["case"]): row for row in rows}
-    with rc_context(STYLE):
-        figure = Figure(figsize=(11, 4.6), layout="constrained")
-        for ax, (label, shown) in zip(figure.subplots(1, 2, sharey=True), panels):
+def convergence(figures: Figures, rows: list[dict]) -> None:
+    """Dissipation of the first cycle against increments and mesh, where there are several."""
+    panels = [("increments", " increments"), ("contact_nodes", "mesh ")]
+    shown = [
+        (key, [row for row in rows if not row["not_converged"] and (row["variant"] == "base" or part in row["variant"])])
+        for key, part in panels
+    ]  # fmt: skip
+    if max(len({row[key] for row in of}) for key, of in shown) < 2:
+        return
+    with figures.drawn("convergence", (11, 4.6)) as figure:
+        axes = figure.subplots(1, 2, sharey=True)
+        for ax, (key, of) in zip(axes, shown):
             for case in figures.runs:
-                mine = sorted((size, name) for size, name in shown if (name, case) in of)
-                sizes = [size for size, _ in mine]
-                style = dict(color=COLOURS[case], marker="osD"["ABC".index(case)])
-                for key, dash, rule in (
+                mine = sorted((row for row in of if row["case"] == case), key=lambda row: row[key])
+                for rule, dash, name in (
                     ("first_cycle_Nmm", "-", "the library's rule"),
                     ("end_of_step_rule_Nmm", ":", "end of step"),
                 ):
-                    work = [of[name, case][key] for _, name in mine]
-                    ax.semilogx(sizes, work, dash, label=f"{case}, {rule}", **style)
-            ticks = sorted({size for size, _ in shown})
+                    x, y = [row[key] for row in mine], [row[rule] for row in mine]
+                    ax.semilogx(x, y, dash, label=f"{case}, {name}", **_style(case))
+            ticks = sorted({row[key] for row in of})
             ax.set_xticks(ticks, [str(size) for size in ticks])
             ax.minorticks_off()
-            ax.set(xlabel=label)
+            ax.set(xlabel=key.replace("_", " "))
             ax.grid(alpha=0.3)
-        figure.axes[0].set(ylabel="work of friction, first cycle [N mm]", ylim=(0, None))
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right center")
-        figures.save(figure, "convergence")
-    shown = {name for _, panel in panels for _, name in panel}
-    write_csv(
-        figures.directory / "convergence.csv", [row for row in rows if row["variant"] in shown]
-    )
-    return True
+        axes[0].set(ylabel="work of friction, first cycle [N mm]", ylim=(0, None))
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center")
+    rows = [row for _, of in shown for row in of]
+    write_csv(figures.directory / "convergence.csv", list({id(row): row for row in rows}.values()))

@@ -1,0 +1,127 @@
+"""The study's figures, tables and its page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from studies import page
+from studies.punch import work
+from studies.punch.figures import Figures, write_csv
+from studies.punch.run import Run
+from studies.punch.statements import STATEMENTS, ask
+
+CAPTIONS = {  # in the order of the page; what to see in each figure stands in docs/study.md
+    "fig3": "Figure 3. The load function f on the mesh's own faces; each node has the quarters around "
+    "it. Outlined: stick zones. Arrows: slip of the last increment.",
+    "unloading1": "The same within the first unloading: the central zone, the zone that appears at the "
+    "rim, and reverse slip advancing inwards behind it.",
+    "unloading_last": "The same within the last unloading.",
+    "fig4": "Figure 4. Trajectory of P in the contact plane.",
+    "fig5": "Figure 5. Friction force at P against the programme.",
+    "fig6": "Figure 6. Slip of P against the programme; shaded where P sticks.",
+    "fig7": "Figure 7. Applied force against slip of P.",
+    "dissipation": "Work of friction per area, on one logarithmic scale; what is below it has its lowest colour.",
+    "wear": "Archard's worn depth: coefficient times work of friction over nodal area.",
+    "cycles": "How the work of friction settles.",
+    "energy": "The energy balance and what it leaves open in each step: docs/dissipation.md says what it proves.",
+    "convergence": "Work of friction in the first cycle against increments and mesh.",
+}
+
+
+def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=()) -> None:
+    """Draw all figures, write all tables and the page.
+
+    Args:
+        runs: By variant and case; ``base`` is the paper's programme.
+        output: Directory of the study.
+        wear: Worn volume per work of friction, mm^3/(N mm).
+        failures: The variants that did not converge.
+    """
+    base = runs["base"]
+    figures = Figures(base, output / "figures")
+    for old in figures.directory.glob("*"):
+        old.unlink()
+    figures.figure3()
+    figures.unloading(1, "unloading1")
+    if figures.cycles > 1:
+        figures.unloading(figures.cycles, "unloading_last")
+    for node in range(1 + len(next(iter(base.values())).points)):
+        figures.point(node)
+    work.maps(figures, wear)
+    work.energy(figures)
+    variants = work.comparison(runs, failures)
+    work.convergence(figures, variants)
+    answers = ask({name: cases for name, cases in runs.items() if name != "mesh coarsened"})
+    tables = dict(
+        variants=variants, mesh=work.mesh_orders(runs), cycles=work.cycles(figures, wear), answers=answers,
+        statements=verdicts(answers), times=times(base),
+    )  # fmt: skip
+    for name, rows in tables.items():
+        write_csv(figures.directory / f"{name}.csv", rows)
+    write_page(output / "study.html", base, figures.directory, tables, wear)
+
+
+def verdicts(answers: list[dict]) -> list[dict]:
+    """One row a statement: in how many of the runs it holds, by case, and what that makes it."""
+    rows = []
+    for statement in STATEMENTS:
+        mine = [row for row in answers if row["statement"] == statement.key]
+        if not mine:
+            continue
+        holds, by_case = [row["holds"] for row in mine], {}
+        for row in mine:
+            by_case.setdefault(row["case"], []).append(row["holds"])
+        base = [f"{row['case']} {row['value']:.3g}" for row in mine if row["variant"] == "base"]
+        rows.append({
+            "where": statement.where, "statement": statement.text, "decided by": statement.measure,
+            "verdict": "holds in all" if all(holds) else "depends" if any(holds) else "holds in none",
+            "runs in which it holds": ", ".join(f"{case} {sum(of)}/{len(of)}" for case, of in by_case.items()),
+            "values of the base runs": ", ".join(base),
+        })  # fmt: skip
+    return rows
+
+
+def times(base: dict[str, Run]) -> list[dict]:
+    """Wall times and largest errors of the base runs."""
+    rows = []
+    for case, run in base.items():
+        of = run.table
+        rows.append(dict(
+            case=case, steps=len(of["step"]), seconds=float(of["seconds"].sum()), slowest_step=float(of["seconds"].max()),
+            iterations=int(of["iterations"].sum()), largest_error=float(of["error"].max()),
+            largest_slip_error=float(of["slip_error"].max()), energy_left_open=float(work.relative_residual(run).max()),
+        ))  # fmt: skip
+    return rows
+
+
+def write_page(file: Path, base: dict[str, Run], directory: Path, tables: dict, wear: float):
+    """All of it in one file; what was computed and by what is its last table, one column a case."""
+    heads = {
+        case: {k: v for key, of in run.head.items() for k, v in (of.items() if isinstance(of, dict) else [(key, of)])}
+        for case, run in base.items()
+    }  # fmt: skip
+    settings = [
+        {"": key, **{case: head[key] for case, head in heads.items()}}
+        for key in next(iter(heads.values()))
+    ]
+    drawn = [file.stem for file in sorted(directory.glob("*.svg"))]
+    order = [name for name in CAPTIONS if name in drawn] + [n for n in drawn if n not in CAPTIONS]
+    parts = [
+        page.paragraph("G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, Comportement hystérétique du frottement anisotrope, "
+            "18e Congrès Français de Mécanique, 2007, Section 3, computed anew."),
+        "<h2>What the paper says, and what holds</h2>",
+        page.paragraph("Every statement is decided by a number, in every run: the base runs and, where computed (--explore), "
+            "variants of what the paper leaves open. The bounds are ours; all numbers are in figures/answers.csv."),
+        page.table(tables["statements"]),
+        "<h2>Figures</h2>",
+        *(page.picture(directory / f"{name}.svg", f"{CAPTIONS.get(name, f'Another tracked node: {name}.')} ({name}.csv)")
+          for name in order),
+        "<h2>Work of friction and wear, cycle by cycle</h2>", page.table(tables["cycles"]),
+        page.paragraph(f"Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it."),
+        "<h2>Variants</h2>", page.table(tables["variants"]),
+        page.paragraph("Against the mesh: order of the last three meshes, and the limit if that order lasted."),
+        page.table(tables["mesh"]),
+        "<h2>Times and errors</h2>", page.table(tables["times"]),
+        "<h2>Parameters</h2>", page.table(settings),
+    ]  # fmt: skip
+    page.write(file, f"Cyclic punch with anisotropic friction: cases {', '.join(base)}", parts)
