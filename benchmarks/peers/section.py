@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.measurement import ROOT, Measurement, alone
 from benchmarks.peers import by_calculix, by_getfem, by_siconos
+from benchmarks.report.drawing import OURS, THEIRS, bars
 from mechanics import judge
 from studies.punch import Parameters, Punch, programme
 
@@ -188,37 +189,74 @@ def siconos() -> dict:
 
 def evaluate(results: dict) -> dict:
     """One row a peer: seconds a step, ratio to ours at equal error, errors by our measure; who is absent."""
-    rows = []
-    absent = [result["absent"] for result in results.values() if "absent" in result]
+    rows, absent = [], [result["absent"] for result in results.values() if "absent" in result]
     for name, result in results.items():
         if "absent" in result:
             continue
-        if name.endswith("siconos"):
-            rows += [_siconos_row(row) for row in result["rows"]]
-            continue
-        again = [result["ours"][key] for key in ("at equal error", "at equal error, again")]
-        ours = float(np.mean([run["seconds"] - run["mesh"] for run in again]))
-        complete = result["done"] == result["steps"]
-        per = result["seconds"] / max(result["done"], 1)
-        rows.append(dict(
-            key=name.split("/")[1].replace("_", "-"), peer=result["peer"], case="A", setting=result["setting"],
-            unknowns=result["unknowns"], seconds=per, ours=ours / result["steps"],
-            ours_tight=(result["ours"]["at 1e-8"]["seconds"] - result["ours"]["at 1e-8"]["mesh"]) / result["steps"],
-            ratio=per / (ours / result["steps"]) if complete else None, increments=result["increments"],
-            done=f"{result['done']} of {result['steps']}", said=result["said"], own=max(result["own"], default=None),
-            error=max(result["errors"], default=None), errors=result["errors"],
-            force_error=max((max(pair) for pair in result["force_error"]), default=None),
-        ))  # fmt: skip
-    rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["key"]))
+        rows += (
+            map(_condensed_row, result["rows"]) if name.endswith("siconos") else [_body_row(result)]
+        )
+    rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["peer"], row["case"]))
     return dict(rows=rows, absent=absent)
 
 
-def _siconos_row(row: dict) -> dict:
-    theirs = row["theirs"]
-    per, mine = float(np.median(theirs["seconds"])), float(np.median(row["ours"]["seconds"] + row["ours again"]["seconds"]))  # fmt: skip
+def _body_row(result: dict) -> dict:
+    def ours(*names):
+        return float(np.mean([run["seconds"] - run["mesh"] for run in map(result["ours"].get, names)])) / result["steps"]  # fmt: skip
+
+    per, mine = result["seconds"] / max(result["done"], 1), ours("at equal error", "at equal error, again")  # fmt: skip
     return dict(
-        key=f"siconos-{row['case']}", peer=row["peer"], case=row["case"], unknowns=None, increments=[5, 10],
-        setting="scaled W, q; start: the step before; tol 1e-10", seconds=per, ours=mine, ours_tight=mine, ratio=per / mine,
-        done=f"{theirs['converged']} of {len(theirs['seconds'])}", said="", error=max(theirs["errors"]),
-        errors=theirs["errors"], own=max(theirs["own"]), our_error=max(row["ours"]["errors"]), force_error=theirs["difference"],
+        peer=result["peer"], case="A", setting=result["setting"], unknowns=result["unknowns"], seconds=per, ours=mine,
+        ours_tight=ours("at 1e-8"), ratio=per / mine if result["done"] == result["steps"] else None,
+        done=f"{result['done']} of {result['steps']}", said=result["said"], own=max(result["own"], default=None),
+        error=max(result["errors"], default=None), force_error=max(map(max, result["force_error"]), default=None),
     )  # fmt: skip
+
+
+def _condensed_row(row: dict) -> dict:
+    theirs = row["theirs"]
+    per, mine = (float(np.median(of)) for of in (theirs["seconds"], row["ours"]["seconds"] + row["ours again"]["seconds"]))  # fmt: skip
+    return dict(
+        peer=row["peer"], case=row["case"], setting="scaled W, q; start: the step before; tol 1e-10", unknowns=None,
+        seconds=per, ours=mine, ours_tight=mine, ratio=per / mine, done=f"{theirs['converged']} of {len(theirs['seconds'])}",
+        said="", own=max(theirs["own"]), error=max(theirs["errors"]), force_error=theirs["difference"],
+    )  # fmt: skip
+
+
+def figures(data):
+    rows = data["rows"]
+    if not rows:
+        return
+    names = [f"{row['peer']}, {row['case']}, {row['unknowns'] or 'condensed'}, {row['done']}" for row in rows]  # fmt: skip
+    figure, (left, right) = bars(names, 2)
+    places = np.arange(len(rows))
+    for ax, shift, key, colour, label in (
+        (left, -0.2, "seconds", THEIRS, "the peer, its error by our measure"), (left, 0.2, "ours", OURS, "we, at equal error"),
+        (right, -0.2, "error", THEIRS, "_"), (right, 0.2, "own", "#999999", "as the peer reports its error"),
+    ):  # fmt: skip
+        values = [max(row[key] or np.nan, 1e-16) for row in rows]
+        ax.barh(places + shift, values, height=0.38, color=colour, label=label)
+    left.set(xlabel="processor seconds a step")
+    right.set(xlabel="largest error of the peer", xlim=(1e-16, 10))
+    figure.legend(loc="outside upper center", frameon=False, ncols=3)
+    yield (
+        "peers",
+        figure,
+        (
+            "Peers beside us: unknowns and steps done. Set-ups are included, but for Siconos, which is given W. GetFEM and CalculiX "
+            "know isotropic friction alone, so only case A can be compared with them."
+        ),
+    )
+
+
+def tables(data):
+    yield [{"not compared": text} for text in data["absent"]]
+    yield [
+        {
+            "peer": row["peer"], "case": row["case"], "unknowns": row["unknowns"], "configuration": row["setting"],
+            "s a step": row["seconds"], "ours at equal error": row["ours"], "ours at 1e-8": row["ours_tight"],
+            "ratio": row["ratio"], "steps done": row["done"], "error by our measure": row["error"], "its own": row["own"],
+            "reactions differ by": row["force_error"], "said": row["said"],
+        }
+        for row in data["rows"]
+    ]  # fmt: skip

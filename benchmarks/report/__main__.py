@@ -21,21 +21,20 @@ from time import monotonic
 import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
 
 # isort: split
+from matplotlib import rc_context
 from tqdm import tqdm
 
 from benchmarks.measurement import ROOT, compute, current, machine, now, stored
 from benchmarks.peers import section as peers
-from benchmarks.report import algebraic, ladder, meshes, page, stability
+from benchmarks.report import algebraic, ladder, meshes, stability
 from benchmarks.scaling import growth
+from studies import page
 
-SECTIONS = {
-    "algebraic": algebraic,
-    "meshes": meshes,
-    "peers": peers,
-    "growth": growth,
-    "ladder": ladder,
-    "stability": stability,
-}
+# Each has TITLE, plan(size), evaluate(results), figures(data) with captions, and tables(data).
+SECTIONS = dict(
+    algebraic=algebraic, meshes=meshes, peers=peers, growth=growth, ladder=ladder, stability=stability
+)  # fmt: skip
+DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -47,11 +46,7 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
     add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
     add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
-    add(
-        "--redraw",
-        action="store_true",
-        help="measure nothing, draw what report.json of the output has",
-    )
+    add("--redraw", action="store_true", help="measure nothing, draw what report.json of the output has")  # fmt: skip
     return parser.parse_args(argv)
 
 
@@ -96,25 +91,59 @@ def dates(record: dict) -> list[str]:
     return parts or [f"{record['date'][:10]}, {record['commit']}"]
 
 
+def write(report: dict, file: Path, directory: Path) -> dict[str, str]:
+    """Draw all sections and write the page; the captions of the figures by their names."""
+    for old in directory.glob("*.svg"):
+        old.unlink()
+    captions, short = {}, f"This is the {report['size']} report: less is measured."
+    parts = [
+        page.paragraph(short if report["size"] != "full" else "", "bad"),
+        page.paragraph(f"{report['date']}. Times are processor seconds of one thread. Repeated runs are interleaved and shown by "
+            "their median; a step of peers and growth is the mean of a programme that ran once. All numbers: report/report.json."),
+    ]  # fmt: skip
+    for name, section in report["sections"].items():
+        parts.append(f"<h2>{section['title']}</h2>")
+        if section["data"]:
+            with rc_context(DRAWING):
+                for figure, drawing, caption in SECTIONS[name].figures(section["data"]):
+                    drawing.savefig(directory / f"{figure}.svg", metadata={"Date": None})
+                    captions[figure] = caption
+                    parts.append(page.picture(directory / f"{figure}.svg", caption))
+            parts += map(page.table, SECTIONS[name].tables(section["data"]))
+        parts += remarks(section)
+    parts += ["<h2>Machine</h2>", page.table([{"": k, " ": v} for k, v in report["machine"].items()])]  # fmt: skip
+    page.write(file, "dolfinx_contact: error against run time", parts)
+    return captions
+
+
+def remarks(section: dict) -> list[str]:
+    """What failed, what was not run, when it was measured."""
+    said = [f"Failed: {name}: {text[-300:]}" for name, text in section["failed"].items()]
+    if section["not_run"]:
+        said.append(f"Not run, there was no time: {', '.join(section['not_run'])}.")
+    if section["older"]:
+        said.append(f"Made with code that has changed since: {', '.join(section['older'])}.")
+    when = "; ".join(f"{day} ({count})" for day, count in section["measured"].items())
+    return [page.paragraph(text, "bad") for text in said] + [
+        page.paragraph(f"Measured {when}, in {section['seconds']:.0f} s, at a load average of up to {section['load'][0] or 0:.1f}.")
+    ]  # fmt: skip
+
+
 def main(argv=None) -> Path:
     options = arguments(argv)
     quick = ROOT / "results" / "report-quick"
-    directory = options.measurements or (
-        ROOT / "results" / "report" if options.size == "full" else quick / "measurements"
-    )
+    kept = ROOT / "results" / "report" if options.size == "full" else quick / "measurements"
     output = options.output or (ROOT / "docs" if options.size == "full" else quick)
     figures = output / "report"
     file = figures / "report.json"
     if options.redraw:
         report = json.loads(file.read_text())
-        kept = report["sections"]
-        report["sections"] = {name: kept[name] for name in SECTIONS if name in kept}
     else:
         plans = {name: SECTIONS[name].plan(options.size) for name in options.sections}
-        records = run(plans, directory, options.minutes)
+        records = run(plans, options.measurements or kept, options.minutes)
         report = dict(date=now(), size=options.size, machine=machine(), sections=evaluated(records))
     figures.mkdir(parents=True, exist_ok=True)
-    report["figures"] = page.write(report, output / "report.html", figures)
+    report["figures"] = write(report, output / "report.html", figures)
     file.write_text(json.dumps(report, indent=1) + "\n")
     print(f"page      {output / 'report.html'}\nfigures   {figures}")
     return output / "report.html"

@@ -12,8 +12,10 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
+from matplotlib.ticker import LogLocator, MaxNLocator
 
-from benchmarks.measurement import Measurement, ladder, spread
+from benchmarks.measurement import Measurement, ladder
+from benchmarks.report.drawing import legend, panels, style
 from benchmarks.stress.scenes import PROGRAMMES, C
 from mechanics.scenes import build
 from studies.punch import CASES, Parameters, Punch, programme
@@ -186,28 +188,58 @@ def merged(curves: list) -> dict:
     )  # fmt: skip
 
 
-def seconds_to(curve: dict, error: float) -> float | None:
-    """Median seconds until ``error`` is reached; None if it never is."""
-    reached = [s for s, e in zip(curve["seconds"], curve["error"]) if e <= error]
-    return min(reached) if reached else None
-
-
 def evaluate(results: dict) -> dict:
-    """By scene: seconds to 1e-8, ratios to the best, set-up and steps."""
+    return dict(rows=[dict(r, scene=name.split("/")[1].replace("_", " ")) for name, r in results.items()])  # fmt: skip
+
+
+def figures(data):
+    rows = data["rows"]
+    figure, axes = panels(len(rows))
+    for ax, row in zip(axes, rows):
+        for solver, curve in row["curves"].items():
+            seconds = np.array(curve["seconds"])
+            lower, upper = seconds - curve["least"], np.array(curve["largest"]) - seconds
+            ax.errorbar(1e3 * seconds, np.maximum(curve["error"], 1e-16), xerr=1e3 * np.abs([lower, upper]),
+                elinewidth=0.4, errorevery=max(1, len(seconds) // 12), markevery=max(1, len(seconds) // 25),
+                **style(solver))  # fmt: skip
+        ax.axhline(TOL, color="0.6", lw=1)
+        ax.set(xscale="log", yscale="log", xlabel="processor time of the step [ms]", ylabel="error")
+        ax.yaxis.set_major_locator(LogLocator(numticks=8))
+        ax.set_title(f"{row['scene']}: step {row['watched']}, {row['unknowns']} unknowns", fontsize=11)  # fmt: skip
+    legend(figure, axes[0])
+    yield (
+        "precision",
+        figure,
+        "Error against the time of one step, set-up left out; the line is the tolerance.",
+    )
+
+    figure, axes = panels(len(rows))
+    for ax, row in zip(axes, rows):
+        for solver, run in row["runs"].items():
+            steps = len(run["seconds"])
+            ax.plot(np.arange(1, steps + 1), np.cumsum(run["seconds"]), **style(solver))
+            if run["said"]:
+                ax.plot(steps, sum(run["seconds"]), "x", color="black", ms=12, mew=2)
+        ax.set(yscale="log", xlabel="steps", ylabel="processor seconds so far")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_title(row["scene"], fontsize=11)
+    legend(figure, axes[0])
+    yield (
+        "setup",
+        figure,
+        "Time of a programme with all set-up, step by step; a cross is a step that was refused.",
+    )
+
+
+def tables(data):
     rows = []
-    for name, result in results.items():
-        times = {label: seconds_to(c, TOL) for label, c in result["curves"].items()}
-        solved = {label: t for label, t in times.items() if t is not None}
-        best = min(solved, key=solved.get) if solved else None
-        row = dict(scene=name.split("/")[1].replace("_", " "), best=best, unknowns=result["unknowns"],
-            watched=result["watched"], curves=result["curves"], runs=result["runs"])  # fmt: skip
-        for label, run in result["runs"].items():
-            later = spread(run["seconds"][1:]) if len(run["seconds"]) > 1 else None
-            row[label] = dict(
-                seconds_to_1e_8=times[label],
-                ratio=times[label] / solved[best] if times[label] is not None else None,
-                setup=run["setup"], step=later, all=sum(run["seconds"]), refused=run["said"],
-                iterations=sum(run["iterations"]), error=run["error"],
-            )  # fmt: skip
-        rows.append(row)
-    return dict(rows=rows)
+    for row in data["rows"]:
+        for solver, run in row["runs"].items():
+            curve, later = row["curves"][solver], run["seconds"][1:] or [None]
+            reached = [s for s, e in zip(curve["seconds"], curve["error"]) if e <= TOL]
+            rows.append({
+                "scene": row["scene"], "solver": solver, "to 1e-8 [s]": min(reached, default=None), "set-up [s]": run["setup"],
+                "median step [s]": sorted(later)[len(later) // 2], "programme [s]": sum(run["seconds"]),
+                "iterations": sum(run["iterations"]), "worst error": run["error"], "refused": run["said"][:60],
+            })  # fmt: skip
+    yield rows

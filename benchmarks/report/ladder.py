@@ -1,14 +1,10 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The economy ladder: one scene, ingredients removed one at a time; and what importing costs."""
+"""The economy ladder: one scene, ingredients removed one at a time."""
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import resource
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from time import process_time
@@ -18,7 +14,8 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 # isort: split
 import numpy as np
 
-from benchmarks.measurement import Measurement, Memory, alone, counted, spread
+from benchmarks.measurement import Measurement, Memory, counted, spread
+from benchmarks.report.drawing import OURS, bars
 from studies.punch import CASES, Parameters, Punch, programme
 
 TITLE = "The economy ladder"
@@ -38,7 +35,6 @@ RUNGS = {
     "certificate": (dict(case="C"), None),
     "no certificate": (dict(case="C", uncertified=True), "certificate"),
 }
-SAVES = 0.9  # a rung that takes more than this part of the one above saves nothing
 
 
 def plan(size: str) -> list[Measurement]:
@@ -49,14 +45,11 @@ def plan(size: str) -> list[Measurement]:
     names = [name for name in RUNGS if name in distinct.values()]
     if size == "smallest":
         names = ["non-associated", "associated"]
-    rungs = [
+    return [
         Measurement(f"ladder/{name}_{k}".replace(" ", "_"), "benchmarks.report.ladder:rung",
             dict(kind=RUNGS[name][0], repetition=k, **settings))
         for k in range(repeat) for name in names
     ]  # fmt: skip
-    return rungs + [
-        Measurement("ladder/imports", "benchmarks.report.ladder:imports", dict(repeat=repeat))
-    ]
 
 
 def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
@@ -102,7 +95,7 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     nodes, dim = len(contact.nodes), contact.frame.shape[0]
     condensed = nodes * (1 if contact.friction.frictionless else dim)
     return dict(
-        unknowns=problem.body.size, condensed=condensed if counts["condensed operators"] else 0,
+        kind=kind, unknowns=problem.body.size, condensed=condensed if counts["condensed operators"] else 0,
         counts=counts, first=setup, bytes=memory.added(), seconds=seconds, iterations=iterations,
         solver=solver,
     )  # fmt: skip
@@ -116,56 +109,19 @@ def moving(punch):
     return dc.ContactProblem(scale * punch.F, punch.u, [punch.contact], bcs=punch.bcs, tol=1e-8), scale  # fmt: skip
 
 
-def imports(repeat: int) -> dict:
-    """Processor seconds, memory and modules of importing ``dolfinx_contact.problem``, which imports all but tables and
-    plain arrays, and of ``import dolfinx``, interleaved."""
-    script = (
-        "import sys, resource; before = set(sys.modules); import {}; "
-        "print(len(set(sys.modules) - before), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, "
-        "*sorted({{m.split('.')[0] for m in set(sys.modules) - before}} - sys.stdlib_module_names))"
-    )
-    # the wheel dolfinx-solver-real wants to be imported before DOLFINx
-    first = "dolfinx_solver, " if importlib.util.find_spec("dolfinx_solver") else ""
-    ours, *others = "dolfinx_contact", "dolfinx", "dolfinx, dolfinx.fem.petsc, ufl"
-    packages = {**{name: name for name in others}, ours: "dolfinx_contact.problem"}
-    found = {package: dict(seconds=[]) for package in packages}
-    for k in range(-1 if repeat > 1 else 0, repeat):
-        for package, imported in packages.items():
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            done = subprocess.run([sys.executable, "-c", script.format(first + imported)], env=alone(),
-                capture_output=True, text=True, check=True)  # fmt: skip
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            if k >= 0:  # the first one reads the disk
-                used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-                found[package]["seconds"].append(used)
-            count, peak, *names = done.stdout.split()
-            found[package].update(modules=int(count), bytes=1024 * int(peak), packages=names)
-    done = subprocess.run([sys.executable, "-X", "importtime", "-c", f"import {packages[ours]}"],
-        env=alone(), capture_output=True, text=True, check=True)  # fmt: skip
-    times = [line.split(":", 1)[1].split("|") for line in done.stderr.splitlines() if "|" in line]
-    own = [
-        dict(module=name.strip(), microseconds=int(self))
-        for self, _, name in times if name.strip().startswith("dolfinx_contact")
-    ]  # fmt: skip
-    return dict(found=found, own=sorted(own, key=lambda row: -row["microseconds"]))
-
-
 def evaluate(results: dict) -> dict:
     """One row a rung: medians over the repetitions, and ratios to the rung that it is compared with."""
-    imported = results.get("ladder/imports")
     by_kind = {}
-    for name, result in results.items():
-        if name != "ladder/imports":
-            by_kind.setdefault(name.rpartition("_")[0].split("/")[1].replace("_", " "), []).append(result)  # fmt: skip
-    first = {json.dumps(kind): name for name, (kind, _) in reversed(RUNGS.items())}
+    for result in results.values():
+        by_kind.setdefault(json.dumps(result["kind"]), []).append(result)
     rows = {}
     for name, (kind, above) in RUNGS.items():
-        runs = by_kind.get(first[json.dumps(kind)])
+        runs = by_kind.get(json.dumps(kind))
         if not runs:
             continue
         last = runs[0]
         steps = max(len(last["seconds"]) - 1, 1)
-        row = dict(
+        row = rows[name] = dict(
             rung=name, compared_with=above, unknowns=last["unknowns"], condensed=last["condensed"],
             solver=last["solver"], set_up=spread([run["seconds"][0] for run in runs]),
             step=spread([np.mean(run["seconds"][1:]) for run in runs]),
@@ -178,23 +134,36 @@ def evaluate(results: dict) -> dict:
             row["step_ratio"] = row["step"]["median"] / other["step"]["median"]
             row["set_up_ratio"] = row["set_up"]["median"] / other["set_up"]["median"]
             row["bytes_ratio"] = row["bytes"] / other["bytes"] if other["bytes"] else None
-            row["saves"] = [
-                what for what in ("step", "set_up", "bytes")
-                if row[f"{what}_ratio"] is not None and row[f"{what}_ratio"] < SAVES
-            ]  # fmt: skip
-        rows[name] = row
-    return dict(rows=list(rows.values()), imports=imported and import_cost(imported))
+    return dict(rows=list(rows.values()))
 
 
-def import_cost(imported: dict) -> dict:
-    """Medians, and what dolfinx_contact brings that ``import dolfinx`` does not."""
-    found = imported["found"]
-    rows = {
-        package: dict(spread(of["seconds"]), modules=of["modules"], bytes=of["bytes"])
-        for package, of in found.items()
-    }
-    packages = [set(of["packages"]) for of in found.values()]
-    return dict(
-        rows=rows, own_modules_ms=sum(row["microseconds"] for row in imported["own"]) / 1e3,
-        slowest_own=imported["own"][:3], beyond_dolfinx=sorted(packages[-1] - packages[0]),
-    )  # fmt: skip
+def figures(data):
+    rows = data["rows"]
+    figure, axes = bars([row["rung"] for row in rows], 3)
+    for ax, key, title, scale in zip(
+        axes, ("step", "set_up", "bytes"),
+        ("one step [ms]", "first step with set-up [ms]", "memory beyond mesh and forms [MB]"), (1e3, 1e3, 1e-6),
+    ):  # fmt: skip
+        values = [max(scale * (row[key] if key == "bytes" else row[key]["median"]), 1e-3) for row in rows]  # fmt: skip
+        ax.bar_label(ax.barh(range(len(rows)), values, color=OURS, height=0.65), fmt="%.3g", padding=3)  # fmt: skip
+        ax.set(xlabel=title, xlim=(0.4 * min(values), 4 * max(values)))
+        for k, row in enumerate(rows):  # a line above each scene that begins anew
+            if k and row["compared_with"] is None:
+                ax.axhline(k - 0.5, color="0.5", lw=0.8)
+    yield (
+        "ladder",
+        figure,
+        "What a step, its set-up and its memory cost as ingredients are removed one at a time.",
+    )
+
+
+def tables(data):
+    yield [
+        {
+            "rung": row["rung"], "compared with": row["compared_with"], "step, ratio": row.get("step_ratio"),
+            "set-up, ratio": row.get("set_up_ratio"), "memory, ratio": row.get("bytes_ratio"),
+            "unknowns": row["unknowns"], "condensed": row["condensed"], "iterations a step": row["iterations"],
+            **{f"{key} a step": value for key, value in row["counts"].items()},
+        }
+        for row in data["rows"]
+    ]  # fmt: skip

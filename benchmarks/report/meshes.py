@@ -12,6 +12,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 
 from benchmarks.measurement import Measurement, spread
+from benchmarks.report.drawing import logarithmic, panels
 from mechanics.convergence import richardson
 from studies.punch import Parameters, Punch, programme
 
@@ -23,6 +24,7 @@ TOLERANCES = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8]
 TIGHT = 1e-10
 CASE = "C"
 QUANTITIES = ("normal", "dissipation", "stick")
+NOISE = 1e-9  # relative; ten times the tolerance of the runs
 AGAIN = 20.0  # seconds: what takes less is repeated, three times at most
 
 
@@ -102,3 +104,48 @@ def evaluate(results: dict) -> dict:
         if r["increments"] == 30 and r["tol"] == tight and once["refine"] == r["refine"]
     ]
     return dict(**families, orders=orders, case=CASE, twice=twice)
+
+
+def figures(data):
+    names = dict(normal="total reaction", dissipation="work of friction", stick="edge of the stick zone")  # fmt: skip
+    families = dict(meshes="width of a cell [mm]", increments="increments of a cycle", tolerances="tolerance")  # fmt: skip
+    figure, axes = panels(4, 2, (5.6, 4.0))
+    for ax, (family, label), marker in zip(axes, families.items(), "os^"):
+        rows = data[family]
+        for key, name in names.items():
+            order = data["orders"][family].get(key)
+            errors = [above_noise(row, key) for row in rows]
+            ax.plot([row["x"] for row in rows], errors, marker=marker, label=name + (f", order {order:.1f}" if order else ""))  # fmt: skip
+        ax.set(xlabel=label, ylabel="relative error")
+        seconds = [row["seconds"]["median"] for row in rows]
+        axes[3].plot(seconds, [above_noise(row, "dissipation") for row in rows], marker=marker, label=f"{family} refined")  # fmt: skip
+    axes[3].set(xlabel="processor seconds of a cycle", ylabel="error of the work of friction")
+    for ax in axes:
+        logarithmic(ax)
+        ax.legend(fontsize=9)
+    yield (
+        "discretisation",
+        figure,
+        (
+            f"Punch, case {data['case']}, one cycle: error of mesh, increments and tolerance against Richardson's limits."
+        ),
+    )
+
+
+def above_noise(row: dict, key: str) -> float:
+    """What the tolerance leaves is no error of mesh or increments."""
+    error = row[f"{key}_error"]
+    return error if error is not None and error > NOISE else np.nan
+
+
+def tables(data):
+    for family in ("meshes", "increments", "tolerances"):
+        yield [
+            {
+                family: f"{row['unknowns']:,} unknowns" if family == "meshes" else row["x"], "total reaction [N]": row["normal"],
+                "work of friction [N mm]": row["dissipation"], "stick edge [mm]": row["stick"], "s": row["seconds"]["median"],
+                **{f"error of {key}": row[f"{key}_error"] for key in QUANTITIES},
+            }
+            for row in data[family]
+        ]  # fmt: skip
+    yield [{"unknowns": row["unknowns"], "twice the increments change the work by": row["change"]} for row in data["twice"]]  # fmt: skip

@@ -12,7 +12,9 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 
 from benchmarks.measurement import Measurement, Memory
+from benchmarks.report.drawing import legend, logarithmic, panels, style
 from benchmarks.scaling.elastic_ratio import elastic_solve as yardstick
+from mechanics.convergence import exponent
 from studies.punch import Parameters, Punch, programme
 
 TITLE = "Growth"
@@ -25,8 +27,6 @@ SOLVERS = {
 # Divisions and layers of the mesh, and up to which size each solver is measured: beyond, it only costs time.
 SIZES = [(2, 2), (4, 2), (8, 4), (12, 6), (16, 8), (24, 12), (32, 16), (48, 24)]
 LAST = {"condensed Newton": 5, "fixed point, bipotential": 5, "solver=None": 5}
-CYCLE = 15  # steps of the paper's cycle
-FREE = 1.1  # the choice of solver=None is right if no other solver is faster by more than this
 
 
 def plan(size: str) -> list[Measurement]:
@@ -94,7 +94,7 @@ def elastic_solve(punch) -> float:
 
 
 def evaluate(results: dict) -> dict:
-    """Rows by solver and size, exponents, and whether ``solver=None`` takes the best at each size."""
+    """Rows by solver and size, and exponents."""
     rows, refused, elastic = [], [], {}
     for name, result in results.items():
         solver = next(s for s in SOLVERS if f"/{s}_".replace(" ", "_") in name)
@@ -114,43 +114,50 @@ def evaluate(results: dict) -> dict:
     rows.sort(key=lambda row: (row["solver"], row["unknowns"]))
     for row in rows:
         row["over_elastic"] = row["step"] / float(np.median(elastic[row["unknowns"]]))
-    return dict(rows=rows, refused=refused, fits=fits(rows), choices=choices(rows))
+    return dict(rows=rows, refused=refused, exponents=exponents(rows))
 
 
-def fits(rows: list[dict]) -> dict:
-    """Exponents of the growth with the unknowns, least squares of logarithms, from 1e3 unknowns on."""
-    found = {}
-    for solver in (*SOLVERS, "elastic solve"):
-        of = [row for row in rows if row["solver"] == solver and row["unknowns"] > 500]
-        if solver == "solver=None" or not of:
-            continue
-        found[solver] = {
-            key: float(np.polyfit(np.log([r["unknowns"] for r in of]), np.log([r[key] for r in of]), 1)[0])
-            if len(of) > 1 and all(r[key] > 0 for r in of) else None
-            for key in ("step", "iterations", "bytes")
-        }  # fmt: skip
-    return found
-
-
-def choices(rows: list[dict]) -> list[dict]:
-    """At each size, for a cycle with its set-up and for many steps: the best solver, what ``solver=None`` took, its price."""
+def exponents(rows: list[dict]) -> list[dict]:
+    """Of the growth with the unknowns, from 500 of them on, solver by solver."""
     found = []
-    for auto in (row for row in rows if row["solver"] == "solver=None"):
-        others = [
-            row for row in rows
-            if row["unknowns"] == auto["unknowns"] and row["solver"] in list(SOLVERS)[:3]
-        ]  # fmt: skip
-        taken = auto["chosen"].split()[0]
-        name = {"CondensedNewton": "condensed Newton", "FixedPoint": "fixed point, return"}[taken]
-        same = next((row for row in others if row["solver"] == name), auto)
-        if len(others) < 2:
-            continue
-        for what, cost in (
-            ("a cycle", lambda row: row["setup"] + CYCLE * row["step"]),
-            ("many steps", lambda row: row["step"]),
-        ):
-            best = min(others, key=cost)
-            loss = cost(same) / cost(best)
-            found.append(dict(unknowns=auto["unknowns"], what=what, auto=taken, best=best["solver"], loss=loss,
-                right=loss <= FREE))  # fmt: skip
+    for solver in dict.fromkeys(row["solver"] for row in rows):
+        of = [row for row in rows if row["solver"] == solver and row["unknowns"] > 500]
+        sizes = [row["unknowns"] for row in of]
+        found.append(dict(solver=solver, from_unknowns=min(sizes, default=0), to_unknowns=max(sizes, default=0)) | {
+            key: exponent(sizes, [row[key] for row in of]) if len(of) > 1 and all(row[key] > 0 for row in of) else None
+            for key in ("step", "iterations", "bytes")
+        })  # fmt: skip
     return found
+
+
+def figures(data):
+    figure, axes = panels(3, 3, (4.4, 4.0))
+    titles = "processor seconds a step", "iterations a step", "memory beyond mesh and forms [MB]"
+    for ax, key, title in zip(axes, ("step", "iterations", "bytes"), titles):
+        for solver in dict.fromkeys(row["solver"] for row in data["rows"]):
+            of = [row for row in data["rows"] if row["solver"] == solver and row[key] > 0]
+            y = np.array([row[key] for row in of]) * (1e-6 if key == "bytes" else 1)
+            if of or key == "step":  # an elastic solve: seconds alone were measured
+                ax.plot([row["unknowns"] for row in of], y, **style(solver))
+        # Where other work had taken the memory before, the quick report finds none that was added.
+        logarithmic(ax)
+        ax.set(xlabel="unknowns", ylabel=title)
+    legend(figure, axes[0], 3)
+    yield (
+        "growth",
+        figure,
+        "Punch, case C, pressed in one step and raised by two of the paper's ten: cost of a step against unknowns.",
+    )
+
+
+def tables(data):
+    yield data["exponents"]
+    yield [
+        {
+            "solver": row["solver"], "takes": row["chosen"], "unknowns": row["unknowns"], "contact nodes": row["nodes"] or None,
+            "s a step": row["step"], "over an elastic solve": row["over_elastic"], "set-up [s]": row["setup"] or None,
+            "iterations a step": row["iterations"] or None, "MB": row["bytes"] / 1e6 or None,
+        }
+        for row in data["rows"]
+    ]  # fmt: skip
+    yield [{"refused": text} for text in data["refused"]]
