@@ -14,11 +14,7 @@ import numpy as np
 
 ORDER = [0, 1, 3, 2, 4, 5, 7, 6]  # DOLFINx's vertices of a hexahedron in the order of C3D8
 FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
-KINDS = {
-    "node to surface": "NODE TO SURFACE",
-    "surface to surface": "SURFACE TO SURFACE",
-    "mortar": "MORTAR",
-}
+KINDS = ("node to surface", "surface to surface", "mortar")
 
 
 def write(file: Path, given: dict, kind: str, stiff: float) -> None:
@@ -31,59 +27,47 @@ def write(file: Path, given: dict, kind: str, stiff: float) -> None:
         stiff: Penalty over Young's modulus, per length: pressure per overclosure and, the same, friction
             per slip of a sticking point.
     """
-    x, cells = given["x"], given["cells"][:, ORDER]
+    young, penalty = float(given["young"]), stiff * float(given["young"])
+    overclosure = {"mortar": ["HARD"], "node to surface": ["LINEAR", f"{penalty:.6e}, 1e-3"], "surface to surface": ["LINEAR", f"{penalty:.6e}"]}  # fmt: skip
+    behaviour, *pressure = overclosure[kind]
+    lines = _mesh(given["x"], given["cells"][:, ORDER], given["contact"], given["top"])
+    lines += [
+        "*MATERIAL, NAME=STEEL", "*ELASTIC", f"{young:.10e}, {float(given['poisson']):.10e}",
+        "*SOLID SECTION, ELSET=EBODY, MATERIAL=STEEL", "*SOLID SECTION, ELSET=EPLANE, MATERIAL=STEEL",
+        "*SURFACE INTERACTION, NAME=RUB", f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={behaviour}", *pressure,
+        "*FRICTION", f"{float(given['mu']):.10e}, {penalty:.6e}",
+        f"*CONTACT PAIR, INTERACTION=RUB, TYPE={kind.upper()}", "SLAVE, MASTER",
+        "*BOUNDARY", "NPLANE, 1, 3", "NTOP, 1, 2",
+    ]  # fmt: skip
+    for displacement in given["programme"]:
+        lines += [
+            "*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY", f"NTOP, 3, 3, {-displacement:.12e}",
+            "*NODE PRINT, NSET=NBODY, FREQUENCY=1000", "U", "*END STEP",
+        ]  # fmt: skip
+    file.write_text("\n".join(lines) + "\n")
+
+
+def _mesh(x, cells, contact, top) -> list[str]:
+    """Nodes and elements of the body and of a block that is the plane, and their surfaces."""
     edges = x[cells]
-    if np.linalg.det(edges[:, [1, 3, 4]] - edges[:, :1]).min() < 0:  # turned inside out
-        turned = np.linalg.det(edges[:, [1, 3, 4]] - edges[:, :1]) < 0
-        cells[turned] = cells[turned][:, [4, 5, 6, 7, 0, 1, 2, 3]]
-    n, m = len(x), len(cells)
-    wide = 1.6 * np.abs(x[:, :2]).max()
-    block = [
-        (a * wide, b * wide, z)
-        for z in (-wide, 0.0)
-        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    ]
+    turned = np.linalg.det(edges[:, [1, 3, 4]] - edges[:, :1]) < 0  # inside out
+    cells[turned] = cells[turned][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    n, m, wide = len(x), len(cells), 1.6 * np.abs(x[:, :2]).max()
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    block = [(a * wide, b * wide, z) for z in (-wide, 0.0) for a, b in corners]
     lines = ["*NODE, NSET=NBODY"]
     lines += [f"{k + 1}, {p[0]:.12e}, {p[1]:.12e}, {p[2]:.12e}" for k, p in enumerate(x)]
     lines += ["*NODE, NSET=NPLANE"]
     lines += [f"{n + k + 1}, {a:.12e}, {b:.12e}, {c:.12e}" for k, (a, b, c) in enumerate(block)]
     lines += ["*ELEMENT, TYPE=C3D8, ELSET=EBODY"]
     lines += [", ".join(map(str, [k + 1, *(cell + 1)])) for k, cell in enumerate(cells)]
-    lines += [
-        "*ELEMENT, TYPE=C3D8, ELSET=EPLANE",
-        f"{m + 1}, " + ", ".join(str(n + k) for k in range(1, 9)),
-    ]
-    touching = np.isin(cells, given["contact"])
+    lines += ["*ELEMENT, TYPE=C3D8, ELSET=EPLANE", ", ".join(map(str, [m + 1, *range(n + 1, n + 9)]))]  # fmt: skip
+    touching = np.isin(cells, contact)
     lines += ["*SURFACE, NAME=SLAVE, TYPE=ELEMENT"]
-    for face, corners in enumerate(FACES, start=1):
-        lines += [f"{k + 1}, S{face}" for k in np.flatnonzero(touching[:, corners].all(axis=1))]
+    for face, nodes in enumerate(FACES, start=1):
+        lines += [f"{k + 1}, S{face}" for k in np.flatnonzero(touching[:, nodes].all(axis=1))]
     lines += ["*SURFACE, NAME=MASTER, TYPE=ELEMENT", f"{m + 1}, S2", "*NSET, NSET=NTOP"]
-    lines += [f"{k + 1}," for k in given["top"]]
-    young, penalty = float(given["young"]), stiff * float(given["young"])
-    pressure = [
-        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=" + ("HARD" if kind == "mortar" else "LINEAR")
-    ]
-    if kind == "node to surface":
-        pressure += [f"{penalty:.6e}, 1e-3"]
-    elif kind == "surface to surface":
-        pressure += [f"{penalty:.6e}"]
-    lines += [
-        "*MATERIAL, NAME=STEEL", "*ELASTIC", f"{young:.10e}, {float(given['poisson']):.10e}",
-        "*SOLID SECTION, ELSET=EBODY, MATERIAL=STEEL", "*SOLID SECTION, ELSET=EPLANE, MATERIAL=STEEL",
-        "*SURFACE INTERACTION, NAME=RUB", *pressure, "*FRICTION", f"{float(given['mu']):.10e}, {penalty:.6e}",
-        f"*CONTACT PAIR, INTERACTION=RUB, TYPE={KINDS[kind]}", "SLAVE, MASTER",
-        "*BOUNDARY", "NPLANE, 1, 3", "NTOP, 1, 2",
-    ]  # fmt: skip
-    for displacement in given["programme"]:
-        lines += [
-            "*STEP, INC=1000",
-            "*STATIC",
-            "1., 1.",
-            "*BOUNDARY",
-            f"NTOP, 3, 3, {-displacement:.12e}",
-        ]
-        lines += ["*NODE PRINT, NSET=NBODY, FREQUENCY=1000", "U", "*END STEP"]
-    file.write_text("\n".join(lines) + "\n")
+    return lines + [f"{k + 1}," for k in top]
 
 
 def read(file: Path, nodes: int) -> np.ndarray:

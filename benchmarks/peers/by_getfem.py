@@ -14,13 +14,10 @@ from time import process_time
 import numpy as np
 
 
-def main(mesh_file, found_file):
-    import getfem
-
-    given = np.load(mesh_file)
-    x, cells, contact, top = (given[name] for name in ("x", "cells", "contact", "top"))
-    young, poisson, mu = (float(given[name]) for name in ("young", "poisson", "mu"))
-    start = process_time()
+def punch(getfem, given):
+    """The model, its mesh and the first degree of freedom of each of our nodes."""
+    x, cells, top = (given[name] for name in ("x", "cells", "top"))
+    young, poisson = float(given["young"]), float(given["poisson"])
     mesh = getfem.Mesh("empty", 3)
     mesh.add_convex(getfem.GeoTrans("GT_QK(3,1)"), np.transpose(x[cells], (2, 1, 0)))
     mfu = getfem.MeshFem(mesh, 3)
@@ -32,32 +29,44 @@ def main(mesh_file, found_file):
     first = np.array([dof_of[tuple(np.round(p, 9))] for p in x])
     held = set(map(int, mesh.pid_from_coords(x[top].T).ravel()))
     mesh.set_region(1, mesh.faces_from_pid(sorted(held)))
-
     model = getfem.Model("real")
     model.add_fem_variable("u", mfu)
-    lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
-    model.add_initialized_data("lame", [lame])
-    model.add_initialized_data("shear", [shear])
+    model.add_initialized_data("lame", [young * poisson / ((1 + poisson) * (1 - 2 * poisson))])
+    model.add_initialized_data("shear", [young / (2 * (1 + poisson))])
     model.add_isotropic_linearized_elasticity_brick(mim, "u", "lame", "shear")
     model.add_initialized_data("down", [0.0, 0.0, 0.0])
     model.add_Dirichlet_condition_with_multipliers(mim, "u", mfu, 1, "down")
-    n, size = len(contact), mfu.nbdof()
+    return model, mfu.nbdof(), first
+
+
+def add_contact(getfem, model, given, size, first) -> None:
+    """The contact brick on the rows of the contact nodes."""
+    n = len(given["contact"])
     normal, tangent = getfem.Spmat("empty", n, size), getfem.Spmat("empty", 2 * n, size)
-    for k, node in enumerate(contact):
+    for k, node in enumerate(given["contact"]):
         normal.add(k, first[node] + 2, -1.0)
         tangent.add(2 * k, first[node], 1.0)
         tangent.add(2 * k + 1, first[node] + 1, 1.0)
     model.add_variable("pressure", n)
     model.add_variable("friction", 2 * n)
     # As the manual advises: of the order of Young's modulus times a length, here of a cell.
-    model.add_initialized_data("r", [young * float(given["cell"])])
-    model.add_initialized_data("mu", [mu])
+    model.add_initialized_data("r", [float(given["young"]) * float(given["cell"])])
+    model.add_initialized_data("mu", [float(given["mu"])])
     model.add_initialized_data("gap", np.zeros(n))
     model.add_initialized_data("alpha", np.ones(n))
     model.add_initialized_data("gamma", [1.0])
     model.add_initialized_data("before", np.zeros(size))
     model.add_basic_contact_brick("u", "pressure", "friction", "r", normal, tangent, "mu", "gap", "alpha", 1,
         "gamma", "before")  # fmt: skip
+
+
+def main(mesh_file, found_file):
+    import getfem
+
+    given = np.load(mesh_file)
+    start = process_time()
+    model, size, first = punch(getfem, given)
+    add_contact(getfem, model, given, size, first)
     seconds, found, own, said = [process_time() - start], [], [], ""
     for displacement in given["programme"]:
         start = process_time()

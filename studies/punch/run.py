@@ -136,13 +136,7 @@ def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **m
         punch.problem.load(_checkpoint(directory, done))
         punch.approach.value = -displacements[done - 1]
     else:
-        disc, area, head = gather(punch), _gathered(punch, contact.area), punch.head()
-        if comm.rank == 0:
-            shutil.rmtree(directory, ignore_errors=True)
-            (directory / "steps").mkdir(parents=True)
-            np.savez(directory / "disc.npz", x=disc.x, faces=disc.faces, area=area)
-            description = json.dumps({"settings": wanted, "head": head}, indent=1)
-            (directory / "run.json").write_text(description + "\n")
+        _begin(punch, directory, wanted)
     comm.barrier()
     history = dc.History(punch.problem, directory / "history.csv", positions, resume=done)
     per_cycle = parameters.loading + parameters.unloading
@@ -168,6 +162,17 @@ def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **m
         if bar is not None:
             bar.update()
     return ""
+
+
+def _begin(punch, directory: Path, wanted: dict) -> None:
+    """An empty directory with what the run is.  Collective."""
+    disc, area, head = gather(punch), _gathered(punch, punch.contact.area), punch.head()
+    if punch.comm.rank == 0:
+        shutil.rmtree(directory, ignore_errors=True)
+        (directory / "steps").mkdir(parents=True)
+        np.savez(directory / "disc.npz", x=disc.x, faces=disc.faces, area=area)
+        description = json.dumps({"settings": wanted, "head": head}, indent=1)
+        (directory / "run.json").write_text(description + "\n")
 
 
 def _checkpoint(directory: Path, step: int) -> Path:

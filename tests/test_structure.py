@@ -1,0 +1,59 @@
+"""What programs keep to: short functions and modules, no path of their own making, no import circle."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("demos", "benchmarks", "studies", "mechanics")
+PROGRAMS = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
+TREES = {file: ast.parse(file.read_text()) for file in PROGRAMS}
+LINES, MODULE = 60, 300  # of a function, of a module
+
+
+def name(file: Path) -> str:
+    """As it is imported."""
+    parts = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@pytest.mark.parametrize("file", PROGRAMS, ids=name)
+def test_functions_and_modules_are_short(file):
+    """No function has more than 60 lines, no module more than 300."""
+    functions = [n for n in ast.walk(TREES[file]) if isinstance(n, ast.FunctionDef)]
+    long = {f.name: n for f in functions if (n := f.end_lineno - f.lineno + 1) > LINES}
+    assert not long
+    assert len(file.read_text().splitlines()) <= MODULE
+
+
+def test_no_program_changes_the_path():
+    """Programs and tests are found by how they are started, not by a path that they change."""
+    files = [*PROGRAMS, *(ROOT / "tests").glob("*.py")]
+    changed = [
+        f"{file}:{node.lineno}"
+        for file in files
+        for node in ast.walk(TREES.get(file) or ast.parse(file.read_text()))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) == "sys.path"
+    ]
+    assert not changed
+
+
+def imports(tree) -> set[str]:
+    """Modules that are imported anywhere, in functions, too."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return found
+
+
+def test_there_is_no_import_circle():
+    """Modules can be put into an order in which each one imports only those before it."""
+    graph = {name(file): imports(tree) for file, tree in TREES.items()}
+    order = list(TopologicalSorter(graph).static_order())
+    assert set(graph) <= set(order)
+    assert "mechanics.judge" in graph["mechanics.judge_scene"]
