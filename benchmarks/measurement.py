@@ -58,7 +58,7 @@ def compute(measurement: Measurement, directory: Path) -> dict:
     A process that fails or is killed leaves a record with what it said under ``failed``; it is tried again
     in the next run.
     """
-    file = directory / f"{measurement.name}.json"
+    file = directory.resolve() / f"{measurement.name}.json"
     file.parent.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_suffix(".unfinished")
     unfinished.unlink(missing_ok=True)
@@ -95,13 +95,16 @@ def made_with() -> dict[str, str]:
     """Digest of every file of this project, and of its compiled kernel, that this process has imported."""
     files = {Path(file) for m in list(sys.modules.values()) if (file := getattr(m, "__file__", None))}  # fmt: skip
     own = {f for f in files if any(d in f.parents for d in OWN) or f.name.startswith("_kernel")}
+    own.discard(ROOT / "benchmarks" / "report" / "drawing.py")  # measures nothing
     return {os.path.relpath(file, ROOT): digest(file) for file in sorted(own)}
 
 
 @functools.cache
 def digest(file: Path) -> str:
-    """Of the content; of a file that is not there, of nothing."""
-    return hashlib.sha256(file.read_bytes() if file.exists() else b"").hexdigest()[:16]
+    """Of the content down to ``evaluate``, below which a section only shows what was measured; of a file that is not
+    there, of nothing."""
+    content = file.read_bytes() if file.exists() else b""
+    return hashlib.sha256(content.split(b"\ndef evaluate(")[0]).hexdigest()[:16]
 
 
 def alone() -> dict[str, str]:
@@ -112,10 +115,6 @@ def alone() -> dict[str, str]:
 
 
 # -- what a measurement ran on -----------------------------------------------------------------------
-
-
-def package() -> str:
-    return version("dolfinx_contact")
 
 
 @functools.cache
@@ -150,7 +149,7 @@ def machine() -> dict:
         memory_gb=round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
         system=platform.platform(), compiler=compiler.stdout.splitlines()[0] if compiler.stdout else "",
         python=platform.python_version(), numpy=np.__version__, dolfinx=dolfinx,
-        petsc=".".join(map(str, PETSc.Sys.getVersion())), dolfinx_contact=package(), commit=commit(),
+        petsc=".".join(map(str, PETSc.Sys.getVersion())), dolfinx_contact=version("dolfinx_contact"), commit=commit(),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import LogLocator
 
 from benchmarks.measurement import Measurement, ladder
 from benchmarks.report.drawing import legend, panels, style
@@ -32,15 +32,14 @@ EXTREMES = {
     "nu 0.49999 opening": (dict(nu=0.49999, **C), "into the air", 4),
     "spring 1e-6": (dict(spring=1e-6, **C), "rocking", 2),
 }
-TOL = 1e-8  # of the programmes
+TOL = 1e-8  # what the seconds of the table are for
 DEEP = 1e-12  # where the curves end
 
 
 def plan(size: str) -> list[Measurement]:
     mesh = dict(full={}, quick={}, smallest=dict(divisions=2, layers=2))[size]
     repeat = dict(full=3, quick=2, smallest=2)[size]
-    scenes = [*CASES, *EXTREMES] if size != "smallest" else ["C"]
-    scenes = [name for name in scenes if name in "ABC" or name in EXTREMES]
+    scenes = ["A", "B", "C", *EXTREMES] if size != "smallest" else ["C"]
     settings = dict(repeat=repeat, mesh=mesh)
     return [
         Measurement(f"algebraic/{name}".replace(" ", "_"), "benchmarks.report.algebraic:scene", dict(name=name, **settings))
@@ -97,8 +96,7 @@ class Sampled:
 
 
 def scene(name: str, repeat: int, mesh: dict) -> dict:
-    """One programme with every solver, then one of its steps again and again, interleaved."""
-    runs = {label: programme_of(name, make(), mesh) for label, make in SOLVERS.items()}
+    """One step of a programme with every solver, again and again, interleaved."""
     watched = 6 if name in CASES else EXTREMES[name][2]  # the punch's first reversal
     curves = {label: [] for label in SOLVERS}
     problems = {}
@@ -119,32 +117,7 @@ def scene(name: str, repeat: int, mesh: dict) -> dict:
                 curves[label].append(curve(problem, before))
     return dict(
         watched=watched, unknowns=problem.body.size, nodes=len(problem.contacts[0].nodes),
-        runs=runs, curves={label: merged(found) for label, found in curves.items()},
-    )  # fmt: skip
-
-
-def programme_of(name: str, solver, mesh: dict) -> dict:
-    """Processor seconds of every step from scratch; the first one holds the set-up."""
-    problem, move, steps = opened(name, solver, TOL, mesh)
-    seconds, iterations, errors, said = [], [], [], ""
-    for step in steps:
-        move(step)
-        start = process_time()
-        found, said = attempt(problem)
-        seconds.append(process_time() - start)
-        iterations.append(found.iterations)
-        errors.append(max(found.error, found.slip_error))
-        if said:
-            break
-    # The first step once more: what it takes without the set-up.
-    problem.reset()
-    move(steps[0])
-    start = process_time()
-    attempt(problem)
-    setup = seconds[0] - (process_time() - start)
-    return dict(
-        seconds=seconds, setup=max(setup, 0.0), iterations=iterations, error=max(errors),
-        steps=len(steps), said=said,
+        curves={label: merged(found) for label, found in curves.items()},
     )  # fmt: skip
 
 
@@ -213,33 +186,12 @@ def figures(data):
         "Error against the time of one step, set-up left out; the line is the tolerance.",
     )
 
-    figure, axes = panels(len(rows))
-    for ax, row in zip(axes, rows):
-        for solver, run in row["runs"].items():
-            steps = len(run["seconds"])
-            ax.plot(np.arange(1, steps + 1), np.cumsum(run["seconds"]), **style(solver))
-            if run["said"]:
-                ax.plot(steps, sum(run["seconds"]), "x", color="black", ms=12, mew=2)
-        ax.set(yscale="log", xlabel="steps", ylabel="processor seconds so far")
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set_title(row["scene"], fontsize=11)
-    legend(figure, axes[0])
-    yield (
-        "setup",
-        figure,
-        "Time of a programme with all set-up, step by step; a cross is a step that was refused.",
-    )
-
 
 def tables(data):
-    rows = []
-    for row in data["rows"]:
-        for solver, run in row["runs"].items():
-            curve, later = row["curves"][solver], run["seconds"][1:] or [None]
-            reached = [s for s, e in zip(curve["seconds"], curve["error"]) if e <= TOL]
-            rows.append({
-                "scene": row["scene"], "solver": solver, "to 1e-8 [s]": min(reached, default=None), "set-up [s]": run["setup"],
-                "median step [s]": sorted(later)[len(later) // 2], "programme [s]": sum(run["seconds"]),
-                "iterations": sum(run["iterations"]), "worst error": run["error"], "refused": run["said"][:60],
-            })  # fmt: skip
-    yield rows
+    yield [
+        {
+            "scene": row["scene"], "solver": solver, "smallest error": min(curve["error"], default=None),
+            "seconds to 1e-8": min((s for s, e in zip(curve["seconds"], curve["error"]) if e <= TOL), default=None),
+        }
+        for row in data["rows"] for solver, curve in row["curves"].items()
+    ]  # fmt: skip

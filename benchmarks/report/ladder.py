@@ -32,8 +32,6 @@ RUNGS = {
     "matrix constant": (dict(case="C"), "matrix new in every step"),
     "recording and wear": (dict(case="C", recorded=True), None),
     "no recording, no wear": (dict(case="C"), "recording and wear"),
-    "certificate": (dict(case="C"), None),
-    "no certificate": (dict(case="C", uncertified=True), "certificate"),
 }
 
 
@@ -60,8 +58,6 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     displacements = programme(punch.parameters)[:steps]
     problem, contact = punch.problem, punch.contact
     history, scale = None, None
-    if kind.get("uncertified"):
-        dc.Contact.bipotential_gap = property(lambda self: np.zeros(len(self.nodes)))
     if kind.get("moving"):
         problem, scale = moving(punch)
     if kind.get("recorded"):

@@ -28,6 +28,7 @@ from dolfinx.mesh import locate_entities
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from mechanics.material import elasticity, stress
 from studies.punch.mesh import CONTACT, TOP, punch_mesh
 
 CASES = {  # [dSFMH07, Table 1]
@@ -86,7 +87,7 @@ class Punch:
         # 2 x 2 x 2 Gauss points, as usual for bricks of eight nodes
         dx = ufl.dx(domain=self.mesh, metadata={"quadrature_degree": 3})
         v = ufl.TestFunction(self.V)
-        self.F = ufl.inner(self.stress(self.u), ufl.sym(ufl.grad(v))) * dx
+        self.F = elasticity(self.u, v, parameters.young, parameters.poisson, dx)
         self.bcs = self._supports()
 
         plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
@@ -99,10 +100,7 @@ class Punch:
 
     def stress(self, u):
         """Hooke's law, as a UFL expression."""
-        E, nu = self.parameters.young, self.parameters.poisson
-        strain = ufl.sym(ufl.grad(u))
-        lame = E * nu / ((1 + nu) * (1 - 2 * nu))
-        return lame * ufl.tr(strain) * ufl.Identity(3) + E / (1 + nu) * strain
+        return stress(u, self.parameters.young, self.parameters.poisson)
 
     def _supports(self):
         """The top face goes down; sideways it is bonded, or held by as little as possible."""
