@@ -38,17 +38,18 @@ class Statement(NamedTuple):
     measure: str
     cases: str  # which cases it is about; several at once if ``together``
     decide: Callable  # Run, or dict of Runs by case -> value, whether it holds
+    cycles: int = 1  # that a run must have to be asked
     together: bool = False
 
 
-def _later(decide):
-    """The same question, asked only of runs with a second cycle."""
+def _over(bound, measure):
+    """Decided by ``measure``: holds above the bound; not asked where it is None."""
+    return lambda runs: NOT_ASKED if (value := measure(runs)) is None else (value, value > bound)
 
-    def asked(subject):
-        runs = subject.values() if isinstance(subject, dict) else [subject]
-        return NOT_ASKED if any(run.parameters.cycles == 1 for run in runs) else decide(subject)
 
-    return asked
+def _most(bound, measure):
+    """As ``_over``, but holds up to the bound."""
+    return lambda runs: NOT_ASKED if (value := measure(runs)) is None else (value, value <= bound)
 
 
 def _centre(run):
@@ -58,28 +59,26 @@ def _centre(run):
 
 def _peripheral(run):
     steps = unloading(run, 1)
-    gained = max(z.peripheral for z in steps[1:]) - steps[0].peripheral
-    return gained, gained > 0.1
+    return max(z.peripheral for z in steps[1:]) - steps[0].peripheral
+
+
+def _ends(run) -> list:
+    """Zones at the end of every cycle."""
+    return [zones(run, run.unloaded(c)) for c in range(1, run.parameters.cycles + 1)]
 
 
 def _shrink(run):
-    first, last = (zones(run, run.unloaded(c)).fraction for c in (1, run.parameters.cycles))
-    if not first:
-        return NOT_ASKED
-    return last / first, last < 0.9 * first
+    first, last = (_ends(run)[k].fraction for k in (0, -1))
+    return (last / first, last < 0.9 * first) if first else NOT_ASKED
 
 
 def _fragment(run):
-    first, last = (zones(run, run.unloaded(c)).count for c in (1, run.parameters.cycles))
-    if not first:
-        return NOT_ASKED
-    return last - first, last > first
+    first, last = (_ends(run)[k].count for k in (0, -1))
+    return last - first if first else None
 
 
 def _within(run):
-    counts = [z.count for z in unloading(run, 1)]
-    ends = [zones(run, run.unloaded(c)).count for c in range(1, run.parameters.cycles + 1)]
-    return float(np.ptp(counts) - np.ptp(ends)), np.ptp(counts) > np.ptp(ends)
+    return float(np.ptp([z.count for z in unloading(run, 1)]) - np.ptp([z.count for z in _ends(run)]))  # fmt: skip
 
 
 def _reverse(cycle):
@@ -93,14 +92,6 @@ def _reverse(cycle):
     return decide
 
 
-def _bounded(measure, cycle, above=False):
-    def decide(run):
-        value = measure(run, cycle(run))
-        return value, (value > SMALL) == above
-
-    return decide
-
-
 def _asymmetric(cycle):
     def decide(run):
         up, down = loading_nonlinearity(run, cycle(run)), unloading_nonlinearity(run, cycle(run))
@@ -110,41 +101,34 @@ def _asymmetric(cycle):
 
 
 def _plateau(side):
-    def decide(run):
-        parts = [plateau(run, c)[side] for c in range(2, run.parameters.cycles + 1)]
-        return min(parts), min(parts) > 0
-
-    return decide
+    return lambda run: min(plateau(run, c)[side] for c in range(2, run.parameters.cycles + 1))
 
 
 def _plateau_elsewhere(run):
     """Area of the nodes that slip in the last cycle but are still at its last loading increment."""
-    start, top, end = (
-        run.unloaded(run.parameters.cycles - 1),
-        *(step(run.parameters.cycles) for step in (run.loaded, run.unloaded)),
-    )
+    n = run.parameters.cycles
+    start, top, end = run.unloaded(n - 1), run.loaded(n), run.unloaded(n)
     slips = [run.fields(k)["slip_increment"] for k in range(start + 1, end + 1)]
     moved = np.linalg.norm(slips, axis=-1)
     most = moved.max(axis=0)
     chosen = (most > STILL * most.max()) & (moved[top - start - 1] < STILL * most)
-    share = run.area[chosen].sum() / run.area.sum()
-    return share, share > SMALL
+    return run.area[chosen].sum() / run.area.sum()
 
 
 def _spread(cycle):
-    def decide(runs):
+    def ratio(runs):
         works = [total(run, cycle(run)) for run in runs.values()]
-        return max(works) / min(works), max(works) <= 1.35 * min(works)
+        return max(works) / min(works)
 
-    return decide
+    return ratio
 
 
-def _against(a, b, bound):
-    def decide(runs):
+def _against(a, b):
+    def ratio(runs):
         works = [runs[case].dissipation(runs[case].parameters.cycles).sum() for case in (a, b)]
-        return works[1] / works[0], works[1] > bound * works[0]
+        return works[1] / works[0]
 
-    return decide
+    return ratio
 
 
 def tenfold_area(runs) -> float:
@@ -157,11 +141,6 @@ def tenfold_area(runs) -> float:
     counts = (works / area).max(axis=0) >= 0.1 * works.mean(axis=0).sum() / area.sum()
     tenfold = works.max(axis=0) >= 10 * works.min(axis=0)
     return float(area[counts & tenfold].sum() / area.sum())
-
-
-def _local(runs):
-    share = tenfold_area(runs)
-    return share, share > SMALL
 
 
 def first(run) -> int:
@@ -177,51 +156,51 @@ STATEMENTS = [
     Statement("centre", S + F(3), "After the first loading, sticking is one zone at the centre.",
         "number of stick zones; one, with the centre", "ABC", _centre),
     Statement("peripheral", S + F(3), "During the first unloading the periphery (r > 3/4 R) "
-        "begins to stick.", "area fraction of the periphery gained; > 0.1", "ABC", _peripheral),
+        "begins to stick.", "area fraction of the periphery gained; > 0.1", "ABC", _over(0.1, _peripheral)),
     Statement("shrink", S + F(3), "From cycle to cycle the stick zones after unloading shrink.",
-        "stuck area, last cycle over first; < 0.9", "ABC", _later(_shrink)),
+        "stuck area, last cycle over first; < 0.9", "ABC", _shrink, 2),
     Statement("fragment", S + F(3), "From cycle to cycle they break into more pieces.",
-        "pieces after the last unloading less those after the first; > 0", "ABC", _later(_fragment)),
+        "pieces after the last unloading less those after the first; > 0", "ABC", _over(0, _fragment), 2),
     Statement("reverse1", S + F(3), "Reverse slip begins at the rim and advances inwards "
         "(first unloading).", "change of its innermost radius / R; begins beyond 3/4, < 0",
         "ABC", _reverse(first)),
     Statement("reverseN", S + F(3), "Reverse slip begins at the rim and advances inwards "
-        "(last unloading).", "the same", "ABC", _later(_reverse(last))),
+        "(last unloading).", "the same", "ABC", _reverse(last), 2),
     Statement("A_closed", S + F(4), "Isotropic: loading and unloading show no noticeable difference "
         "in the force-slip curve of P (last cycle).", "difference in slip / range; <= 0.05",
-        "A", _later(_bounded(hysteresis, last))),
+        "A", _most(SMALL, lambda run: hysteresis(run, last(run))), 2),
     Statement("BC_first", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
         "(first cycle).", "non-linearity of loading; <= 0.05 < that of unloading", "BC",
         _asymmetric(first)),
     Statement("BC_last", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
-        "(last cycle).", "the same", "BC", _later(_asymmetric(last))),
+        "(last cycle).", "the same", "BC", _asymmetric(last), 2),
     Statement("plateau", S + F(6), "From the second cycle on P is still at the end of loading, before "
-        "the peak.", "part of loading before the peak; > 0", "ABC", _later(_plateau(0))),
+        "the peak.", "part of loading before the peak; > 0", "ABC", _over(0, _plateau(0)), 2),
     Statement("plateau_elsewhere", S + F(6), "There are other choices of P for which it is so (last "
         "cycle).", "share of the area that slips in the cycle but is still before the peak; > 0.05",
-        "ABC", _later(_plateau_elsewhere)),
+        "ABC", _over(SMALL, _plateau_elsewhere), 2),
     Statement("A_linear", S + F(7), "Isotropic: the force-slip curve is quasi-linear (loading of the "
         "last cycle).", "non-linearity of loading; <= 0.05", "A",
-        _later(_bounded(loading_nonlinearity, last))),
+        _most(SMALL, lambda run: loading_nonlinearity(run, last(run))), 2),
     Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more "
         "than A by a fifth or more.", "all work of B over that of A; > 1.2", "AB",
-        _against("A", "B", 1.2), True),
+        _over(1.2, _against("A", "B")), together=True),
     Statement("nonassociated", "Section 4", "The slip rule alone has a strong influence: C dissipates "
         "more than B by a fifth or more.", "all work of C over that of B; > 1.2", "BC",
-        _against("B", "C", 1.2), True),
+        _over(1.2, _against("B", "C")), together=True),
     Statement("within", "observed", "Stick zones break up within one unloading more than from cycle to "
-        "cycle.", "range of the pieces' number, within first less between; > 0", "ABC", _later(_within)),
+        "cycle.", "range of the pieces' number, within first less between; > 0", "ABC", _over(0, _within), 2),
     Statement("after", "observed", "From the second cycle on P is still after the peak.",
-        "part of unloading after the peak; > 0", "ABC", _later(_plateau(1))),
+        "part of unloading after the peak; > 0", "ABC", _over(0, _plateau(1)), 2),
     Statement("A_unlinear", "observed", "Even the isotropic force-slip curve is not quasi-linear (last "
         "cycle).", "non-linearity of loading; > 0.05", "A",
-        _later(_bounded(loading_nonlinearity, last, above=True))),
+        _over(SMALL, lambda run: loading_nonlinearity(run, last(run))), 2),
     Statement("spread1", "observed", "The cases dissipate alike within 30 % or so (first cycle).",
-        "largest over smallest work; <= 1.35", "ABC", _spread(first), True),
+        "largest over smallest work; <= 1.35", "ABC", _most(1.35, _spread(first)), together=True),
     Statement("spreadN", "observed", "The cases dissipate alike within 30 % or so (last cycle).",
-        "the same", "ABC", _later(_spread(last)), True),
+        "the same", "ABC", _most(1.35, _spread(last)), 2, True),
     Statement("local", "observed", "Locally the cases differ tenfold.", "share of the area where "
-        "the work differs tenfold; > 0.05", "ABC", _local, True),
+        "the work differs tenfold; > 0.05", "ABC", _over(SMALL, tenfold_area), together=True),
 ]  # fmt: skip
 
 
@@ -236,6 +215,8 @@ def ask(runs: dict[str, dict[str, Run]]) -> list[dict]:
             else:
                 asked = wanted
             for case, subject in asked.items():
+                if min(run.parameters.cycles for run in wanted.values()) < statement.cycles:
+                    continue
                 value, holds = statement.decide(subject)
                 if holds is not None:
                     rows.append(dict(statement=statement.key, variant=variant, case=case,
