@@ -7,6 +7,7 @@ import re
 import subprocess
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -15,6 +16,7 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
 from benchmarks import measurement
 from benchmarks.measurement import Measurement, compute, current, stored
+from benchmarks.peers import compare
 from benchmarks.report import __main__ as report
 
 pytestmark = [
@@ -94,3 +96,20 @@ def test_a_stopped_report_continues(made, tmp_path):
     assert file.stat().st_mtime_ns == before
     found = report.run({"section": [bad, good]}, tmp_path, minutes=-1.0)
     assert found == {"section": {"two": None, "one": record}}
+
+
+def test_a_peer_is_judged_by_our_error():
+    """Displacements that somebody else has found, here our own at 1e-11, have our error and our forces."""
+    increments, mesh = [1, 2], dict(divisions=2, layers=2)
+    ours, punch = (compare.case_a(0, increments, mesh, tol=1e-11) for _ in range(2))
+    given = compare.told(punch)
+    found = []
+    for displacement in given["programme"]:
+        ours.press(displacement)
+        found.append(ours.u.x.array.reshape(-1, 3).copy())
+    result = compare.compared(punch, given, found, 1.0, 0, increments, mesh)
+    assert result["done"] == result["steps"] == 3 and max(result["errors"]) < 1e-10
+    assert np.max(result["force_error"]) < 1e-6
+    assert compare.evaluate({"peers/one": result | dict(peer="one", setting="", said="", own=[])})["rows"][0]["ratio"] > 0  # fmt: skip
+    found[0][0, 0] += 1e-4
+    assert compare.compared(compare.case_a(0, increments, mesh), given, found, 1.0, 0, increments, mesh)["errors"][0] > 1e-3  # fmt: skip

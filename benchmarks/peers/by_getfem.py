@@ -15,7 +15,7 @@ import numpy as np
 
 
 def punch(getfem, given):
-    """The model, its mesh and the first degree of freedom of each of our nodes."""
+    """The model, what it refers to and must be kept, and the first degree of freedom of each of our nodes."""
     x, cells, top = (given[name] for name in ("x", "cells", "top"))
     young, poisson = float(given["young"]), float(given["poisson"])
     mesh = getfem.Mesh("empty", 3)
@@ -36,7 +36,7 @@ def punch(getfem, given):
     model.add_isotropic_linearized_elasticity_brick(mim, "u", "lame", "shear")
     model.add_initialized_data("down", [0.0, 0.0, 0.0])
     model.add_Dirichlet_condition_with_multipliers(mim, "u", mfu, 1, "down")
-    return model, mfu.nbdof(), first
+    return model, (mesh, mfu, mim), first
 
 
 def add_contact(getfem, model, given, size, first) -> None:
@@ -65,7 +65,8 @@ def main(mesh_file, found_file):
 
     given = np.load(mesh_file)
     start = process_time()
-    model, size, first = punch(getfem, given)
+    model, kept, first = punch(getfem, given)
+    size = kept[1].nbdof()
     add_contact(getfem, model, given, size, first)
     seconds, found, own, said = [process_time() - start], [], [], ""
     for displacement in given["programme"]:

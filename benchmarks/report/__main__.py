@@ -25,7 +25,7 @@ from matplotlib import rc_context
 from tqdm import tqdm
 
 from benchmarks.measurement import ROOT, compute, current, machine, now, stored
-from benchmarks.peers import section as peers
+from benchmarks.peers import compare as peers
 from benchmarks.report import algebraic, ladder, meshes, stability
 from benchmarks.scaling import growth
 from studies import page
