@@ -12,7 +12,6 @@ import os
 import platform
 import subprocess
 import sys
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.metadata import version
@@ -175,41 +174,24 @@ class Memory:
         raise RuntimeError(f"/proc/self/status has no {name}")
 
 
-@contextmanager
-def counted():
-    """Counts what the library does with its matrices, in a dictionary by name."""
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.petsc.linear_solver import LinearSolver
-    from dolfinx_contact.solvers.condensed import CondensedBody
-    from dolfinx_contact.step import LoadStep
+EVENTS = dict(
+    set_ups="PCSetUp", factorisations="MatLUFactorNum", back_solves="MatSolve", of_many_columns="MatMatSolve",
+    preconditioner="PCApply", products="MatMult",
+)  # fmt: skip
 
-    targets = (
-        ("set-ups of a linear solver", LinearSolver, "__init__"),
-        ("back-solves", LinearSolver, "solve"),
-        ("back-solves", LinearSolver, "apply"),
-        ("multiplications with K", ElasticBody, "multiply"),
-        ("assemblies of F", ElasticBody, "internal_force"),
-        ("residuals", LoadStep, "residual"),
-        ("condensed operators", CondensedBody, "__init__"),
-    )
-    counts = dict.fromkeys((name for name, *_ in targets), 0)
-    kept = [(owner, method, getattr(owner, method)) for _, owner, method in targets]
 
-    def counting(name, function):
-        @functools.wraps(function)
-        def call(*args, **kwargs):
-            counts[name] += 1
-            return function(*args, **kwargs)
+def counts() -> dict[str, int]:
+    """How often PETSc did what in all stages, since its log was begun (``PETSc.Log.begin``)."""
+    from petsc4py import PETSc
 
-        return call
-
-    for name, owner, method in targets:
-        setattr(owner, method, counting(name, getattr(owner, method)))
-    try:
-        yield counts
-    finally:
-        for owner, method, function in kept:
-            setattr(owner, method, function)
+    found = dict.fromkeys(EVENTS, 0)
+    for stage in range(100):
+        try:
+            for name, event in EVENTS.items():
+                found[name] += int(PETSc.Log.Event(event).getPerfInfo(stage)["count"])
+        except PETSc.Error:  # there is no such stage
+            break
+    return found
 
 
 def spread(values) -> dict:
