@@ -11,11 +11,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.problem_input import (
+    ProblemOptions,
     check_alive,
     check_planes,
     check_size,
@@ -23,8 +23,6 @@ from dolfinx_contact.problem_input import (
     checked_conditions,
     checked_contacts,
     checked_options,
-    checked_solver,
-    checked_tolerance,
     hold,
 )
 from dolfinx_contact.results import checkpoint
@@ -38,7 +36,7 @@ from dolfinx_contact.results.record import (
 )
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.condensed import KEPT
-from dolfinx_contact.step import LoadStep
+from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.trial import may_touch, presses, refined
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -47,7 +45,7 @@ LOG = logging.getLogger("dolfinx_contact")
 NOTHING = "none: nothing touches"
 
 
-class ContactProblem(Guarded):
+class ContactProblem(ProblemOptions):
     """An elastic body pressed against rigid planes, solved load step by load step.
 
     Args:
@@ -78,9 +76,6 @@ class ContactProblem(Guarded):
         NotImplementedError: ``F`` is not linear, or a tangential direction of a contact node is held
             that is no axis of its contact.
     """
-
-    _settable = ("monitor", "solver", "tol")
-    _remedy = "monitor, solver and tol may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
         self,
@@ -117,32 +112,9 @@ class ContactProblem(Guarded):
         self._begin()
         self._made = True
 
-    @property
-    def solver(self):
-        """The solver's options; another one may be assigned between steps, on all ranks."""
-        return self._solver
-
-    @solver.setter
-    def solver(self, solver) -> None:
-        self._solver = checked_solver(solver)
-
-    @property
-    def tol(self) -> float:
-        """The tolerance; another one may be assigned between steps, on all ranks."""
-        return self._tol
-
-    @tol.setter
-    def tol(self, tol: float) -> None:
-        self._tol = checked_tolerance(tol)
-
-    def __repr__(self) -> str:
-        nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
-        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
-        return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
-
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
-        self._check_owned()
+        check_alive(self, self.body, self.contacts)
         self._begin()
         self._restore()
 
@@ -182,7 +154,7 @@ class ContactProblem(Guarded):
                 nothing holds.  After any exception the last converged state is in place.
         """
         start = perf_counter()
-        self._check_owned()
+        check_alive(self, self.body, self.contacts)
         try:
             self._check_input()
             self._renew_laws()
@@ -216,7 +188,7 @@ class ContactProblem(Guarded):
         Args:
             path: File name, usually ending in ``.npz``.
         """
-        self._check_owned()
+        check_alive(self, self.body, self.contacts)
         past = self._memory.get("past", ())
         checkpoint.save(path, self.body, self.contacts, self._states, past)
 
@@ -229,7 +201,7 @@ class ContactProblem(Guarded):
         Raises:
             ValueError: the file is no checkpoint of this problem.
         """
-        self._check_owned()
+        check_alive(self, self.body, self.contacts)
         self._states, past = checkpoint.load(path, self.body, self.contacts)
         kept = self._memory.setdefault("past", deque(maxlen=KEPT))
         kept.clear()
@@ -246,12 +218,12 @@ class ContactProblem(Guarded):
         if assembled != self._assembled:
             self._assembled = assembled
             self._unbind()
-            self._set_stiffness()
+            self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         b, external = body.load()
         last, before = self._states
         starts = [self.u.x.array[: body.size].copy(), 2 * last - before]
         return LoadStep(
-            body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self._watch
+            body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
         )  # fmt: skip
 
     def bound(self):
@@ -289,33 +261,7 @@ class ContactProblem(Guarded):
             self._bound.destroy()
         self._bound = self._bound_to = None
 
-    @property
-    def _watch(self):
-        """The user's monitor with the statuses of all nodes; None costs nothing."""
-        if self.monitor is None:
-            return None
-
-        def watch(iteration: int, error: float) -> None:
-            now = self.counts()
-            with raised_together(self.body.comm):
-                self.monitor(iteration, error, now)
-
-        return watch
-
-    def _set_stiffness(self) -> None:
-        """Take what errors and solvers want to know of the stiffness at the contact nodes."""
-        body = self.body
-        self._stiffness = [contact.nodal_stiffness(body.K) for contact in self.contacts]
-        for contact, stiffness in zip(self.contacts, self._stiffness):
-            contact.rho = stiffness.normal
-        size = body.largest(np.abs(body.V.tabulate_dof_coordinates()))
-        # Any unit of force that keeps squares within the range of double precision.
-        self._unit = body.largest(body.cancelling(np.full(body.size, size))) or 1.0
-
     # -- helpers -------------------------------------------------------------------------------
-
-    def _check_owned(self) -> None:
-        check_alive(self, self.body, self.contacts)
 
     def _check_input(self) -> None:
         check_step(self.u, self.body.comm, self.contacts)

@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 
 from dolfinx_contact import compat
+from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.checks import positive
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.contact import Contact
@@ -165,6 +166,36 @@ def check_planes(contacts, body) -> None:
         else:
             continue
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
+
+
+class ProblemOptions(Guarded):
+    """Solver and tolerance of a ``ContactProblem``, which may be exchanged between steps; the rest stays."""
+
+    _settable = ("monitor", "solver", "tol")
+    _remedy = "monitor, solver and tol may be changed between steps; for anything else make a new ContactProblem."
+
+    @property
+    def solver(self):
+        """The solver's options; another one may be assigned between steps, on all ranks."""
+        return self._solver
+
+    @solver.setter
+    def solver(self, solver) -> None:
+        self._solver = checked_solver(solver)
+
+    @property
+    def tol(self) -> float:
+        """The tolerance; another one may be assigned between steps, on all ranks."""
+        return self._tol
+
+    @tol.setter
+    def tol(self, tol: float) -> None:
+        self._tol = checked_tolerance(tol)
+
+    def __repr__(self) -> str:
+        nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
+        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
+        return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
 
 
 def check_alive(problem, body, contacts) -> None:

@@ -6,8 +6,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.error import EPSILON, Errors, as_errors, contact_defects, contact_rounding
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.error import (
+    EPSILON,
+    Errors,
+    NodalStiffness,
+    as_errors,
+    contact_defects,
+    contact_rounding,
+)
 from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.results.record import counts
+
+
+def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
+    """Stiffness at the nodes of each contact, and a unit of force; contacts take their ``rho``.  Collective."""
+    stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
+    for contact, of in zip(contacts, stiffness):
+        contact.rho = of.normal
+    size = body.largest(np.abs(body.V.tabulate_dof_coordinates()))
+    # Any unit that keeps squares within the range of double precision.
+    return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
 
 
 class LoadStep:
@@ -24,7 +43,7 @@ class LoadStep:
         starts: Displacements near which the solution may lie.
         tol: Largest error.
         unit: Of force, any that keeps squares within the range of double precision.
-        monitor: None, or a function of iteration, largest error and ``Counts``.
+        monitor: None, or the user's function of iteration, largest error and ``Counts``.
     """
 
     def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
@@ -137,7 +156,9 @@ class LoadStep:
     def _tell(self) -> None:
         """Tell the user's monitor the errors of another state."""
         if self._monitor is not None:
-            self._monitor(self._evaluations, self.errors.largest)
+            now = counts(self.body, self.contacts)
+            with raised_together(self.body.comm):
+                self._monitor(self._evaluations, self.errors.largest, now)
         self._evaluations += 1
 
     def _asked(self, forces: np.ndarray):
