@@ -7,7 +7,7 @@
 # 3] shows. This demo writes numbers, a picture and ParaView files; the scene itself is in
 # `studies/punch`, so it runs from the root of the clone: `python -m demos.demo_punch`, with options
 # (try `--help`), on any number of MPI ranks. As a notebook it needs that root on the path: start
-# Jupyter there with `PYTHONPATH=$PWD`.
+# Jupyter there with `PYTHONPATH=$PWD`. In an environment of your own: `pip install -e .` first.
 #
 # ## Notation
 #
