@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 import scenes
+import ufl
 from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
@@ -230,7 +231,7 @@ def test_checkpoints_of_another_law_are_refused(tmp_path, other):
     elif other == "modulus":
         scene.modulus.value = 200e3
     else:
-        scene.problem = dc.ContactProblem(scene.F + 1e4 * scenes.ufl.inner(scene.u, scenes.ufl.TestFunction(scene.V)) * scenes.ufl.ds, scene.u, scene.contact, bcs=scene.bcs)  # fmt: skip
+        scene.problem = dc.ContactProblem(scene.F + 1e4 * ufl.inner(scene.u, ufl.TestFunction(scene.V)) * ufl.ds, scene.u, scene.contact, bcs=scene.bcs)  # fmt: skip
     with pytest.raises(ValueError, match="checkpoint.* written with another .*[Ss]et "):
         scene.problem.load(path)
     assert not scene.u.x.array.any()
