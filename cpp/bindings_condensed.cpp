@@ -122,6 +122,7 @@ void bind_condensed(py::module_ &m) {
         .def_property_readonly(
             "rounding", [](const Solution &s) { return std::max(s.rounding, s.slip_rounding); })
         .def_readonly("change", &Solution::change)
+        .def_readonly("unsolvable", &Solution::unsolvable)
         .def_readonly("iterations", &Solution::iterations)
         .def_readonly("seconds", &Solution::seconds)
         .def_readonly("converged", &Solution::converged)

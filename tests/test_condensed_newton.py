@@ -220,7 +220,7 @@ def test_infeasible_raises():
     with pytest.raises(CondensedNotConverged, match="no solution") as caught:
         solve_condensed(W, q, Friction(0.3))
     assert caught.value.best.error > 1e-3
-    assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "fixed point"}
+    assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "proximal point"}
 
 
 def test_caps():

@@ -11,7 +11,7 @@ from dolfinx_contact.law.friction import Friction
 
 
 def checked_problem(q, W, friction, r0) -> tuple:
-    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together."""
+    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together, and a ``Friction`` with them."""
     q = finite("q", q)
     dim = q.shape[1] if q.ndim == 2 else 3
     if dim not in (2, 3) or q.ndim not in (1, 2) or q.size % dim:
@@ -24,8 +24,16 @@ def checked_problem(q, W, friction, r0) -> tuple:
         raise ValueError(
             f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
         )
+    if isinstance(friction, (np.ndarray, list, tuple)):
+        mu = finite("friction", friction)
+        if mu.shape != (len(q),):
+            raise ValueError(
+                f"friction as an array has one coefficient per contact, shape {(len(q),)}, not "
+                f"{mu.shape}; those of two directions are a Friction((mu_1, mu_2))."
+            )
+        friction = Friction(np.column_stack((mu, mu)))
     if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction, not {friction!r}.")
+        raise ValueError(f"friction must be a Friction or an array, not {friction!r}.")
     for name, rows in (("coefficients", friction.mu), ("axes", friction.axes)):
         if rows is not None and rows.ndim == 2 and len(rows) != len(q):
             raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")
@@ -42,4 +50,4 @@ def checked_problem(q, W, friction, r0) -> tuple:
         r0 = finite("r0", r0)
         if r0.size != q.size:
             raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
-    return q, W, r0
+    return q, W, friction, r0

@@ -47,6 +47,8 @@ class CondensedResult:
         branch: The method of the cascade that gave the answer.
         tried: All that were tried, in order.
         tied: Forces of the tied rows of a kernel operator, if it has any.
+        unsolvable: Of a failure: it is proved that there is no solution, by trying every state of a
+            few contacts in two dimensions.
     """
 
     reaction: np.ndarray
@@ -61,6 +63,7 @@ class CondensedResult:
     branch: str
     tried: tuple[Attempt, ...] = field(repr=False)
     tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    unsolvable: bool = False
 
 
 class CondensedNotConverged(RuntimeError):
@@ -74,11 +77,16 @@ class CondensedNotConverged(RuntimeError):
     def __init__(self, best: CondensedResult):
         self.best, self.tried = best, best.tried
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
+        advice = (
+            "There is no solution: none of the states of the contacts is one."
+            if best.unsolvable
+            else "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
+            "few degrees of freedom may have no solution at all."
+        )
         super().__init__(
             f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
-            f"{best.seconds:.3g} s. Tried (iterations): {methods}. Smaller load steps, or a start r0 "
-            "near the solution, help most often; a body of too few degrees of freedom may have no "
-            "solution at all."
+            f"{best.iterations} iterations and {best.seconds:.3g} s. Tried (iterations): {methods}. "
+            + advice
         )
 
     def __reduce__(self):
@@ -155,7 +163,7 @@ class CondensedNewton:
         result = CondensedResult(
             found.reaction, found.displacement, found.status, found.error, found.slip_error,
             found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
-            found.tied,
+            found.tied, found.unsolvable,
         )  # fmt: skip
         if not found.converged:
             raise CondensedNotConverged(result)
@@ -178,7 +186,7 @@ class CondensedNewton:
 
 
 def solve_condensed(
-    W, q, friction: Friction, solver=None, tol: float = 1e-8, r0=None, max_seconds=None
+    W, q, friction, solver=None, tol: float = 1e-8, r0=None, max_seconds=None
 ) -> CondensedResult:
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
@@ -199,10 +207,13 @@ def solve_condensed(
     but below ``rounding`` is returned with a ``RoundingWarning``: double precision has no better one.
 
     Args:
-        W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix (made
-            dense).  May be rank-deficient and slightly unsymmetric.
+        W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix.  May be
+            rank-deficient and slightly unsymmetric.  Stored as a dense matrix; products, sweeps and
+            factors leave out its zeros if it couples a contact to few others, however it was given.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
-        friction: The law; coefficients for all contacts or ``shape=(n, 2)`` for each.
+        friction: A ``Friction``, of coefficients for all contacts or ``shape=(n, 2)`` for each; or an
+            array of one coefficient of isotropic friction per contact, ``shape=(n,)``.  An array is
+            always one per contact, so two contacts are no exception; a pair is ``Friction((a, b))``.
         solver: ``CondensedNewton(...)``; None is one with default options.
         tol: Largest error and, unless the solver says otherwise, slip error.
         r0: Reactions to start from, of the shape of ``q``.
@@ -216,7 +227,7 @@ def solve_condensed(
         CondensedNotConverged: no method reached ``tol``; carries the best state and what was tried.
             That is also the answer to a problem without solution.
     """
-    q, W, r0 = checked_problem(q, W, friction, r0)
+    q, W, friction, r0 = checked_problem(q, W, friction, r0)
     dim = q.shape[1]
     solver, tol = _checked_options(solver, tol, max_seconds)
     turns = principal_axes(friction, len(q), dim)
@@ -250,9 +261,7 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
 
     Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off.
     """
-    finer = (
-        solver if solver.slip_tol is None else CondensedNewton(**vars(solver) | {"slip_tol": None})
-    )
+    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "fallbacks": False})
     for factor in (1e-2, 1e-4):
         if found.change <= tol or found.error <= found.rounding:
             break

@@ -5,34 +5,13 @@
 /// that fails, a cascade of fallbacks.
 #pragma once
 
-#include "condensed_fixed_point.h"
-#include "condensed_judge.h"
-#include "condensed_scaling.h"
-#include "condensed_starts.h"
-#include <functional>
+#include "condensed_attempts.h"
 
 namespace dolfinx_contact::condensed {
-/// What a caller may choose.
-struct Options {
-    double tol = 1e-8;      ///< largest error of a solution
-    double slip_tol = 1e-8; ///< largest slip error of a solution
-    double max_seconds = std::numeric_limits<double>::infinity();
-    int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
-    int newton_iterations = 60;   ///< Newton iterations of one attempt
-    bool fallbacks = true;
-    Scales scales = {};
-};
-
 /// The solver of one problem: P tangential directions, T of them with friction (T = P or 0).
-template <int T, int P> class Cascade {
+template <int T, int P> class Cascade : private Attempts<T, P> {
   public:
-    Cascade(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
-        : op_(op), q_(q), options_(options),
-          judge_(op, law, q, options.scales, std::min(options.tol, options.slip_tol)),
-          scaling_(op, law, q) {
-        budget_.max_seconds = options.max_seconds;
-        budget_.max_iterations = options.max_iterations;
-    }
+    using Attempts<T, P>::Attempts;
 
     Solution run(const std::vector<VectorXd> &starts) {
         best_.reaction = VectorXd::Zero(q_.size());
@@ -51,61 +30,48 @@ template <int T, int P> class Cascade {
     }
 
   private:
+    using Base = Attempts<T, P>;
+    using Base::attempt, Base::best_, Base::budget_, Base::judge_, Base::op_, Base::options_,
+        Base::q_, Base::scaling_;
+
     void search(const std::vector<VectorXd> &starts) {
         const VectorXd given = scaling_.make_unit(nearest(starts));
         const VectorXd zero = VectorXd::Zero(scaling_.size());
-        const auto newton = [this](VectorXd r, double normal, double tangential) {
-            return [this, r, normal, tangential]() mutable {
-                System<T> system = scaling_.make();
-                system.set_metric(normal, tangential);
-                finish(system, r);
-            };
-        };
-        if (attempt("newton", newton(given, 10.0, 1.0)) || !options_.fallbacks)
+        if (op_.nodes() == 1 && op_.tied() == 0 &&
+            attempt("one contact", [this] { this->one_contact(); }))
             return;
-        if (!given.isZero(0.0) && attempt("newton from zero", newton(zero, 10.0, 1.0)))
+        if (attempt("newton", [&] { this->newton(given, 10.0, 1.0); }) || !options_.fallbacks)
+            return;
+        constexpr Index pivotable = 64;
+        if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
+            (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
+            return;
+        if (attempt("proximal point", [&] { this->swept(given, 300); }) ||
+            attempt("sweeps", [&] { this->swept(zero, 2000); }))
             return;
         for (const auto &[normal, tangential] :
              {std::pair{1.0, 0.1}, {1.0, 1.0}, {100.0, 10.0}, {10.0, 10.0}, {0.1, 0.1}})
-            if (attempt("newton, other metric", newton(given, normal, tangential)))
+            if (attempt("newton, other metric",
+                        [&, n = normal, t = tangential] { this->newton(given, n, t); }))
                 return;
-        const auto path = [this, &zero](auto change) {
-            return [this, change, &zero] {
+        if (T > 0 && !scaling_.associated() && attempt("continuation in p", [&] {
                 VectorXd r = zero;
-                if (follow(r, change)) {
-                    System<T> system = scaling_.make();
-                    system.set_metric(10.0, 1.0);
-                    finish(system, r);
-                }
-            };
-        };
-        if (T > 0 && !scaling_.associated() &&
-            attempt("continuation in p", path([](Path &at, double s) { at.rule = s; })))
-            return;
-        if (attempt("fixed point", [this, zero] {
-                VectorXd r = zero;
-                System<T> system = scaling_.make();
-                system.set_metric(1.0, 1.0);
-                fixed_point(system, r, 1e-6, 400, budget_);
-                system.set_metric(10.0, 1.0);
-                finish(system, r);
+                if (this->follow(r))
+                    this->newton(r, 10.0, 1.0);
             }))
             return;
-        if (attempt("homotopy in the load", path([](Path &at, double s) { at.load = s; })))
-            return;
-        if (T > 0 &&
-            attempt("continuation in mu", path([](Path &at, double s) { at.friction = s; })))
-            return;
-        attempt("random starts", [this, &newton] {
-            // Solutions that no path leads to: from anywhere, and from near the best state so far.
-            std::minstd_rand random(1);
-            const auto size = static_cast<double>(scaling_.size());
-            const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
-            for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
-                newton(k % 2 == 0 ? start_near(random, scaling_.scaled(best_.reaction))
-                                  : random_start<T>(random, op_.nodes(), op_.tied()),
-                       k % 3 == 1 ? 1.0 : 10.0, k % 3 == 2 ? 0.1 : 1.0)();
-        });
+        attempt("random starts", [this] { random_starts(); });
+    }
+
+    /// Solutions that no path leads to: from anywhere, and from near the best state so far.
+    void random_starts() {
+        std::minstd_rand random(1);
+        const auto size = static_cast<double>(scaling_.size());
+        const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
+        for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
+            this->newton(k % 2 == 0 ? start_near(random, scaling_.scaled(best_.reaction))
+                                    : random_start<T>(random, op_.nodes(), op_.tied()),
+                         k % 3 == 1 ? 1.0 : 10.0, k % 3 == 2 ? 0.1 : 1.0);
     }
 
     /// The start of the smallest residual, scaled; zero is always one.
@@ -126,95 +92,6 @@ template <int T, int P> class Cascade {
         }
         return best;
     }
-
-    /// Newton's method to the tolerance, judged on physical reactions; keeps the best state.
-    void finish(System<T> &system, VectorXd &r) {
-        const auto certified = [&](const VectorXd &mapped) {
-            Solution found;
-            found.reaction = scaling_.physical(system, mapped);
-            found.tied = op_.tied();
-            judge_.judge(found);
-            system.accurate = found.near_rounding;
-            found.converged = Judge<P>::accepts(found, options_.tol, options_.slip_tol);
-            if (found.converged || worst(found) < worst(best_)) {
-                found.tried = std::move(best_.tried);
-                best_ = std::move(found);
-            }
-            return best_.converged;
-        };
-        const double target = 1e3 * std::min(options_.tol, options_.slip_tol);
-        Newton<T> newton(system);
-        if (newton.solve(r, target, budget_, options_.newton_iterations, certified) ==
-            End::converged) {
-            const VectorXd change = system.right.cwiseProduct(newton.next_change(r));
-            best_.change = scaling_.contact_part(change).norm() / best_.acting;
-        } else {
-            State<T> state;
-            state.evaluate(system, r, system.displacement(r));
-            certified(state.mapped());
-        }
-    }
-    static double worst(const Solution &s) { return std::max(s.error, s.slip_error); }
-
-    /// Follows the solution from s = 0 to 1, steps halved on failure and doubled after success.
-    bool follow(VectorXd &r, const std::function<void(Path &, double)> &change) {
-        double reached = -1.0, step = 0.25;
-        VectorXd before;
-        double reached_before = -1.0;
-        constexpr double shortest = 1e-4;
-        const int last_iteration = budget_.iterations + 2000;
-        for (int failures = 0; reached < 1.0;) {
-            const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
-            Path at;
-            change(at, s);
-            System<T> system = scaling_.make(at);
-            system.set_metric(10.0, 1.0);
-            VectorXd trial = r;
-            if (before.size() > 0 && failures == 0)
-                trial += (s - reached) / (reached - reached_before) * (r - before);
-            const End end =
-                Newton<T>(system).solve(trial, 1e-6, budget_, options_.newton_iterations,
-                                        [](const VectorXd &) { return true; });
-            if (end == End::converged) {
-                if (reached >= 0.0) {
-                    before = r;
-                    reached_before = reached;
-                    step *= 2.0;
-                }
-                r = trial;
-                reached = s;
-                failures = 0;
-            } else {
-                step *= 0.5;
-                ++failures;
-                if (step < shortest || reached < 0.0 || budget_.spent() ||
-                    budget_.iterations >= last_iteration)
-                    return false;
-            }
-        }
-        return true;
-    }
-
-    template <class Try> bool attempt(const char *name, Try &&action) {
-        if (budget_.spent())
-            return true;
-        const int iterations = budget_.iterations;
-        const double seconds = budget_.seconds();
-        action();
-        best_.tried.push_back({name, best_.converged, budget_.iterations - iterations,
-                               budget_.seconds() - seconds, best_.error, best_.slip_error});
-        if (best_.converged)
-            best_.branch = name;
-        return best_.converged;
-    }
-
-    const Operator &op_;
-    const VectorXd &q_;
-    Options options_;
-    Judge<P> judge_;
-    Scaling<T, P> scaling_;
-    Budget budget_;
-    Solution best_;
 };
 
 /// Solves w = q + W r with the law between r and w at every contact.

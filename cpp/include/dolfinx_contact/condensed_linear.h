@@ -7,30 +7,47 @@
 #include "condensed_matrix.h"
 
 namespace dolfinx_contact::condensed {
-/// Solves J y = rhs and keeps the factors. J is singular where W is, with more contacts than the
-/// body has degrees of freedom; the shortest of the steps that fit best is taken then.
+/// Solves J y = rhs and keeps the factors.
 class LinearSolver {
   public:
-    VectorXd solve(const MatrixXd &J, const VectorXd &rhs) {
+    /// J of few unknowns may be singular: the shortest of the solutions that fit best is taken
+    /// then. Of many unknowns a singular one is refused, unless it is `regularised`.
+    bool solve(const MatrixXd &J, const VectorXd &rhs, VectorXd &y, bool regularised) {
         constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
         constexpr Index worth_it = 128; // below, double precision costs nothing
-        VectorXd y;
         kind_ = Kind::in_single;
-        if (J.rows() >= worth_it && solve_in_single(J, rhs, y))
-            return y;
+        if (J.rows() >= worth_it && !regularised && solve_in_single(J, rhs, y))
+            return true;
         kind_ = Kind::in_double;
         double_.compute(J);
-        if (double_.rcond() > smallest_rcond)
-            return double_.solve(rhs);
+        if (regularised || double_.rcond() > smallest_rcond) {
+            y = double_.solve(rhs);
+            return true;
+        }
+        if (J.rows() >= worth_it)
+            return false;
         kind_ = Kind::orthogonal;
         orthogonal_.setThreshold(threshold);
-        return orthogonal_.compute(J).solve(rhs);
+        y = orthogonal_.compute(J).solve(rhs);
+        return true;
+    }
+
+    /// J sparse; false if it is singular.
+    bool solve(const Eigen::SparseMatrix<double> &J, const VectorXd &rhs, VectorXd &y) {
+        kind_ = Kind::sparse;
+        sparse_.compute(J);
+        if (sparse_.info() != Eigen::Success)
+            return false;
+        y = sparse_.solve(rhs);
+        return y.allFinite();
     }
 
     /// With the factors of the last matrix; those in single precision are not refined.
     VectorXd again(const VectorXd &rhs) const {
         if (kind_ == Kind::in_double)
             return double_.solve(rhs);
+        if (kind_ == Kind::sparse)
+            return sparse_.solve(rhs);
         if (kind_ == Kind::orthogonal)
             return orthogonal_.solve(rhs);
         const double scale = rhs.lpNorm<Eigen::Infinity>();
@@ -40,7 +57,7 @@ class LinearSolver {
     }
 
   private:
-    enum class Kind { in_single, in_double, orthogonal };
+    enum class Kind { in_single, in_double, orthogonal, sparse };
 
     /// By iterative refinement; false if that does not converge, because J is too badly
     /// conditioned for it.
@@ -66,5 +83,6 @@ class LinearSolver {
     Eigen::PartialPivLU<Eigen::MatrixXf> single_;
     Eigen::PartialPivLU<MatrixXd> double_;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
+    Eigen::SparseLU<Eigen::SparseMatrix<double>> sparse_;
 };
 } // namespace dolfinx_contact::condensed

@@ -5,8 +5,10 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <Eigen/Sparse>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace dolfinx_contact::condensed {
 using Eigen::Index;
@@ -46,10 +48,15 @@ class Square {
     bool symmetric() const { return part_ != Part::all; }
     auto diagonal() const { return values_.diagonal(); }
 
+    /// The same entries without the zeros, for products; null for none. Not owned.
+    void set_sparse(const Eigen::SparseMatrix<double> *sparse) { sparse_ = sparse; }
+
     VectorXd operator*(const VectorXd &x) const {
         VectorXd y = VectorXd::Zero(size());
         if (x.isZero(0.0))
             return y;
+        if (sparse_ != nullptr)
+            return *sparse_ * x;
         if (part_ == Part::lower)
             y.noalias() += values_.selfadjointView<Eigen::Lower>() * x;
         else if (part_ == Part::upper)
@@ -62,6 +69,8 @@ class Square {
     /// |A| |x|: the size of what is added up in a product.
     VectorXd magnitudes(const VectorXd &x) const {
         const VectorXd size_of_x = x.cwiseAbs();
+        if (sparse_ != nullptr)
+            return sparse_->cwiseAbs() * size_of_x;
         VectorXd y = VectorXd::Zero(size());
         for (Index j = 0; j < size(); ++j) {
             const auto [first, last] = stored(j, size());
@@ -135,7 +144,11 @@ class Square {
   private:
     Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> values_;
     Part part_;
+    const Eigen::SparseMatrix<double> *sparse_ = nullptr;
 };
+
+/// For every contact those that its reaction moves; empty where that is more than a few of them.
+using Pattern = std::vector<std::vector<Index>>;
 
 /// Inverts a symmetric positive definite matrix in place, lower triangle, by halves: n^3
 /// operations, where factors and solves for the columns of the identity take 7/3 n^3. False, and

@@ -27,7 +27,8 @@ struct Solution {
     double change = none; ///< of the reactions in Newton's next step, over `acting`
     double acting = 0.0;  ///< the force that errors are relative to
     bool near_rounding = false;
-    Index tied = 0; ///< how many of the reactions
+    bool unsolvable = false; ///< proved: no state of the contacts is a solution
+    Index tied = 0;          ///< how many of the reactions
     int iterations = 0;
     double seconds = 0.0;
     bool converged = false;
@@ -56,6 +57,7 @@ class Operator {
             values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
         else
             values_ = W;
+        find_pattern();
     }
     Operator(const Operator &) = delete; // views look into it
 
@@ -79,6 +81,9 @@ class Operator {
         }
         return *normal_;
     }
+
+    /// Empty if W is not sparse.
+    const Pattern &pattern() const { return pattern_; }
 
     /// Mean magnitude of the normal compliance of a contact.
     double mean_normal() const {
@@ -122,6 +127,44 @@ class Operator {
     }
 
   private:
+    /// W is sparse if it is of many contacts that a tenth of the others move at most.
+    void find_pattern() {
+        constexpr Index many = 64, densest = 10;
+        const Index n = nodes();
+        if (n < many || tied_ > 0)
+            return;
+        Index blocks = 0;
+        std::vector<Eigen::Triplet<double>> entries;
+        pattern_.resize(static_cast<std::size_t>(n));
+        for (Index j = 0; j < n; ++j) {
+            for (Index i = 0; i < n; ++i) {
+                bool found = false;
+                for (Index k = 0; k < dim_ * dim_; ++k) {
+                    const Index row = dim_ * i + k % dim_, column = dim_ * j + k / dim_;
+                    if (const double value = W_(row, column); value != 0.0) {
+                        entries.emplace_back(row, column, value);
+                        found = true;
+                    }
+                }
+                if (found || i == j) {
+                    pattern_[static_cast<std::size_t>(j)].push_back(i);
+                    ++blocks;
+                }
+            }
+            if (blocks * densest > n * (j + 1) && j * densest > n) {
+                pattern_.clear();
+                return;
+            }
+        }
+        if (blocks * densest > n * n) {
+            pattern_.clear();
+            return;
+        }
+        sparse_.resize(size_, size_);
+        sparse_.setFromTriplets(entries.begin(), entries.end());
+        W_.set_sparse(&sparse_);
+    }
+
     Square view(const double *values, Square::Part triangle) const {
         return {values, size_, size_, symmetric_ ? triangle : Square::Part::all};
     }
@@ -131,6 +174,8 @@ class Operator {
     bool symmetric_;
     MatrixXd values_, inverse_values_;
     Square W_;
+    Pattern pattern_;
+    Eigen::SparseMatrix<double> sparse_;
     std::optional<Square> inverse_;
     mutable MatrixXd normal_values_;
     mutable std::optional<Square> normal_;

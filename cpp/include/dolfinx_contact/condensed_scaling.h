@@ -7,11 +7,6 @@
 #include "condensed_operator.h"
 
 namespace dolfinx_contact::condensed {
-/// A problem on the way to the one that is asked for, all ones.
-struct Path {
-    double rule = 1.0, load = 1.0, friction = 1.0;
-};
-
 /// P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Scaling {
   public:
@@ -57,37 +52,33 @@ template <int T, int P> class Scaling {
         return reaction;
     }
 
-    /// p / mu to the power `rule`, mu times 10^(3 friction - 3), gaps raised until `load` of the
-    /// largest penetration is left.
-    System<T> make(const Path &path = {}) const {
+    /// The problem with p / mu to the power `rule`.
+    System<T> make(double rule = 1.0) const {
         System<T> system;
         system.nodes = op_.nodes();
         system.tied = op_.tied();
         system.W = T == P ? &op_.W() : &op_.normal();
         system.inverse = T == P ? op_.inverse() : nullptr;
+        system.pattern = op_.pattern().empty() ? nullptr : &op_.pattern();
         const Index size = system.size();
         system.left.resize(size);
         system.right.resize(size);
         system.q.resize(size);
         system.smooth.assign(static_cast<std::size_t>(op_.nodes()), T == 0);
-        const double lift = (1.0 - path.load) * deepest();
         for (Index i = 0; i < op_.nodes(); ++i) {
             if constexpr (T > 0) {
                 const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
                 system.smooth[static_cast<std::size_t>(i)] = smooth;
                 for (int c = 0; c < T; ++c) {
-                    const double mu =
-                        smooth ? 1.0
-                               : coefficients_.mu(i, c) * std::pow(10.0, 3.0 * path.friction - 3.0);
+                    const double mu = smooth ? 1.0 : coefficients_.mu(i, c);
                     system.right[D * i + c] = mu * force_;
-                    system.left[D * i + c] =
-                        mu * std::pow(coefficients_.q2(i, c), path.rule) / length_;
+                    system.left[D * i + c] = mu * std::pow(coefficients_.q2(i, c), rule) / length_;
                     system.q[D * i + c] = q_[(P + 1) * i + c];
                 }
             }
             system.right[D * i + T] = force_;
             system.left[D * i + T] = 1.0 / length_;
-            system.q[D * i + T] = q_[(P + 1) * i + P] + lift;
+            system.q[D * i + T] = q_[(P + 1) * i + P];
         }
         for (Index c = 0; c < op_.tied(); ++c) {
             system.right[D * op_.nodes() + c] = tied_scale(c) * force_;
@@ -119,13 +110,6 @@ template <int T, int P> class Scaling {
     double tied_scale(Index c) const {
         const double compliance = op_.mean_normal();
         return (compliance > 0.0 ? compliance : 1.0) / op_.largest_in_tied_row(c);
-    }
-
-    double deepest() const {
-        double depth = 0.0;
-        for (Index i = 0; i < op_.nodes(); ++i)
-            depth = std::max(depth, -q_[(P + 1) * i + P]);
-        return depth;
     }
 
     const Operator &op_;

@@ -41,24 +41,33 @@ template <int T> struct System {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    const Square *W;       // physical
-    const Square *inverse; // of W, or null
-    VectorXd q;            // physical
+    const Square *W;                  // physical
+    const Square *inverse;            // of W, or null
+    const Pattern *pattern = nullptr; // of W, if sparse
+    VectorXd q;                       // physical
     VectorXd left, right;
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction
     Index nodes, tied;        // tied rows come last: w_c = 0, r_c of any sign
     bool accurate = false;    // displacements in twice the precision
+    double shift = 0.0;       // added to the diagonal of W at contacts; physical
 
     Index size() const { return D * nodes + tied; }
 
     VectorXd displacement(const VectorXd &r) const {
-        if (accurate)
-            return left.cwiseProduct(W->accurate(q, right.cwiseProduct(r)).template cast<double>());
-        return left.cwiseProduct(q + *W * VectorXd(right.cwiseProduct(r)));
+        const VectorXd forces = right.cwiseProduct(r);
+        if (accurate && shift == 0.0)
+            return left.cwiseProduct(W->accurate(q, forces).template cast<double>());
+        return left.cwiseProduct(q + *W * forces + shifted(forces));
     }
     VectorXd change(const VectorXd &dr) const {
-        return left.cwiseProduct(*W * VectorXd(right.cwiseProduct(dr)));
+        const VectorXd forces = right.cwiseProduct(dr);
+        return left.cwiseProduct(*W * forces + shifted(forces));
+    }
+    VectorXd shifted(VectorXd forces) const {
+        forces *= shift;
+        forces.tail(tied).setZero();
+        return forces;
     }
     VectorXd change_of_reaction(const VectorXd &dw) const {
         return (*inverse * VectorXd(dw.cwiseQuotient(left))).cwiseQuotient(right);

@@ -1,0 +1,211 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_attempts.h
+/// The methods of the cascade, each ended by the judge, and the best state that they found.
+#pragma once
+
+#include "condensed_judge.h"
+#include "condensed_plane.h"
+#include "condensed_proximal.h"
+#include "condensed_scaling.h"
+#include "condensed_starts.h"
+
+namespace dolfinx_contact::condensed {
+/// What a caller may choose.
+struct Options {
+    double tol = 1e-8;      ///< largest error of a solution
+    double slip_tol = 1e-8; ///< largest slip error of a solution
+    double max_seconds = std::numeric_limits<double>::infinity();
+    int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
+    int newton_iterations = 60;   ///< Newton iterations of one attempt
+    bool fallbacks = true;
+    Scales scales = {};
+};
+
+/// P tangential directions, T of them with friction (T = P or 0).
+template <int T, int P> class Attempts {
+  public:
+    Attempts(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
+        : op_(op), q_(q), options_(options),
+          judge_(op, law, q, options.scales, std::min(options.tol, options.slip_tol)),
+          scaling_(op, law, q) {
+        budget_.max_seconds = options.max_seconds;
+        budget_.max_iterations = options.max_iterations;
+    }
+
+  protected:
+    /// Whether scaled reactions are a solution; keeps the best state.
+    bool certify(System<T> &system, const VectorXd &mapped) {
+        Solution found;
+        found.reaction = scaling_.physical(system, mapped);
+        found.tied = op_.tied();
+        judge_.judge(found);
+        last_error_ = worst(found);
+        system.accurate = found.near_rounding;
+        found.converged = Judge<P>::accepts(found, options_.tol, options_.slip_tol);
+        if (found.converged || worst(found) < worst(best_)) {
+            found.tried = std::move(best_.tried);
+            best_ = std::move(found);
+        }
+        return best_.converged;
+    }
+    void set_change(Newton<T> &newton, const System<T> &system, const VectorXd &r) {
+        const VectorXd change = system.right.cwiseProduct(newton.next_change(r));
+        best_.change = scaling_.contact_part(change).norm() / best_.acting;
+    }
+
+    /// Newton's method to the tolerance, judged on physical reactions.
+    void finish(System<T> &system, VectorXd &r) {
+        const auto certified = [&](const VectorXd &mapped) { return certify(system, mapped); };
+        const double target = 1e3 * std::min(options_.tol, options_.slip_tol);
+        Newton<T> newton(system);
+        if (newton.solve(r, target, budget_, options_.newton_iterations, certified) ==
+            End::converged) {
+            set_change(newton, system, r);
+        } else {
+            State<T> state;
+            state.evaluate(system, r, system.displacement(r));
+            if (certified(state.mapped()))
+                set_change(newton, system, r);
+        }
+    }
+
+    /// All states that one contact can be in.
+    void one_contact() {
+        System<T> system = scaling_.make();
+        system.set_metric(10.0, 1.0);
+        using Exact = Nodal<T, Real>;
+        const typename Exact::Matrix A =
+            system.left.template cast<Real>().asDiagonal() *
+            system.W->template block<T + 1>(0, 0).template cast<Real>() *
+            system.right.template cast<Real>().asDiagonal();
+        const typename Exact::Vector q =
+            system.left.template cast<Real>().cwiseProduct(system.q.template cast<Real>());
+        for (const auto &r : Exact(A, system.smooth[0]).candidates(q))
+            if (certify(system, r.template cast<double>())) {
+                Newton<T> newton(system);
+                return set_change(newton, system, r.template cast<double>());
+            }
+    }
+
+    /// Newton's method from r, with a metric of its own.
+    void newton(VectorXd r, double normal, double tangential) {
+        System<T> system = scaling_.make();
+        system.set_metric(normal, tangential);
+        finish(system, r);
+    }
+
+    /// Newton's method from where sweeps come to from r, and the proximal point method from there.
+    void swept(VectorXd r, int sweeps) {
+        System<T> system = scaling_.make();
+        sweep(system, r, 1e-6, sweeps, budget_);
+        newton(r, 10.0, 1.0);
+        if (!best_.converged)
+            proximal_from(r);
+    }
+
+    /// The proximal point method from r, the errors those of the problem itself.
+    void proximal_from(VectorXd r) {
+        System<T> system = scaling_.make();
+        system.inverse = nullptr;
+        const auto error = [&](const VectorXd &mapped) {
+            last_error_ = 0.0;
+            return certify(system, mapped) ? 0.0 : last_error_;
+        };
+        if (!proximal(system, r, op_.mean_normal(), budget_, error))
+            return;
+        system.set_metric(10.0, 1.0);
+        Newton<T> newton(system);
+        set_change(newton, system, r);
+    }
+
+    /// Contacts in the plane: complementary pivots; of a few contacts every state.
+    void in_the_plane() {
+        if constexpr (T == 1 && P == 1) {
+            constexpr int covers = 20;
+            constexpr Index few = 5;
+            System<T> system = scaling_.make();
+            system.set_metric(10.0, 1.0);
+            const Plane plane(system);
+            std::minstd_rand random(1);
+            const auto accept = [&](const VectorXd &r) {
+                if (r.size() == 0 || !certify(system, r))
+                    return false;
+                Newton<T> newton(system);
+                set_change(newton, system, r);
+                return true;
+            };
+            for (int k = 0; k < covers && !budget_.spent(); ++k, ++budget_.iterations) {
+                VectorXl cover = VectorXl::Ones(3 * op_.nodes());
+                for (Index i = 0; i < cover.size() && k > 0; ++i)
+                    cover[i] = std::pow(10.0, uniform(random) - 0.5);
+                if (accept(plane.pivots(cover)))
+                    return;
+            }
+            if (op_.nodes() <= few)
+                best_.unsolvable = !plane.all_states(accept);
+        }
+    }
+    static double worst(const Solution &s) { return std::max(s.error, s.slip_error); }
+
+    /// Follows the solution from the associated rule, p / mu to the power 0, to 1, steps halved on
+    /// failure and doubled after success.
+    bool follow(VectorXd &r) {
+        double reached = -1.0, step = 0.25;
+        VectorXd before;
+        double reached_before = -1.0;
+        constexpr double shortest = 1e-4;
+        const int last_iteration = budget_.iterations + 2000;
+        for (int failures = 0; reached < 1.0;) {
+            const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
+            System<T> system = scaling_.make(s);
+            system.set_metric(10.0, 1.0);
+            VectorXd trial = r;
+            if (before.size() > 0 && failures == 0)
+                trial += (s - reached) / (reached - reached_before) * (r - before);
+            const End end =
+                Newton<T>(system).solve(trial, 1e-6, budget_, options_.newton_iterations,
+                                        [](const VectorXd &) { return true; });
+            if (end == End::converged) {
+                if (reached >= 0.0) {
+                    before = r;
+                    reached_before = reached;
+                    step *= 2.0;
+                }
+                r = trial;
+                reached = s;
+                failures = 0;
+            } else {
+                step *= 0.5;
+                ++failures;
+                if (step < shortest || reached < 0.0 || budget_.spent() ||
+                    budget_.iterations >= last_iteration)
+                    return false;
+            }
+        }
+        return true;
+    }
+
+    template <class Try> bool attempt(const char *name, Try &&action) {
+        if (budget_.spent())
+            return true;
+        const int iterations = budget_.iterations;
+        const double seconds = budget_.seconds();
+        action();
+        best_.tried.push_back({name, best_.converged, budget_.iterations - iterations,
+                               budget_.seconds() - seconds, best_.error, best_.slip_error});
+        if (best_.converged)
+            best_.branch = name;
+        return best_.converged;
+    }
+
+    const Operator &op_;
+    const VectorXd &q_;
+    Options options_;
+    Judge<P> judge_;
+    Scaling<T, P> scaling_;
+    Budget budget_;
+    Solution best_;
+    double last_error_ = 0.0; // of the state certified last
+};
+} // namespace dolfinx_contact::condensed

@@ -1,0 +1,237 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_direction.h
+/// Newton's direction: the nodes' linearised problems put together and solved.
+#pragma once
+
+#include "condensed_linear.h"
+#include "condensed_step.h"
+
+namespace dolfinx_contact::condensed {
+template <int T> class Direction {
+  public:
+    static constexpr int D = T + 1;
+    using Node = Eigen::Matrix<double, D, 1>;
+
+    explicit Direction(const System<T> &system) : system_(system) {}
+
+    /// Newton's step by the smaller of the two eliminations, if there is a choice.
+    /// The last one, with the factors of the one before where they still fit, leaves out dw.
+    void find(const State<T> &state, const VectorXd &r, const VectorXd &w, VectorXd &dr,
+              VectorXd &dw, bool last = false) {
+        Index compliance = system_.tied, stiffness = 0;
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto &point = state.points[static_cast<std::size_t>(i)];
+            const bool open = point.branch == Branch::open, stick = point.branch == Branch::stick;
+            compliance += open ? 0 : (stick ? D : std::max(T, 1));
+            stiffness += open ? D : (stick ? 0 : T);
+        }
+        const bool stiff = system_.inverse && system_.shift == 0.0 && stiffness < compliance;
+        std::vector<Branch> branches;
+        steps_.clear();
+        offsets_.clear();
+        Index unknowns = 0;
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto &point = state.points[static_cast<std::size_t>(i)];
+            steps_.push_back(stiff ? by_stiffness<T>(system_, i, point, at(r, i), at(w, i))
+                                   : by_compliance<T>(system_, i, point, at(r, i), at(w, i)));
+            offsets_.push_back(unknowns);
+            unknowns += steps_.back().m;
+            branches.push_back(point.branch);
+        }
+        same_factors_ = last && stiff == stiff_ && branches == branches_;
+        stiff_ = stiff;
+        branches_ = std::move(branches);
+        const VectorXd left = -w.tail(system_.tied); // of tied rows
+        if (stiff) {
+            tied_ = 0; // their motion is known
+            dw = eliminate(*system_.inverse, system_.right.cwiseInverse(),
+                           system_.left.cwiseInverse(), unknowns, left);
+            dr = system_.change_of_reaction(dw);
+        } else {
+            tied_ = system_.tied;
+            dr = eliminate(*system_.W, system_.left, system_.right, unknowns + tied_, left);
+            if (!last)
+                dw = system_.change(dr);
+        }
+    }
+
+  private:
+    static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
+
+    /// c + B y with y from L A (c + B y) + G y = g, A = diag(left) matrix diag(right). Of tied rows
+    /// y is the unknown force and A (c + B y) = `in_tied_rows`; or that is known and no unknown.
+    VectorXd eliminate(const Square &matrix, const VectorXd &left, const VectorXd &right,
+                       Index unknowns, const VectorXd &in_tied_rows) {
+        VectorXd found(system_.size());
+        found.tail(system_.tied) = in_tied_rows;
+        found.tail(tied_).setZero();
+        active_.clear();
+        for (Index i = 0; i < system_.nodes; ++i) {
+            auto &step = steps_[static_cast<std::size_t>(i)];
+            found.template segment<D>(D * i) = step.c;
+            if (step.m > 0)
+                active_.push_back(i);
+        }
+        if (unknowns == 0)
+            return found;
+        VectorXd known = left.cwiseProduct(matrix * VectorXd(right.cwiseProduct(found)));
+        if (system_.shift > 0.0) // never by stiffness
+            known += left.cwiseProduct(system_.shifted(right.cwiseProduct(found)));
+        VectorXd rhs(unknowns);
+        to_.clear();
+        from_.clear();
+        for (const Index i : active_) {
+            const auto &step = steps_[static_cast<std::size_t>(i)];
+            rhs.segment(offset(i), step.m) = (step.g - step.L * at(known, i)).head(step.m);
+            to_.emplace_back(step.L * at(left, i).asDiagonal());
+            from_.emplace_back(at(right, i).asDiagonal() * step.B);
+        }
+        rhs.tail(tied_) = in_tied_rows.head(tied_) - known.tail(tied_);
+        const VectorXd y =
+            same_factors_ ? linear_.again(rhs) : factored(matrix, left, right, unknowns, rhs);
+        for (const Index i : active_) {
+            const auto &step = steps_[static_cast<std::size_t>(i)];
+            found.template segment<D>(D * i) +=
+                step.B.leftCols(step.m) * y.segment(offset(i), step.m);
+        }
+        found.tail(tied_) += y.tail(tied_);
+        return found;
+    }
+
+    /// J^-1 rhs. Where J is singular, with more contacts than the body has degrees of freedom: of
+    /// few unknowns the shortest of the steps that fit best, of many the step of W + shift, which
+    /// costs no more than a regular one.
+    VectorXd factored(const Square &matrix, const VectorXd &left, const VectorXd &right,
+                      Index unknowns, const VectorXd &rhs) {
+        constexpr double small_shift = 1e-9;
+        if (&matrix == system_.W && system_.pattern != nullptr)
+            return factored_sparse(unknowns, rhs, small_shift * mean_normal());
+        const double shift = singular_ ? small_shift * mean_normal() : 0.0;
+        assemble(matrix, unknowns, system_.shift + shift);
+        tie(matrix, left, right);
+        VectorXd y;
+        if (linear_.solve(J_, rhs, y, singular_))
+            return y;
+        singular_ = true;
+        return factored(matrix, left, right, unknowns, rhs);
+    }
+    /// The same of a sparse W, always with a shift.
+    VectorXd factored_sparse(Index unknowns, const VectorXd &rhs, double shift) {
+        std::vector<Index> position(static_cast<std::size_t>(system_.nodes), -1);
+        for (std::size_t a = 0; a < active_.size(); ++a)
+            position[static_cast<std::size_t>(active_[a])] = static_cast<Index>(a);
+        VectorXd y;
+        for (int tries = 0; tries < 4; ++tries, shift *= 1e2) {
+            std::vector<Eigen::Triplet<double>> entries;
+            for (std::size_t b = 0; b < active_.size(); ++b) {
+                const Index j = active_[b];
+                for (const Index i : in(*system_.pattern, j)) {
+                    const Index a = in(position, i);
+                    if (a >= 0)
+                        couple_sparse(i, j, in(to_, a), from_[b],
+                                      i == j ? system_.shift + shift : 0.0, entries);
+                }
+            }
+            Eigen::SparseMatrix<double> J(unknowns, unknowns);
+            J.setFromTriplets(entries.begin(), entries.end());
+            if (linear_.solve(J, rhs, y))
+                return y;
+        }
+        return VectorXd::Zero(unknowns);
+    }
+    void couple_sparse(Index i, Index j, const Eigen::Matrix<double, D, D> &to,
+                       const Eigen::Matrix<double, D, D> &from, double shift,
+                       std::vector<Eigen::Triplet<double>> &entries) const {
+        Eigen::Matrix<double, D, D> block;
+        for (int k = 0; k < D; ++k)
+            for (int l = 0; l < D; ++l)
+                block(l, k) = (*system_.W)(D * i + l, D * j + k) + (k == l ? shift : 0.0);
+        Eigen::Matrix<double, D, D> coupled = to * block * from;
+        if (i == j)
+            coupled += in(steps_, i).G;
+        for (int k = 0; k < in(steps_, j).m; ++k)
+            for (int l = 0; l < in(steps_, i).m; ++l)
+                entries.emplace_back(offset(i) + l, offset(j) + k, coupled(l, k));
+    }
+    double mean_normal() const {
+        double mean = 0.0;
+        for (Index i = 0; i < system_.nodes; ++i)
+            mean += std::abs((*system_.W)(D * i + T, D * i + T));
+        return mean / static_cast<double>(system_.nodes);
+    }
+
+    /// Rows and columns of J of tied rows, which are the last ones.
+    void tie(const Square &matrix, const VectorXd &left, const VectorXd &right) {
+        const Index first = J_.rows() - tied_, row = D * system_.nodes;
+        for (Index c = 0; c < tied_; ++c) {
+            for (std::size_t a = 0; a < active_.size(); ++a) {
+                const Index i = active_[a];
+                Node across, down;
+                for (int k = 0; k < D; ++k) {
+                    across[k] = matrix(row + c, D * i + k);
+                    down[k] = matrix(D * i + k, row + c);
+                }
+                const int m = in(steps_, i).m;
+                J_.block(first + c, offset(i), 1, m) =
+                    left[row + c] * (across.transpose() * from_[a]).leftCols(m);
+                J_.block(offset(i), first + c, m, 1) = (to_[a] * down).head(m) * right[row + c];
+            }
+            for (Index d = 0; d < tied_; ++d)
+                J_(first + c, first + d) =
+                    left[row + c] * matrix(row + c, row + d) * right[row + d];
+        }
+    }
+
+    /// J = to (matrix + shift) from + G, node by node, from the entries of the matrix that are
+    /// stored.
+    void assemble(const Square &matrix, Index unknowns, double shift) {
+        J_.resize(unknowns, unknowns);
+        const auto count = static_cast<Index>(active_.size());
+        for (Index b = 0; b < count; ++b) {
+            const auto [first, last] = matrix.stored(b, count);
+            for (Index a = first; a < last; ++a) {
+                Eigen::Matrix<double, D, D> block =
+                    matrix.template block<D>(in(active_, a), in(active_, b));
+                if (a == b)
+                    block.diagonal().array() += shift;
+                couple(a, b, block);
+                if (matrix.symmetric() && a != b)
+                    couple(b, a, block.transpose());
+            }
+            const Index j = in(active_, b);
+            const auto &step = in(steps_, j);
+            J_.block(offset(j), offset(j), step.m, step.m) += step.G.topLeftCorner(step.m, step.m);
+        }
+    }
+    template <class Block> void couple(Index a, Index b, const Block &block) {
+        const Index i = in(active_, a), j = in(active_, b);
+        const int rows = in(steps_, i).m, columns = in(steps_, j).m;
+        if constexpr (D == 3)
+            if (rows == 2 && columns == 2) { // slipping nodes: the most of them
+                J_.template block<2, 2>(offset(i), offset(j)) =
+                    (in(to_, a).template topRows<2>() * block) *
+                    in(from_, b).template leftCols<2>();
+                return;
+            }
+        const Eigen::Matrix<double, D, D> entries = in(to_, a) * block * in(from_, b);
+        for (int k = 0; k < columns; ++k)
+            for (int l = 0; l < rows; ++l)
+                J_(offset(i) + l, offset(j) + k) = entries(l, k);
+    }
+    Index offset(Index i) const { return in(offsets_, i); }
+    template <class Vector> static const auto &in(const Vector &vector, Index i) {
+        return vector[static_cast<std::size_t>(i)];
+    }
+
+    const System<T> &system_;
+    std::vector<NodeStep<T>> steps_;
+    std::vector<Index> offsets_, active_;
+    std::vector<Eigen::Matrix<double, D, D>> to_, from_;
+    MatrixXd J_;
+    LinearSolver linear_;
+    std::vector<Branch> branches_; // with which J was made
+    bool stiff_ = false, same_factors_ = false, singular_ = false;
+    Index tied_ = 0; // tied rows that J has
+};
+} // namespace dolfinx_contact::condensed

@@ -1,0 +1,169 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Rigid bodies (W = H M^-1 H', rank deficient, sparse), one contact, and contacts in the plane."""
+
+import sys
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from condensed_scenes import judge
+
+from dolfinx_contact import CondensedNotConverged, Friction
+from dolfinx_contact.solvers.condensed_newton import solve_condensed
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from rigid_family import KINDS, problem
+
+pytestmark = pytest.mark.filterwarnings("ignore::dolfinx_contact.checks.RoundingWarning")
+TOL = 1e-8
+
+
+def check(W, q, friction, mu, p=None, **options):
+    """Solve; the judge's errors are within tol or rounding; returns the result."""
+    found = solve_condensed(W, q, friction, **options)
+    mu = np.broadcast_to(mu, q.shape[1] - 1)
+    errors = judge(W, q, mu, np.ones(len(mu)) if p is None else p, found.reaction)
+    assert max(errors) <= 1.01 * max(TOL, found.rounding)
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_piles_and_towers(kind):
+    """Rigid bodies, 1 to 16, seeds other than the benchmark's: every problem is solved."""
+    for n in (1, 2, 5, 16):
+        for seed in range(100, 106):
+            scene = problem(kind, n, seed, motion=[0.0, 0.1, 1.0][seed % 3], spread=seed % 3)
+            check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=20)
+
+
+def test_sparse_and_dense_storage():
+    """A W of many zeros gives the same contact forces' sum and velocities whether its zeros are used
+    or hidden by entries too small to matter."""
+    scene = problem("tower", 24, 3, mu=0.4, motion=0.0)
+    hidden = scene.W.toarray()
+    hidden[hidden == 0] = 1e-30
+    sparse = check(scene.W, scene.q, Friction(0.4), 0.4)
+    dense = check(hidden, scene.q, Friction(0.4), 0.4)
+    size = np.abs(scene.q).max()  # reactions are not unique, velocities of this scene are
+    assert np.abs(sparse.displacement - dense.displacement).max() <= 1e-6 * size
+
+
+def random_contact(rng, dim):
+    """W symmetric positive definite of condition up to 1e8, any load, any law."""
+    B = np.linalg.qr(rng.normal(size=(dim, dim)))[0]
+    W = (B * 10 ** rng.uniform(-rng.uniform(0, 8), 0, size=dim)) @ B.T
+    q = rng.normal(size=(1, dim))
+    q[0, -1] = -abs(q[0, -1]) * 10 ** rng.uniform(-3, 0)
+    mu = 10 ** rng.uniform(-1, 0.5, size=dim - 1)
+    p = 10 ** rng.uniform(-1, 1, size=dim - 1)
+    return (W + W.T) / 2, q, mu, p
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_one_contact_is_never_refused(dim):
+    """A single contact on a positive definite W is solved whatever its condition and law."""
+    rng = np.random.default_rng(dim)
+    for _ in range(1000):
+        W, q, mu, p = random_contact(rng, dim)
+        law = Friction(mu[0]) if dim == 2 else Friction(mu, p)
+        found = check(W, q, law, mu, p)
+        assert found.branch == "one contact"
+
+
+def test_one_contact_without_rank():
+    """Compliance of rank one or two, moved in what it can give: solved too."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        rank = rng.integers(1, 3)
+        H = rng.normal(size=(3, rank))
+        H[2, 0] += 2 * np.sign(H[2, 0])
+        mu = rng.uniform(0.1, 0.6)
+        if np.linalg.norm(H[:2] @ np.linalg.pinv(H[2:])) * mu >= 1:
+            continue  # may jam without a solution
+        W = H @ H.T
+        check(
+            (W + W.T) / 2,
+            (H @ -np.abs(rng.normal(size=rank)) * np.sign(H[2, 0]))[None],
+            Friction(mu),
+            mu,
+        )
+
+
+def brute_force(W, q, mu):
+    """Whether any state of the contacts in the plane solves the problem; independent of the kernel."""
+    n = len(q)
+    flat, size = q.ravel(), np.abs(q).max()
+    for states in product("osrl", repeat=n):
+        trial, test = [], []
+        for i, state in enumerate(states):
+            t, normal = np.eye(2 * n)[2 * i : 2 * i + 2]
+            if state == "s":
+                trial += [t, normal]
+                test += [t, normal]
+            elif state != "o":
+                trial.append(normal + (mu if state == "r" else -mu) * t)
+                test.append(normal)
+        r = np.zeros(2 * n)
+        if trial:
+            A, B = np.array(test), np.array(trial).T
+            r = B @ np.linalg.solve(A @ W @ B, -A @ flat)
+        w, r = (flat + W @ r).reshape(-1, 2), r.reshape(-1, 2)
+        force = np.abs(r).max() + 1e-300
+        if (r[:, 1] < -1e-9 * force).any() or (w[:, 1] < -1e-9 * size).any():
+            continue
+        if (np.abs(r[:, 0]) > mu * r[:, 1] + 1e-9 * force).any():
+            continue
+        if all(s in "os" or r[i, 0] * w[i, 0] <= 1e-9 * force * size for i, s in enumerate(states)):
+            return True
+    return False
+
+
+def test_the_plane_is_decided():
+    """One to four contacts in two dimensions, W positive definite or of any sign off its diagonal, mu
+    to 3: solved, or refused with the proof that no state is a solution, as all states tried here say."""
+    rng, outcomes = np.random.default_rng(1), {True: 0, False: 0}
+    for k in range(400):
+        n = 1 + k % 4
+        B = rng.normal(size=(2 * n, 2 * n))
+        W = B @ B.T
+        if k % 2:
+            W = (B + B.T) / 2
+            W[np.diag_indices(2 * n)] = np.abs(np.diag(W)) + 0.1
+        q, mu = rng.normal(size=(n, 2)), rng.uniform(0.1, 3)
+        q[:, 1] -= 1
+        solvable = brute_force(W, q, mu)
+        outcomes[solvable] += 1
+        if solvable:
+            check(W, q, Friction(mu), mu)
+        else:
+            with pytest.raises(CondensedNotConverged, match="no solution: none") as caught:
+                solve_condensed(W, q, Friction(mu))
+            assert caught.value.best.unsolvable
+    assert min(outcomes.values()) >= 20
+
+
+def test_jammed():
+    """One contact that sticks with reactions hundreds of times the load, r = -W^-1 q."""
+    W, q = np.array([[1.001, 1], [1, 1.001]]), np.array([[5, -0.01]])
+    found = check(W, q, Friction(1.02), 1.02)
+    assert found.reaction[0] == pytest.approx(-np.linalg.solve(W, q[0]), rel=1e-9)
+
+
+def test_one_coefficient_per_contact():
+    """An array is one coefficient per contact, two contacts included; a pair is a Friction."""
+    rng = np.random.default_rng(4)
+    for n in (1, 2, 3):
+        B = rng.normal(size=(3 * n, 3 * n))
+        W, q = B @ B.T + np.eye(3 * n), rng.normal(size=(n, 3))
+        q[:, 2] = -1
+        mu = rng.uniform(0.1, 0.4, size=n)
+        found = solve_condensed(W, q, mu, tol=1e-11)
+        expected = solve_condensed(W, q, Friction(np.column_stack((mu, mu))), tol=1e-11)
+        assert np.array_equal(found.reaction, expected.reaction)
+        bound = np.linalg.norm(found.reaction[:, :2], axis=1) / mu
+        assert (bound <= found.reaction[:, 2] * (1 + 1e-12)).all()
+    for wrong in ([0.3], [[0.3, 0.2, 0.1]], [0.3, np.nan, 0.1], [-0.1, 0.2, 0.3]):
+        with pytest.raises(ValueError, match="friction|mu"):
+            solve_condensed(W, q, np.array(wrong))
