@@ -2,19 +2,15 @@
 # SPDX-License-Identifier: MIT
 """Rigid bodies (W = H M^-1 H', rank deficient, sparse), one contact, and contacts in the plane."""
 
-import sys
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 from condensed_scenes import judge
 
+from benchmarks.rigid_family import KINDS, problem
 from dolfinx_contact import CondensedNotConverged, Friction
 from dolfinx_contact.solvers.condensed_newton import solve_condensed
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from rigid_family import KINDS, problem
 
 pytestmark = pytest.mark.filterwarnings("ignore::dolfinx_contact.checks.RoundingWarning")
 TOL = 1e-8
