@@ -56,6 +56,10 @@ def _options(A, options) -> dict:
     return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
 
 
+def _heed_signals(*_) -> None:
+    """A monitor of every iteration: Python answers Ctrl-C only while it runs itself."""
+
+
 class LinearSolverError(RuntimeError):
     """PETSc's linear solver did not solve; the message has its reason and options."""
 
@@ -96,6 +100,8 @@ class LinearSolver:
         self.unread = [key for key in ours if not compat.option_was_read(f"{prefix}{key}")]
         for key in ours:
             del database[key]
+        if not self.exact:
+            self.ksp.setMonitor(_heed_signals)
         self._right, self._left = A.createVecs()
 
     def destroy(self) -> None:
