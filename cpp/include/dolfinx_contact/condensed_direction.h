@@ -107,14 +107,13 @@ template <int T> class Direction {
         constexpr double small_shift = 1e-9;
         if (&matrix == system_.W && system_.pattern != nullptr)
             return factored_sparse(unknowns, rhs, small_shift * mean_normal());
-        const double shift = singular_ ? small_shift * mean_normal() : 0.0;
-        assemble(matrix, unknowns, system_.shift + shift);
-        tie(matrix, left, right);
-        VectorXd y;
-        if (linear_.solve(J_, rhs, y, singular_))
-            return y;
-        singular_ = true;
-        return factored(matrix, left, right, unknowns, rhs);
+        for (VectorXd y;; singular_ = true) { // a second time at most
+            const double shift = singular_ ? small_shift * mean_normal() : 0.0;
+            assemble(matrix, unknowns, system_.shift + shift);
+            tie(matrix, left, right);
+            if (linear_.solve(J_, rhs, y, singular_) || singular_)
+                return y;
+        }
     }
     /// The same of a sparse W, always with a shift.
     VectorXd factored_sparse(Index unknowns, const VectorXd &rhs, double shift) {
