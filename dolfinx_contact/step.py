@@ -145,6 +145,10 @@ class LoadStep:
             self._tell()
         return self.errors
 
+    def contacts_moved(self) -> None:
+        """Contacts were moved by others: what was measured is not their state any more."""
+        self._measured = None
+
     def measure_open(self, x: np.ndarray) -> Errors:
         """Errors of a displacement without reactions."""
         for contact in self.contacts:

@@ -49,9 +49,9 @@ class SceneJudge:
         mu = np.broadcast_to(np.asarray(mu, float), (d - 1,))
         p = mu if p is None else np.broadcast_to(np.asarray(p, float), (d - 1,))
         gap0 = x[nodes, :d] @ frame[-1]
-        self.body = judge.Body(
-            K, contact, self.fixed, frame, gap0, np.abs(x[nodes, :d]) @ np.abs(frame[-1]), mu, p
-        )
+        # Coordinates are rounded like the largest one: a face that is meant to lie in the plane may not, by a last digit.
+        reach = np.full(len(nodes), np.abs(x).max(initial=0.0))
+        self.body = judge.Body(K, contact, self.fixed, frame, gap0, reach, mu, p)
         # Unique whatever the mesh: no slip rule of its own, and little friction.
         self.unique = bool(np.all(mu == mu[0]) and np.all(p == p[0]) and mu[0] <= 0.2)
         self.restart()
