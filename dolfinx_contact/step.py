@@ -53,7 +53,7 @@ class LoadStep:
         self._before = None  # reactions of the state judged before
         self._evaluations = 0
         self._known = None  # a displacement, and the forces b - K x that it leaves
-        self._measured = None  # displacement whose errors were measured with F
+        self._measured = None  # displacement and contact states whose errors were measured with F
 
     def total(self, array) -> np.ndarray:
         """Sum of an array over all ranks."""
@@ -136,7 +136,7 @@ class LoadStep:
         Reactions by the return map: where slip is large beside them their direction is that of the slip, not that of
         rounding in the forces.
         """
-        if self._measured is None or not self.body.same(x, self._measured):
+        if not self._is_measured(x):
             forces = -self.body.residual(x)
             maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
             for contact, map in zip(self._asked(self.free(forces)), maps):
@@ -145,9 +145,13 @@ class LoadStep:
             self._tell()
         return self.errors
 
-    def contacts_moved(self) -> None:
-        """Contacts were moved by others: what was measured is not their state any more."""
-        self._measured = None
+    def _is_measured(self, x: np.ndarray) -> bool:
+        """Whether the errors are those of ``x``, and nobody has moved the contacts since."""
+        if self._measured is None:
+            return False
+        measured, states = self._measured
+        stand = all(contact.present is state for contact, state in zip(self.contacts, states))
+        return self.body.same(x, measured if stand else None)  # asked on all ranks
 
     def measure_open(self, x: np.ndarray) -> Errors:
         """Errors of a displacement without reactions."""
@@ -167,7 +171,6 @@ class LoadStep:
 
     def _asked(self, forces: np.ndarray):
         """The contacts, each with the reactions that balance the forces at its nodes."""
-        self._measured = None  # contacts will move
         for contact in self.contacts:
             contact.take_reaction(-forces)
             yield contact
@@ -187,7 +190,7 @@ class LoadStep:
     def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
         """Errors of the contacts' present state, ``forces = -F(x)``."""
         self.errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
-        self._measured = x.copy()
+        self._measured = x.copy(), [contact.present for contact in self.contacts]
 
     def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
         """Errors of the contacts' present state.

@@ -77,6 +77,11 @@ class ContactHistory(Guarded):
         self.restore()
 
     @property
+    def present(self) -> State:
+        """The present state; another object as soon as any part of it is replaced."""
+        return self._present
+
+    @property
     def last(self) -> State:
         """The state at the end of the last step that converged."""
         return self._last

@@ -114,7 +114,6 @@ class CondensedBody:
                 (result.displacement.ravel(), force[anchors] / self._scales["tied_stiffness"])
             )
             rounding = rounding + self._motion(base) - moved
-        step.contacts_moved()  # to where the next pass would have begun
         x, force, result = best
         self.past.append((q, force, self._tied))
         forward = max(result.change, step.measure(x).largest)
