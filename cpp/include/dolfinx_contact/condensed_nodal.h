@@ -76,6 +76,8 @@ template <int T, class Scalar = double> class Nodal {
     using Matrix = Eigen::Matrix<Scalar, D, D>;
 
     Nodal(const Matrix &A, bool smooth) : A_(A), smooth_(smooth || T == 0) {
+        if (smooth_)
+            return; // the normal component alone, no inverse
         const Eigen::FullPivLU<Matrix> lu(A);
         regular_ = lu.isInvertible();
         if (regular_)
