@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The condensed contact problem on NumPy arrays. The GIL is released while it is solved.
-#include <dolfinx_contact/condensed.h>
+#include <dolfinx_contact/condensed_solution.h>
 
 #include <memory>
 #include <optional>

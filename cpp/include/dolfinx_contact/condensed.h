@@ -94,20 +94,6 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
     }
 };
 
-/// Solves w = q + W r with the law between r and w at every contact.
-///
-/// Component order per contact: T tangential, then the normal one; w_n is the gap, w_t the slip.
-/// W may be rank-deficient and slightly unsymmetric. Rows after those of contacts are tied: w_c =
-/// 0. The errors, with S the larger of |r|, Euclidean over all contacts, and `external` (where |r|
-/// is above the load |kappa (q_t, min(q_n, 0))|, that counts instead):
-/// - error: |(r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu), kappa_c w_c)| / S, Euclidean
-///   over all contacts and tied rows, kappa by default 1 / W_nn;
-/// - slip_error: |kappa_t (w_t + |w_t| d)| / S, Euclidean over slipping contacts, |kappa_t w_t| on
-///   sticking ones, kappa_t by default 1 / W along the defect;
-/// - rounding: eps times the size of the terms that cancel in them, over S.
-///
-/// T = 0 is contact without friction on normal components alone.
-/// @param starts reactions to start from; the one of the smallest residual is taken
 template <int T>
 Solution solve(const Operator &op, const AnyLaw<T> &law, const VectorXd &q,
                const std::vector<VectorXd> &starts, const Options &options) {

@@ -11,17 +11,6 @@
 #include "condensed_starts.h"
 
 namespace dolfinx_contact::condensed {
-/// What a caller may choose.
-struct Options {
-    double tol = 1e-8;      ///< largest error of a solution
-    double slip_tol = 1e-8; ///< largest slip error of a solution
-    double max_seconds = std::numeric_limits<double>::infinity();
-    int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
-    int newton_iterations = 60;   ///< Newton iterations of one attempt
-    bool fallbacks = true;
-    Scales scales = {};
-};
-
 /// P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Attempts {
   public:

@@ -6,19 +6,10 @@
 #pragma once
 
 #include "condensed_exact.h"
-#include "condensed_operator.h"
+#include "condensed_solution.h"
 #include <stdexcept>
-#include <string>
 
 namespace dolfinx_contact::condensed {
-/// Scales of the errors that a caller may give; W gives those that are empty.
-struct Scales {
-    VectorXd stiffness;  ///< kappa of each contact, (n,), force per length; else 1 / W_nn
-    VectorXd tangential; ///< symmetric (T, T) of each contact, (n T T,); else 1 / W along a defect
-    VectorXd tied;       ///< of each tied row; else 1 / its largest entry
-    double external = 0.0; ///< a force that acts beside the reactions
-};
-
 /// The two errors of a state and their rounding.
 template <int P> class Judge {
   public:

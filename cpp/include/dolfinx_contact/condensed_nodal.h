@@ -76,12 +76,12 @@ template <int T, class Scalar = double> class Nodal {
     using Matrix = Eigen::Matrix<Scalar, D, D>;
 
     Nodal(const Matrix &A, bool smooth) : A_(A), smooth_(smooth || T == 0) {
-        if (smooth_)
-            return; // the normal component alone, no inverse
-        const Eigen::FullPivLU<Matrix> lu(A);
-        regular_ = lu.isInvertible();
-        if (regular_)
-            inverse_ = lu.inverse();
+        if constexpr (T > 0) {
+            const Eigen::FullPivLU<Matrix> lu(A);
+            regular_ = lu.isInvertible();
+            if (regular_)
+                inverse_ = lu.inverse();
+        }
     }
 
     /// Reactions of all states that can be the solution, the likeliest first: open; sticking; the
@@ -97,7 +97,7 @@ template <int T, class Scalar = double> class Nodal {
         if (regular_)
             found.push_back(-inverse_ * q);
         else
-            found.push_back(-A_.completeOrthogonalDecomposition().solve(q));
+            found.push_back(least_stick(q));
         add_slips(q, found);
         return found;
     }
@@ -131,6 +131,16 @@ template <int T, class Scalar = double> class Nodal {
     }
 
   private:
+    /// The smallest sticking reaction of a singular A. In dynamic size and double precision, as
+    /// elsewhere in the kernel: one more kind of decomposition takes half a minute to compile.
+    Vector least_stick(const Vector &q) const {
+        const MatrixXd A = A_.template cast<double>();
+        const VectorXd right = q.template cast<double>();
+        const Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal(A);
+        const VectorXd stick = orthogonal.solve(right);
+        return -stick.template cast<Scalar>();
+    }
+
     /// r = n (e, 1) with w_n = 0 and w_t along -e: w_t x e = 0 times A_nn + A_nt e is trigonometric
     /// in the angle of e.
     void add_slips(const Vector &q, std::vector<Vector> &found) const {
@@ -159,6 +169,6 @@ template <int T, class Scalar = double> class Nodal {
     }
 
     Matrix A_, inverse_;
-    bool smooth_, regular_;
+    bool smooth_, regular_ = false;
 };
 } // namespace dolfinx_contact::condensed

@@ -1,41 +1,13 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
 /// @file condensed_operator.h
-/// W with what is derived from it once, and what a solution consists of.
+/// W with what is derived from it once.
 #pragma once
 
 #include "condensed_system.h"
 #include <optional>
-#include <string>
 
 namespace dolfinx_contact::condensed {
-/// One entry of the cascade that was tried.
-struct Attempt {
-    std::string branch;
-    bool converged;
-    int iterations;
-    double seconds, error, slip_error; ///< the errors of the best state so far
-};
-
-/// Reactions and displacements, (T + 1) per node, then those of tied rows, in the units of q and W.
-struct Solution {
-    static constexpr double none = std::numeric_limits<double>::infinity();
-    VectorXd reaction, displacement;
-    std::vector<Branch> status;
-    double error = none, slip_error = none;
-    double rounding = none, slip_rounding = none; ///< what double precision leaves of the errors
-    double change = none; ///< of the reactions in Newton's next step, over `acting`
-    double acting = 0.0;  ///< the force that errors are relative to
-    bool near_rounding = false;
-    bool unsolvable = false; ///< proved: no state of the contacts is a solution
-    Index tied = 0;          ///< how many of the reactions
-    int iterations = 0;
-    double seconds = 0.0;
-    bool converged = false;
-    std::string branch;
-    std::vector<Attempt> tried;
-};
-
 /// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse when
 /// that begins to pay. If W is symmetric to the last bit, one triangle of it is kept, and its
 /// inverse by Cholesky in the other triangle of the same array, which has one column more; else
