@@ -83,21 +83,15 @@ std::string scaled_map_properties(const Law &law, const Local<T> &a, const Local
                            "scaled metric");
 }
 
-template <int T> int newton_steps(const SecularEquation<T> &equation) {
-    SecularEquations<T, 1> one;
-    one.set(0, equation);
-    return one.solve(1);
-}
-
 /// Newton steps of the equations of both projections, whichever takes more.
 template <class Law, int T = Law::tangents> int newton_steps(const Law &law, const Local<T> &tau) {
-    const Start<T> nearest = start_projection(law, tau),
-                   back = start_return(law, tau, 0.0, Tangent<T>(Tangent<T>::Zero()), 1.0, 1.0);
+    const Local<T> p = tau * power_of_two(largest<T + 1>(tau)).down;
     int most = 0;
-    if (nearest.branch == unfinished)
-        most = newton_steps(boundary_equation(law, nearest.p));
-    if (back.branch == unfinished)
-        most = std::max(most, newton_steps(return_equation(law, back.p)));
+    if (project(law, tau).branch == Branch::slip)
+        most = solve<T>(boundary_equation(law, p)).steps;
+    const Tangent<T> still = Tangent<T>::Zero(), z = in_units_of_ellipse(law, tau);
+    if (return_map(law, tau, 0.0, still, 1.0, 1.0).branch == Branch::slip)
+        most = std::max(most, solve<T>(return_equation(law, z, tau[T])).steps);
     return most;
 }
 

@@ -19,7 +19,7 @@ template <int T> struct Linearisation {
 
 /// w_t = M Q^2 du_t, whose norm is the dual norm ||Q^2 (-du_t)||*_mu of [dSFMH07, Section 1].
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
+Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
     Tangent<T> w;
     for (int i = 0; i < T; ++i)
         w[i] = law.mu(i) * (law.q2(i) * slip[i]);
@@ -29,8 +29,8 @@ template <class Law, int T = Law::tangents>
 /// Predictor of [dSFMH07, Section 2]:
 /// tau_t = r_t - rho Q^2 du_t,  tau_n = r_n - rho (x_n + |M Q^2 du_t|).
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Local<T> predictor(const Law &law, const Local<T> &r, double gap,
-                                                 const Tangent<T> &slip, double rho) {
+Local<T> predictor(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
+                   double rho) {
     Local<T> tau;
     for (int i = 0; i < T; ++i)
         tau[i] = r[i] - rho * (law.q2(i) * slip[i]);
@@ -48,9 +48,8 @@ Reaction<T> bipotential_map(const Law &law, const Local<T> &r, double gap, const
 /// The predictor in the scaled variables (M^-1 r_t, r_n), (M Q^2 du_t, x_n + |M Q^2 du_t|), in
 /// which the law is isotropic with unit friction.
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Local<T> scaled_predictor(const Law &law, const Local<T> &r,
-                                                        double gap, const Tangent<T> &slip,
-                                                        double rho) {
+Local<T> scaled_predictor(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
+                          double rho) {
     const Tangent<T> w = scaled_slip(law, slip);
     Local<T> tau;
     for (int i = 0; i < T; ++i)
@@ -59,40 +58,24 @@ template <class Law, int T = Law::tangents>
     return tau;
 }
 
-/// A reaction and the number of its branch as a double: one type, for loops to vectorise.
-template <int T> struct CodedReaction {
-    Local<T> r;
-    double branch;
-};
-
-/// scaled_map without a jump.
-template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline CodedReaction<T> coded_scaled_map(const Law &law, const Local<T> &r,
-                                                                double gap, const Tangent<T> &slip,
-                                                                double rho) {
-    const Local<T> tau = scaled_predictor(law, r, gap, slip, rho);
-    Tangent<T> t;
-    for (int i = 0; i < T; ++i)
-        t[i] = tau[i];
-    const double n = tau[T], length = norm<T>(t);
-    // apex, inside or boundary: 0, n or (length + n) / 2. A max with a constant would make g++
-    // split the cases again, hence |.| for max(., 0) and + tiny against 0 / 0.
-    const double half = 0.5 * std::max(0.5 * length + 0.5 * n, n), radius = half + std::abs(half);
-    const double shrink = std::min(length, radius) / (length + tiny);
-    CodedReaction<T> result{tau, length <= -n ? 0.0 : (length <= n ? inside_code(law) : 2.0)};
-    for (int i = 0; i < T; ++i)
-        result.r[i] = law.mu(i) * (shrink * t[i]);
-    result.r[T] = radius;
-    return result;
-}
-
 /// Predictor and corrector in the scaled variables; the projection on the unit cone has a closed
 /// form. Same fixed points as bipotential_map, other iterates (unless M is the identity).
 template <class Law, int T = Law::tangents>
 Reaction<T> scaled_map(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
                        double rho) {
-    const CodedReaction<T> coded = coded_scaled_map(law, r, gap, slip, rho);
-    return {coded.r, branch_of(coded.branch)};
+    const Local<T> tau = scaled_predictor(law, r, gap, slip, rho);
+    const Tangent<T> t = tau.template head<T>();
+    const double n = tau[T], length = norm<T>(t);
+    if (length <= -n)
+        return {Local<T>::Zero(), Branch::open};
+    const bool on_boundary = !(length <= n);
+    const double radius = on_boundary ? 0.5 * length + 0.5 * n : n;
+    const double shrink = on_boundary ? radius / length : 1.0;
+    Reaction<T> result{tau, on_boundary ? Branch::slip : inside(law)};
+    for (int i = 0; i < T; ++i)
+        result.r[i] = law.mu(i) * (shrink * t[i]);
+    result.r[T] = radius;
+    return result;
 }
 
 /// Unit vector along M Q^2 du_t. The dual norm has a kink at du_t = 0; there, the limit for a slip
@@ -167,8 +150,7 @@ Linearisation<T> scaled_jacobian(const Law &law, const Local<T> &r, double gap,
 ///     r_n x_n + (r_n - |x|) |w| + |x| |w| |e_x + e_w|^2 / 2.
 /// r_n - |x| below zero (r outside by rounding) counts as zero.
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline double bipotential_gap(const Law &law, const Local<T> &r, double gap,
-                                                     const Tangent<T> &slip) {
+double bipotential_gap(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip) {
     const Tangent<T> x = in_units_of_ellipse(law, r), w = scaled_slip(law, slip);
     const double x_length = norm<T>(x), w_length = norm<T>(w);
     double chord2 = 0.0;

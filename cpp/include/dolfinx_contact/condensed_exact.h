@@ -66,7 +66,7 @@ Branch project_exactly(const Law &law, Eigen::Matrix<Real, T + 1, 1> &tau) {
         return Branch::open;
     }
     if (std::sqrt(ellipse2) <= tau[T])
-        return branch_of(inside_code(law));
+        return inside(law);
     if constexpr (T > 0) {
         Eigen::Matrix<Real, T, 1> d;
         const Real R = std::max(tau[T], 0.0L) + boundary_root(law, tau, d);

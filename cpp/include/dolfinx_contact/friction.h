@@ -89,11 +89,10 @@ template <class Law> double divisor(const Law &law, int i) {
     return std::max(law.mu(i), min_coefficient);
 }
 
-/// Branch by its number, which vectorised loops compute as a double.
-inline Branch branch_of(double number) { return static_cast<Branch>(static_cast<int>(number)); }
-
-/// Number of the branch of a node inside the cone. Without friction there is no sticking.
-template <class Law> double inside_code(const Law &law) { return law.mu(0) > 0.0 ? 1.0 : 2.0; }
+/// Branch of a node inside the cone. Without friction there is no sticking.
+template <class Law> Branch inside(const Law &law) {
+    return law.mu(0) > 0.0 ? Branch::stick : Branch::slip;
+}
 
 /// Q = P M^-1 scaled to max(Q) = 1, so that Q is the identity exactly when the rule is associated
 /// and the bi-potential gap does not depend on the scale of p.

@@ -10,7 +10,7 @@
 namespace dolfinx_contact {
 /// M^-1 t, the tangential vector in units of the friction ellipse.
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Tangent<T> in_units_of_ellipse(const Law &law, const Local<T> &r) {
+Tangent<T> in_units_of_ellipse(const Law &law, const Local<T> &r) {
     Tangent<T> x;
     for (int i = 0; i < T; ++i)
         x[i] = r[i] / divisor(law, i);
@@ -19,20 +19,9 @@ template <class Law, int T = Law::tangents>
 
 /// Load function f = |M^-1 r_t| - r_n, [dSFMH07, Eq. (1)]; f <= 0 is membership of the cone.
 template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline double load_function(const Law &law, const Local<T> &r) {
+double load_function(const Law &law, const Local<T> &r) {
     return norm<T>(in_units_of_ellipse(law, r)) - r[T];
 }
-
-/// A projection on the cone up to its boundary branch, without a jump, for loops to vectorise.
-template <int T> struct Start {
-    Local<T> r;    ///< the result, unless unfinished
-    double branch; ///< number of its branch, or `unfinished`
-    Local<T> p;    ///< what the equation of the boundary point is made of
-    double scale;
-};
-
-/// In the place of a branch: a boundary point, for which a secular equation is to be solved.
-inline constexpr double unfinished = 3.0;
 
 /// The root of an equation that a law gave: closed form where all b_i and all c_i are the same.
 template <class Law, int T = Law::tangents>
@@ -66,30 +55,6 @@ SecularEquation<T> boundary_equation(const Law &law, const Local<T> &tau) {
     return equation;
 }
 
-/// First part of project, with p = tau / scale.
-template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Start<T> start_projection(const Law &law, const Local<T> &tau) {
-    const PowerOfTwo two = power_of_two(largest<T + 1>(tau));
-    Start<T> start{tau, 0.0, tau, two.up};
-    double sum = 0.0, polar2 = 0.0, ellipse2 = 0.0;
-    for (int i = 0; i <= T; ++i) {
-        start.p[i] *= two.down;
-        sum += start.p[i];
-    }
-    for (int i = 0; i < T; ++i) {
-        const double dual = start.p[i] * divisor(law, i), x = start.p[i] / divisor(law, i);
-        polar2 += dual * dual;
-        ellipse2 += x * x;
-    }
-    const double n = start.p[T], nan = 0.0 * sum; // NaN if tau is not finite, else zero
-    const bool open = std::sqrt(polar2) <= -n;    // tau in the polar cone, the apex included
-    start.branch = open ? 0.0 : (std::sqrt(ellipse2) <= n ? inside_code(law) : unfinished);
-    start.scale += nan;
-    for (int i = 0; i <= T; ++i)
-        start.r[i] = (open ? 0.0 : tau[i]) + nan;
-    return start;
-}
-
 /// Boundary point of a Euclidean projection. R mu_i e_i = p_i (1 - g_i) = p_i R mu_i^2 / d_i with
 /// g_i = (R - p_n) / d_i: of the two, the one with the smaller rounding error.
 template <class Law, int T = Law::tangents>
@@ -106,11 +71,11 @@ Local<T> euclidean_point(const Law &law, const Local<T> &p, double scale,
 }
 
 /// Derivative of a projection on the branches that are not the boundary.
-template <int T> Jacobian<T> derivative_off_boundary(double branch) {
+template <int T> Jacobian<T> derivative_off_boundary(Branch branch) {
     Jacobian<T> J = Jacobian<T>::Zero();
-    if (branch == 1.0)
+    if (branch == Branch::stick)
         J.setIdentity();
-    J(T, T) = branch > 0.0 ? 1.0 : 0.0;
+    J(T, T) = branch == Branch::open ? 0.0 : 1.0;
     return J;
 }
 
@@ -147,16 +112,30 @@ Jacobian<T> boundary_derivative(const Law &law, double tau_n, const SecularRoot<
 /// tau on the branch taken, at a kink one of the limits of derivatives nearby.
 template <class Law, int T = Law::tangents>
 Reaction<T> project(const Law &law, const Local<T> &tau, Jacobian<T> *derivative = nullptr) {
-    const Start<T> start = start_projection(law, tau);
-    if constexpr (T > 0)
-        if (start.branch == unfinished) {
-            const SecularRoot<T> root = root_for(law, boundary_equation(law, start.p));
+    const PowerOfTwo scale = power_of_two(largest<T + 1>(tau));
+    const Local<T> p = tau * scale.down;
+    const double nan = 0.0 * p.sum(); // NaN if tau is not finite, else zero
+    double polar2 = nan, ellipse2 = nan;
+    for (int i = 0; i < T; ++i) {
+        const double dual = p[i] * divisor(law, i), x = p[i] / divisor(law, i);
+        polar2 += dual * dual;
+        ellipse2 += x * x;
+    }
+    Reaction<T> result{tau, inside(law)};
+    if (std::sqrt(polar2) <= -p[T]) { // tau in the polar cone, the apex included
+        result = {Local<T>::Zero(), Branch::open};
+    } else if (!(std::sqrt(ellipse2) <= p[T])) {
+        if constexpr (T == 0) {
+            result.r[T] += nan;
+        } else {
+            const SecularRoot<T> root = root_for(law, boundary_equation(law, p));
             if (derivative != nullptr)
-                *derivative = boundary_derivative(law, start.p[T], root);
-            return {euclidean_point(law, start.p, start.scale, root), Branch::slip};
+                *derivative = boundary_derivative(law, p[T], root);
+            return {euclidean_point(law, p, scale.up + nan, root), Branch::slip};
         }
+    }
     if (derivative != nullptr)
-        *derivative = derivative_off_boundary<T>(start.branch);
-    return {start.r, branch_of(start.branch)};
+        *derivative = derivative_off_boundary<T>(result.branch);
+    return result;
 }
 } // namespace dolfinx_contact

@@ -18,62 +18,38 @@ template <int T> struct State {
     Branch branch;
 };
 
-// Where the boundary branch of a map needs the root of a secular equation, its object gives a
-// Start, and says of which equation, and which boundary point the root stands for. The equations of
-// many nodes are then solved side by side.
-
 struct EuclideanProjection {
-    template <class Law, class S>
-    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
-        return start_projection(law, s.r);
-    }
-    template <class Law, class P> auto equation(const Law &law, const P &p) const {
-        return boundary_equation(law, p);
-    }
-    template <class Law, class P, class Root>
-    auto point(const Law &law, const P &p, double scale, const Root &root) const {
-        return euclidean_point(law, p, scale, root);
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return project(law, s.r);
     }
 };
 
-struct BipotentialMap : EuclideanProjection {
-    template <class Law, class S>
-    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
-        return start_projection(law, predictor(law, s.r, s.gap, s.slip, s.rho_n));
-    }
-};
-
-struct ReturnMap {
-    template <class Law, class S>
-    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
-        return start_return(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
-    }
-    template <class Law, class P> auto equation(const Law &law, const P &p) const {
-        return return_equation(law, p);
-    }
-    template <class Law, class P, class Root>
-    auto point(const Law &law, const P &, double scale, const Root &root) const {
-        return return_point(law, scale, root);
+struct BipotentialMap {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return bipotential_map(law, s.r, s.gap, s.slip, s.rho_n);
     }
 };
 
 struct ScaledMap {
-    template <class Law, class S>
-    [[gnu::always_inline]] auto operator()(const Law &law, const S &s) const {
-        return coded_scaled_map(law, s.r, s.gap, s.slip, s.rho_n);
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return scaled_map(law, s.r, s.gap, s.slip, s.rho_n);
+    }
+};
+
+struct ReturnMap {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
+        return return_map(law, s.r, s.gap, s.slip, s.rho_n, s.rho_t);
     }
 };
 
 struct LoadFunction {
-    template <class Law, class S>
-    [[gnu::always_inline]] double operator()(const Law &law, const S &s) const {
+    template <class Law, class S> double operator()(const Law &law, const S &s) const {
         return load_function(law, s.r);
     }
 };
 
 struct BipotentialGap {
-    template <class Law, class S>
-    [[gnu::always_inline]] double operator()(const Law &law, const S &s) const {
+    template <class Law, class S> double operator()(const Law &law, const S &s) const {
         return bipotential_gap(law, s.r, s.gap, s.slip);
     }
 };

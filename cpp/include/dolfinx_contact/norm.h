@@ -19,8 +19,8 @@ struct PowerOfTwo {
 };
 
 /// The power of two for which magnitude * down lies in [4, 8); less for magnitude < 2^-960, zero
-/// included. Bits of the exponent, no comparison and no library call: loops with it vectorise.
-[[gnu::always_inline]] inline PowerOfTwo power_of_two(double magnitude) {
+/// included. Bits of the exponent, no library call.
+inline PowerOfTwo power_of_two(double magnitude) {
     constexpr std::uint64_t exponent = 0x7ffULL << 52U, twice_bias = 2046ULL << 52U;
     const double within_range = 0.25 * magnitude + 0x1p-1021; // so that up and down are normal
     std::uint64_t bits = 0;
@@ -33,8 +33,7 @@ struct PowerOfTwo {
 }
 
 /// max |v_i|
-template <int N>
-[[gnu::always_inline]] inline double largest(const Eigen::Matrix<double, N, 1> &v) {
+template <int N> double largest(const Eigen::Matrix<double, N, 1> &v) {
     double magnitude = std::abs(v[0]);
     for (int i = 1; i < N; ++i)
         magnitude = std::max(magnitude, std::abs(v[i]));
@@ -42,7 +41,7 @@ template <int N>
 }
 
 /// |v|, for all finite v whose norm is representable.
-template <int T> [[gnu::always_inline]] inline double norm(const Tangent<T> &v) {
+template <int T> double norm(const Tangent<T> &v) {
     if constexpr (T == 0)
         return 0.0;
     else if constexpr (T == 1)

@@ -9,34 +9,11 @@
 #include "slip_rule.h"
 
 namespace dolfinx_contact {
-/// First part of return_map, with p = (z / |z|, R / |z|) and R for the scale.
-template <class Law, int T = Law::tangents>
-[[gnu::always_inline]] inline Start<T> start_return(const Law &law, const Local<T> &r, double gap,
-                                                    const Tangent<T> &slip, double rho_n,
-                                                    double rho_t) {
-    const double n = r[T] - rho_n * gap;
-    Start<T> start{r, 0.0, r, n};
-    Tangent<T> z;
-    for (int i = 0; i < T; ++i) {
-        start.r[i] = r[i] - rho_t * slip[i];
-        z[i] = start.r[i] / divisor(law, i);
-    }
-    start.r[T] = n;
-    const double length = norm<T>(z);
-    const bool open = n <= 0.0;
-    start.branch = open ? 0.0 : (length <= n ? inside_code(law) : unfinished);
-    for (int i = 0; i < T; ++i)
-        start.p[i] = z[i] / (length + tiny);
-    start.p[T] = n / (length + tiny);
-    for (int i = 0; i <= T; ++i)
-        start.r[i] = open ? 0.0 : start.r[i];
-    return start;
-}
-
 /// Secular equation of the boundary branch: a = z / |z|, b_i = 1 / p_i^2, c_i = R / |z|.
 template <class Law, int T = Law::tangents>
-SecularEquation<T> return_equation(const Law &law, const Local<T> &p) {
-    return {p.template head<T>(), inverse_p_squared(law), Tangent<T>::Constant(p[T])};
+SecularEquation<T> return_equation(const Law &law, const Tangent<T> &z, double R) {
+    const double length = norm<T>(z);
+    return {z / length, inverse_p_squared(law), Tangent<T>::Constant(R / length)};
 }
 
 /// Boundary point R (M e, 1).
@@ -81,18 +58,27 @@ Jacobian<T> return_derivative(const Law &law, const SecularEquation<T> &equation
 template <class Law, int T = Law::tangents>
 Reaction<T> return_map(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
                        double rho_n, double rho_t, Jacobian<T> *derivative = nullptr) {
-    const Start<T> start = start_return(law, r, gap, slip, rho_n, rho_t);
-    if constexpr (T > 0)
-        if (start.branch == unfinished) {
-            const SecularEquation<T> equation = return_equation(law, start.p);
-            const SecularRoot<T> root = root_for(law, equation);
-            if (derivative != nullptr)
-                *derivative = return_derivative(law, equation, root);
-            return {return_point(law, start.scale, root), Branch::slip};
-        }
+    const double R = r[T] - rho_n * gap;
+    const Tangent<T> tau = r.template head<T>() - rho_t * slip;
+    Tangent<T> z;
+    for (int i = 0; i < T; ++i)
+        z[i] = tau[i] / divisor(law, i);
+    Reaction<T> result{Local<T>::Zero(), Branch::open};
+    if (!(R <= 0.0)) {
+        if constexpr (T > 0)
+            if (!(norm<T>(z) <= R)) {
+                const SecularEquation<T> equation = return_equation(law, z, R);
+                const SecularRoot<T> root = root_for(law, equation);
+                if (derivative != nullptr)
+                    *derivative = return_derivative(law, equation, root);
+                return {return_point(law, R, root), Branch::slip};
+            }
+        result = {Local<T>::Constant(R), inside(law)};
+        result.r.template head<T>() = tau;
+    }
     if (derivative != nullptr)
-        *derivative = derivative_off_boundary<T>(start.branch);
-    return {start.r, branch_of(start.branch)};
+        *derivative = derivative_off_boundary<T>(result.branch);
+    return result;
 }
 
 /// Derivative by (du_t, x_n), of that by (tau, r_n - rho_n x_n).
