@@ -74,7 +74,7 @@ _HOME = {  # the module of every name
 __all__ = list(_HOME)
 
 
-def __getattr__(name: str):
+def _get(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
@@ -85,6 +85,10 @@ def __getattr__(name: str):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
+
+
+if not TYPE_CHECKING:  # which would take any name for one of ours
+    __getattr__ = _get
 
 
 def __dir__() -> list[str]:

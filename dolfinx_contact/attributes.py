@@ -24,7 +24,7 @@ class Guarded:
     _settable: tuple[str, ...] = ()
     _remedy: str = ""  # what to do instead of setting one of the others
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: object) -> None:
         if name in self._settable or name.startswith("_") or "_made" not in self.__dict__:
             object.__setattr__(self, name, value)
             return

@@ -7,7 +7,9 @@ import from here what moved between releases, and read as present-day DOLFINx ev
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -28,7 +30,7 @@ version: str = dolfinx.__version__
 _ADD = (la.InsertMode if hasattr(la, "InsertMode") else la.ScatterMode).add
 
 
-def functionspace(mesh, element):
+def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
     """Function space from ``(family, degree)`` or ``(family, degree, shape)``, as in DOLFINx >= 0.7."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, element)
@@ -40,13 +42,13 @@ def functionspace(mesh, element):
     return fem.VectorFunctionSpace(mesh, (family, degree), dim=shape[0][0])
 
 
-def interpolation_points(V):
+def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
     """Interpolation points of the element of ``V``: a method before DOLFINx 0.10, a property since."""
     points = V.element.interpolation_points
     return points() if callable(points) else points
 
 
-def model_to_mesh(model, comm, rank, gdim=3):
+def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int = 3) -> Any:
     """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10)."""
     try:
         from dolfinx.io import gmsh
@@ -58,7 +60,7 @@ def model_to_mesh(model, comm, rank, gdim=3):
     return SimpleNamespace(mesh=found[0], cell_tags=found[1], facet_tags=found[2])
 
 
-def partitioner(ranks, nodes_per_cell):
+def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
     """A ``partitioner`` for ``create_box`` and others, from a function of this rank's number of cells.
 
     ``ranks(cells, size)`` gives the rank of each of the ``cells`` that this rank hands in.
@@ -127,19 +129,19 @@ def set_bc_values(array, bcs) -> None:
             fem.set_bc(array, [bc])
 
 
-def assemble_into(x, form) -> None:
+def assemble_into(x: Any, form: Any) -> None:
     """Assemble a linear form into the distributed vector ``x`` and add what ghosts hold to owners."""
     x.array[:] = 0.0
     fem.assemble_vector(x.array, form)
     add_to_owners(x)
 
 
-def add_to_owners(x) -> None:
+def add_to_owners(x: Any) -> None:
     """Add what this rank's ghosts hold in the distributed vector ``x`` to their owners."""
     x.scatter_reverse(_ADD)
 
 
-def petsc_vec(u):
+def petsc_vec(u: fem.Function) -> PETSc.Vec:
     """The PETSc vector of a Function: ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before."""
     return u.x.petsc_vec if hasattr(u.x, "petsc_vec") else u.vector
 

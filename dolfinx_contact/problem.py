@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from collections.abc import Sequence
+from os import PathLike
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -13,6 +16,7 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.collective import agree, raised_together
+from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.problem_input import (
     ProblemOptions,
@@ -30,11 +34,12 @@ from dolfinx_contact.results.record import (
     Counts,
     NotConverged,
     Step,
+    converged,
     counts,
     record,
     warn_of_rounding,
 )
-from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.condensed import KEPT
 from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.trial import may_touch, presses, refined
@@ -79,16 +84,16 @@ class ContactProblem(ProblemOptions):
 
     def __init__(
         self,
-        F,
-        u,
-        contacts,
-        bcs=(),
-        J=None,
-        solver=None,
-        tol=1e-8,
-        petsc_options=None,
-        petsc_options_prefix=None,
-    ):
+        F: Any,
+        u: fem.Function,
+        contacts: Contact | Sequence[Contact],
+        bcs: Sequence[Any] = (),
+        J: Any = None,
+        solver: Solver | None = None,
+        tol: float = 1e-8,
+        petsc_options: dict[str, Any] | None = None,
+        petsc_options_prefix: str | None = None,
+    ) -> None:
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
         comm = u.function_space.mesh.comm
@@ -131,7 +136,7 @@ class ContactProblem(ProblemOptions):
         self._unbind()
         self.body.close()
 
-    def __del__(self):
+    def __del__(self) -> None:
         # On several ranks only the next problem on the mesh can, see ``free_garbage``: Python collects when it likes.
         if "_made" in self.__dict__ and compat.may_free_alone(self.body.comm):
             self._unbind()
@@ -139,7 +144,7 @@ class ContactProblem(ProblemOptions):
     def __enter__(self) -> ContactProblem:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def solve(self) -> Step:
@@ -160,7 +165,7 @@ class ContactProblem(ProblemOptions):
             self._renew_laws()
             step, found = self._search()
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
-            if not self._converged(step.errors, done):
+            if not converged(step.errors, done, self.tol):
                 raise NotConverged(
                     f"not converged: {done}, tol {self.tol:.1e}. Smaller load steps help most often.",
                     done,
@@ -180,7 +185,7 @@ class ContactProblem(ProblemOptions):
         warn_of_rounding(done, self.tol)
         return done
 
-    def save(self, path) -> None:
+    def save(self, path: str | PathLike[str]) -> None:
         """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
 
         The file is replaced in one go, so a run that is killed leaves the last one whole.  Collective.
@@ -192,7 +197,7 @@ class ContactProblem(ProblemOptions):
         past = self._memory.get("past", ())
         checkpoint.save(path, self.body, self.contacts, self._states, past)
 
-    def load(self, path) -> None:
+    def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
 
         On one rank the steps that follow have the same bits as without the interruption.  On several
@@ -226,7 +231,7 @@ class ContactProblem(ProblemOptions):
             body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
         )  # fmt: skip
 
-    def bound(self):
+    def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solver.py``.  Collective."""
         if self._bound_to is not self.solver:
             self._unbind()
@@ -249,11 +254,6 @@ class ContactProblem(ProblemOptions):
             found = self.bound().solve(step)
         step.measure(found.x)
         return step, found
-
-    def _converged(self, errors, record: Step) -> bool:
-        """Whether all errors are at most the tolerance, or nothing is left above rounding."""
-        near = record.forward_error <= self.tol or errors.within(0.0)
-        return near and errors.within(self.tol)
 
     def _unbind(self) -> None:
         """Forget what was set up for a stiffness that has changed.  Collective."""

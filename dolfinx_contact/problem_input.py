@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.checks import positive
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.results.record import Counts
 from dolfinx_contact.solvers.automatic import Automatic
+from dolfinx_contact.solvers.base import Solver
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
@@ -171,16 +174,17 @@ def check_planes(contacts, body) -> None:
 class ProblemOptions(Guarded):
     """Solver and tolerance of a ``ContactProblem``, which may be exchanged between steps; the rest stays."""
 
+    monitor: Callable[[int, float, Counts], object] | None
     _settable = ("monitor", "solver", "tol")
     _remedy = "monitor, solver and tol may be changed between steps; for anything else make a new ContactProblem."
 
     @property
-    def solver(self):
+    def solver(self) -> Solver:
         """The solver's options; another one may be assigned between steps, on all ranks."""
         return self._solver
 
     @solver.setter
-    def solver(self, solver) -> None:
+    def solver(self, solver: Solver | None) -> None:
         self._solver = checked_solver(solver)
 
     @property

@@ -9,6 +9,8 @@ import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import exterior_facet_indices
 from mpi4py import MPI
+from numpy.typing import ArrayLike
+from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import frozen
@@ -60,13 +62,14 @@ class Contact(ContactResults):
         friction, wear: The laws; another one may be assigned between steps, on all ranks.
     """
 
+    rho: np.ndarray | None
     _settable = ("friction", "wear", "rho")
     _remedy = (
         "results are read-only, and what a contact was made of stays; friction and wear may be exchanged between "
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V, facets, plane: RigidPlane, friction: Friction, wear: Wear | None = None):
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: RigidPlane, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
@@ -136,7 +139,7 @@ class Contact(ContactResults):
 
     # -- one iteration -------------------------------------------------------------------------
 
-    def set_metric(self, K) -> None:
+    def set_metric(self, K: PETSc.Mat) -> None:
         """Take ``rho`` from the assembled stiffness: the normal diagonal entry of each node.
 
         Args:
@@ -144,7 +147,7 @@ class Contact(ContactResults):
         """
         self.rho = self.nodal_stiffness(K).normal
 
-    def nodal_stiffness(self, K) -> NodalStiffness:
+    def nodal_stiffness(self, K: PETSc.Mat) -> NodalStiffness:
         """Normal and tangential blocks of the stiffness at the contact nodes, local frame.
 
         Args:
@@ -164,7 +167,7 @@ class Contact(ContactResults):
                 )
         return stiffness
 
-    def add_springs(self, K, springs: np.ndarray) -> None:
+    def add_springs(self, K: PETSc.Mat, springs: np.ndarray) -> None:
         """Add a spring per contact node and local direction to a PETSc matrix.  Collective.
 
         Args:
@@ -173,7 +176,7 @@ class Contact(ContactResults):
         """
         add_to(K, self.points.matrix(springs[:, :, None] * np.eye(self.points.dim)))
 
-    def move(self, u) -> None:
+    def move(self, u: fem.Function | np.ndarray) -> None:
         """Gaps and slip increments for a displacement, from the last converged step on.
 
         Args:
@@ -209,7 +212,7 @@ class Contact(ContactResults):
         slip[self.points.held] = 0.0
         return EPSILON * gap, EPSILON * slip
 
-    def update(self, u, map: str = "bipotential") -> None:
+    def update(self, u: fem.Function | np.ndarray, map: str = "bipotential") -> None:
         """One predictor and corrector for all nodes, with the augmentation parameter ``rho``.
 
         Takes ``u``, computes gaps and slip increments, and replaces ``reaction`` by its predictor's
@@ -269,7 +272,7 @@ class Contact(ContactResults):
         status = np.full_like(self.status, Status.OPEN)
         self.take(reaction=np.zeros_like(self.reaction), status=status)
 
-    def assemble_reaction(self, b) -> None:
+    def assemble_reaction(self, b: PETSc.Vec | np.ndarray) -> None:
         """Add the nodal reactions, forces on the body, to ``b``.
 
         Args:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -60,7 +61,7 @@ class ContactHistory(Guarded):
         """Last converged state and sums as arrays by name; this rank's nodes."""
         return self._last._asdict() | self._sums
 
-    def check_saved(self, saved) -> None:
+    def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size."""
         for name, array in ContactHistory.save(self).items():
             if name not in saved or saved[name].shape != array.shape:
@@ -70,7 +71,7 @@ class ContactHistory(Guarded):
                     "for another mesh or another contact."
                 )
 
-    def load(self, saved) -> None:
+    def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank."""
         self._last = State(*(frozen(np.array(saved[name])) for name in State._fields))
         self._sums = {name: frozen(np.array(saved[name])) for name in SUMS}

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
@@ -60,7 +62,7 @@ class ContactLaws(ContactHistory):
         """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
         return super().save() | self._laws() | {"plane": self.plane.displacement}
 
-    def check_saved(self, saved) -> None:
+    def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size, or another law or plane was saved."""
         super().check_saved(saved)
         for name, array in self._laws().items():
@@ -71,7 +73,7 @@ class ContactLaws(ContactHistory):
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
-    def load(self, saved) -> None:
+    def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         super().load(saved)
         self.plane.displacement = saved["plane"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import Guarded, frozen
 
@@ -53,11 +54,11 @@ class RigidPlane(Guarded):
     _settable = ("displacement",)
     _remedy = "make a new RigidPlane and a new Contact; plane.displacement = ... moves a plane."
 
-    def __init__(self, point, normal, axis=None):
+    def __init__(self, point: ArrayLike, normal: ArrayLike, axis: ArrayLike | None = None) -> None:
         self.point = frozen(_vector("point", point))
         size = self.point.size
         self.normal = frozen(_unit("normal", normal, size))
-        self.axis = None
+        self.axis: np.ndarray | None = None
         self._displacement = frozen(np.zeros(size))
         if axis is not None:
             along = _unit("axis", axis, size)
@@ -77,7 +78,7 @@ class RigidPlane(Guarded):
         return self._displacement
 
     @displacement.setter
-    def displacement(self, value):
+    def displacement(self, value: ArrayLike) -> None:
         self._displacement = frozen(_vector("plane.displacement", value, self.point.size))
 
     @property
@@ -97,7 +98,7 @@ class RigidPlane(Guarded):
             t1 /= np.linalg.norm(t1)
         return np.array([t1, np.cross(n, t1), n])
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()
         return (
             f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis})"

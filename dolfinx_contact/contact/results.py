@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.contact import fields
@@ -69,11 +70,11 @@ class ContactResults(ContactLaws):
         """Normal reaction over nodal area, ``shape=(n,)``, force per area.  Collective at first."""
         return self.reaction[:, -1] / self.area
 
-    def function(self, values, name: str = "f", elsewhere: float = 0.0):
+    def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
         """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
         return fields.scalar(self.V, self.nodes, values, name, elsewhere)
 
-    def reaction_function(self):
+    def reaction_function(self) -> fem.Function:
         """Nodal reactions in global components as a Function on ``V``, zero elsewhere."""
         function = fem.Function(self.V, name="reaction")
         self.points.add_forces(self.reaction, function.x.array[: self.points.size])

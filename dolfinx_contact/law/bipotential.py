@@ -8,12 +8,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.friction_cone import as_nodes
 
 
-def bipotential_gap(r, gap, slip_increment, friction: Friction):
+def bipotential_gap(
+    r: ArrayLike, gap: ArrayLike, slip_increment: ArrayLike, friction: Friction
+) -> np.ndarray:
     """Gap ``b_c(-du, r) + du . r`` of the bi-potential of [dSFMH07, Section 1].
 
     For a reaction in the friction cone and no penetration it is

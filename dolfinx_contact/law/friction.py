@@ -9,6 +9,7 @@ anisotrope", 18e Congrès Français de Mécanique, 2007.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
 
@@ -68,9 +69,15 @@ class Friction:
         associated: ``p`` is proportional to ``mu`` everywhere.
     """
 
+    mu: np.ndarray
+    p: np.ndarray
+    axes: np.ndarray | None
+    frictionless: bool
+    isotropic: bool
+    associated: bool
     __slots__ = ("mu", "p", "axes", "frictionless", "isotropic", "associated", "_laws")
 
-    def __init__(self, mu, p=None, k=None, *, axes=None):
+    def __init__(self, mu: ArrayLike, p: ArrayLike | None = None, k: float | None = None, *, axes: ArrayLike | None = None) -> None:  # fmt: skip
         given = f"mu={mu!r}, p={p!r}, k={k!r}"
         mu_given = mu
         mu = _coefficients("mu", mu)
@@ -127,16 +134,17 @@ class Friction:
         set_(self, "isotropic", self.associated and bool(np.all(mu[..., 0] == mu[..., 1])))
         set_(self, "_laws", {})
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"Friction is immutable: make a new one to change {name}")
 
-    __delattr__ = __setattr__
+    def __delattr__(self, name: str) -> None:
+        self.__setattr__(name, None)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         p = np.where(self.mu > 0, self.p, 1.0)
         return _restore, (self.mu, p, self.axes)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         if self.mu.ndim == 2:
             return f"<Friction with coefficients for {len(self.mu)} nodes>"
         mu, p = (tuple(map(float, array)) for array in (self.mu, self.p))

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction
 
@@ -41,7 +42,7 @@ def as_nodes(name: str, value, components: int | None, nodes: int | None = None)
     return array
 
 
-def project_cone(tau, mu):
+def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
     """Euclidean projection on the friction cone ``|M^-1 r_t| <= r_n``, the corrector of
     [dSFMH07, Section 2].
 
@@ -67,7 +68,7 @@ def project_cone(tau, mu):
         return law.project(tau / scale)[0] * scale
 
 
-def load_function(r, mu):
+def load_function(r: ArrayLike, mu: ArrayLike) -> np.ndarray:
     """Load function ``f = |M^-1 r_t| - r_n`` of [dSFMH07, Eq. (1)]: negative inside the friction
     cone, zero on its boundary.
 

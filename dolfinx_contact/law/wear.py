@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import Guarded, frozen
 
@@ -25,7 +26,7 @@ class Wear(Guarded):
 
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
 
-    def __init__(self, coefficient):
+    def __init__(self, coefficient: ArrayLike) -> None:
         array = np.asarray(coefficient)
         real = array.dtype.kind in "iuf" and array.shape in ((), (1,), (2,))
         if not real or not np.isfinite(array).all() or (array < 0).any():
@@ -40,5 +41,5 @@ class Wear(Guarded):
         """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length."""
         return (self.coefficient * work).sum(axis=1) / area
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Wear({self.coefficient.tolist()})"

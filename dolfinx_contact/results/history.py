@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import csv
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import ArrayLike
 
 from dolfinx_contact.collective import raised_together
+from dolfinx_contact.results.record import Step
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
 
 
 class History:
@@ -36,7 +43,14 @@ class History:
         positions: Of the tracked nodes, ``shape=(m, 3)``, global frame.
     """
 
-    def __init__(self, problem, path=None, points=(), contact: int = 0, resume: int = 0):
+    def __init__(
+        self,
+        problem: ContactProblem,
+        path: str | PathLike[str] | None = None,
+        points: ArrayLike = (),
+        contact: int = 0,
+        resume: int = 0,
+    ) -> None:
         self.problem, self.comm = problem, problem.body.comm
         with raised_together(self.comm):
             self.path = None if path is None else Path(path)
@@ -45,17 +59,17 @@ class History:
             if not isinstance(resume, (int, np.integer)) or resume < 0:
                 raise ValueError(f"resume must be a number of rows, 0 or more, got {resume!r}.")
         self._tracked = problem.contacts[contact]
-        points, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
-        if points.size and (points.ndim != 2 or points.shape[1] != gdim):
-            raise ValueError(f"points must have shape (m, {gdim}), got {points.shape}.")
-        self._nodes = [self._nearest(point) for point in points]
+        at, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
+        if at.size and (at.ndim != 2 or at.shape[1] != gdim):
+            raise ValueError(f"points must have shape (m, {gdim}), got {at.shape}.")
+        self._nodes = [self._nearest(point) for point in at]
         self.positions = np.array([self._at(node, self._tracked.x) for node in self._nodes])
-        self.rows = self._read(resume) if resume else []
+        self.rows: list[dict[str, Any]] = self._read(resume) if resume else []
         self._written = 0
         if self.rows:
             self._write()
 
-    def record(self, step, **columns) -> dict:
+    def record(self, step: Step, **columns: object) -> dict[str, Any]:
         """Append a row for ``step``, the record of the last solve; ``columns`` come first.  Collective.
 
         A row that could not be written, on a full disk for instance, is kept and written with the next one.

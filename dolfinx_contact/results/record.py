@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class Step:
     seconds: float
     counts: Counts
     solver: str
-    tried: tuple = ()
+    tried: tuple[Any, ...] = ()
 
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
@@ -72,11 +72,13 @@ class NotConverged(RuntimeError):
         reactions: Of each contact in that state, local frame.
     """
 
-    def __init__(self, message: str, step: Step, displacement, reactions):
+    def __init__(
+        self, message: str, step: Step, displacement: np.ndarray, reactions: list[np.ndarray]
+    ) -> None:
         super().__init__(message)
         self.step, self.displacement, self.reactions = step, displacement, reactions
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         # An exception is taken apart into its message alone, and could not be put together on the other side.
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
@@ -114,6 +116,12 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         solver=found.chosen,
         tried=found.tried,
     )
+
+
+def converged(errors, step: Step, tol: float) -> bool:
+    """Whether all errors are at most the tolerance, or nothing is left above rounding."""
+    near = step.forward_error <= tol or errors.within(0.0)
+    return near and errors.within(tol)
 
 
 def warn_of_rounding(step: Step, tol: float) -> None:

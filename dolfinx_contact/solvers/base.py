@@ -8,7 +8,7 @@ everything set up for the body's present stiffness, and is thrown away when the 
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class SolverResult(NamedTuple):
 class BoundSolver(Protocol):
     """A solver bound to a body and its contacts."""
 
-    def solve(self, step) -> SolverResult:
+    def solve(self, step: Any) -> SolverResult:
         """Search a displacement whose errors are at most ``step.tol``.  Collective."""
 
     def destroy(self) -> None:
@@ -48,7 +48,7 @@ class BoundSolver(Protocol):
 class Solver(Protocol):
     """Options of a solver; one object may be used for many problems."""
 
-    def bind(self, body, contacts, stiffness, memory) -> BoundSolver:
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """Set up for a body with its assembled stiffness.  Collective.
 
         Args:

@@ -16,7 +16,8 @@ from dolfinx_contact.collective import raised_together
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
-from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged, principal_axes
+from dolfinx_contact.solvers.condensed_input import principal_axes
+from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged
 
 KEPT = 64  # earlier steps: more than a cycle has
 

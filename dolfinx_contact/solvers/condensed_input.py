@@ -51,3 +51,13 @@ def checked_problem(q, W, friction, r0) -> tuple:
         if r0.size != q.size:
             raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
     return q, W, friction, r0
+
+
+def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
+    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
+    turns = np.tile(np.eye(dim), (nodes, 1, 1))
+    if friction.axes is not None:
+        cos, sin = friction.axes.T
+        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
+        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
+    return turns

@@ -7,13 +7,18 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.solvers.condensed_input import checked_problem
+from dolfinx_contact.solvers.condensed_input import checked_problem, principal_axes
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.base import BoundSolver
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,7 @@ class CondensedNotConverged(RuntimeError):
         tried: What was tried, a tuple of ``Attempt``.
     """
 
-    def __init__(self, best: CondensedResult):
+    def __init__(self, best: CondensedResult) -> None:
         self.best, self.tried = best, best.tried
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
         advice = (
@@ -89,7 +94,7 @@ class CondensedNotConverged(RuntimeError):
             + advice
         )
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         return type(self), (self.best,)
 
 
@@ -115,7 +120,7 @@ class CondensedNewton:
         newton_iterations: int = 60,
         max_seconds: float = math.inf,
         fallbacks: bool = True,
-    ):
+    ) -> None:
         self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol, finite=True)
         self.max_iterations = int(positive("max_iterations", max_iterations, whole=True))
         self.newton_iterations = int(positive("newton_iterations", newton_iterations, whole=True))
@@ -176,7 +181,7 @@ class CondensedNewton:
             )
         return result
 
-    def bind(self, body, contacts, stiffness, memory):
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``solver.Solver``."""
         from dolfinx_contact.solvers.condensed import (
             CondensedBody,  # arrays alone do without DOLFINx
@@ -186,7 +191,13 @@ class CondensedNewton:
 
 
 def solve_condensed(
-    W, q, friction, solver=None, tol: float = 1e-8, r0=None, max_seconds=None
+    W: Any,
+    q: ArrayLike,
+    friction: Friction | ArrayLike,
+    solver: CondensedNewton | None = None,
+    tol: float = 1e-8,
+    r0: ArrayLike | None = None,
+    max_seconds: float | None = None,
 ) -> CondensedResult:
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
@@ -275,16 +286,6 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
         except CondensedNotConverged:
             break
     return found
-
-
-def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
-    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
-    turns = np.tile(np.eye(dim), (nodes, 1, 1))
-    if friction.axes is not None:
-        cos, sin = friction.axes.T
-        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
-        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
-    return turns
 
 
 def _turned_back(result: CondensedResult, turns: np.ndarray) -> CondensedResult:

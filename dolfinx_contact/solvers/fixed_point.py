@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dolfinx_contact.checks import positive
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.anderson import Anderson
-from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, SolverResult
 from dolfinx_contact.solvers.newton_krylov import search_by_newton
 from dolfinx_contact.solvers.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
@@ -65,7 +66,7 @@ class FixedPoint:
     max_iterations: int = 400
     max_seconds: float = math.inf
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.map not in PARAMETERS:
             raise ValueError(f"map must be one of {', '.join(PARAMETERS)}, got {self.map!r}.")
         if self.rho is not None:
@@ -74,7 +75,7 @@ class FixedPoint:
         positive("max_iterations", self.max_iterations, whole=True)
         positive("max_seconds", self.max_seconds)
 
-    def bind(self, body, contacts, stiffness, memory):
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``Solver``."""
         return BoundFixedPoint(self, body, contacts, stiffness)
 

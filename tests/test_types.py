@@ -1,0 +1,89 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Types for those who check theirs: a user's script passes ``mypy --strict``, and a mistake in it does not."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import dolfinx_contact as dc
+
+mypy = pytest.importorskip("mypy")
+pytestmark = [
+    pytest.mark.slow,  # mypy reads NumPy's types, some 20 seconds
+    pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts programs of its own"),
+]
+SCRIPT = Path(__file__).with_name("user_script.py")
+
+# What DOLFINx and others lack is theirs; an editable install is found by its path, as source that is not checked.
+CONFIG = """[mypy]
+strict = true
+[mypy-dolfinx.*,ufl.*,petsc4py.*,mpi4py.*,scipy.*]
+ignore_missing_imports = true
+follow_imports = skip
+[mypy-dolfinx_contact.*]
+follow_imports = silent
+"""
+MISTAKES = {
+    "dc.Fricton(0.3)": "attr-defined",
+    "dc.Friction('0.3', k='associated')": "arg-type",
+    "dc.RigidPlane((0, 0, 0))": "call-arg",
+    "problem.solve().eror": "attr-defined",
+    "contact.reaction.upper()": "attr-defined",
+}
+KNOWN = {
+    "contact.reaction": "ndarray",
+    "contact.friction": "Friction",
+    "contact.plane.displacement": "ndarray",
+    "problem.solve()": "Step",
+    "problem.solve().error": "float",
+    "problem.solve().counts": "Counts",
+    "problem.monitor": "Counts",
+    "dc.solve_condensed": "CondensedResult",
+    "dc.History(problem).rows": "dict",
+    "dc.__version__": "str",
+}
+
+
+def checked(folder, text):
+    """What ``mypy --strict`` says of a script, a list of lines."""
+    (folder / "mypy.ini").write_text(CONFIG)
+    (folder / "script.py").write_text(text)
+    result = subprocess.run(
+        [sys.executable, "-m", "mypy", "--no-error-summary", "script.py"],
+        cwd=folder,
+        env={"MYPYPATH": str(Path(dc.__file__).parents[1]), "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+    )
+    assert not result.stderr, result.stderr
+    return result.stdout.splitlines()
+
+
+def test_a_users_script_is_well_typed(tmp_path):
+    """Nothing of ours lacks a type; each mistake is one of its own; and what users read most is known, not Any."""
+    script = SCRIPT.read_text()
+    start = len(script.splitlines()) + 2
+    body = [*MISTAKES, *(f"reveal_type({name})" for name in KNOWN)]
+    tail = "\ndef f(problem: dc.ContactProblem, contact: dc.Contact) -> None:\n    "
+    said = checked(tmp_path, script + tail + "\n    ".join(body) + "\n")
+    by_line = {}
+    for line in said:
+        by_line.setdefault(int(line.split(":")[1]) - start, []).append(line)
+    assert sorted(by_line) == list(range(1, len(body) + 1)), said
+    for k, kind in enumerate(MISTAKES.values(), start=1):
+        assert f"[{kind}]" in by_line[k][0], by_line[k]
+    for k, kind in enumerate(KNOWN.values(), start=len(MISTAKES) + 1):
+        assert kind in by_line[k][0] and '"Any"' not in by_line[k][0], by_line[k]
+
+
+def test_a_users_script_runs(tmp_path):
+    """The script is one that works."""
+    result = subprocess.run(
+        [sys.executable, str(SCRIPT), str(tmp_path)], capture_output=True, text=True
+    )
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout.splitlines()[-1]) < 1e-9
