@@ -4,8 +4,10 @@
 // The condensed contact problem on NumPy arrays. The GIL is released while it is solved.
 #include <dolfinx_contact/condensed_solution.h>
 
+#include <chrono>
 #include <memory>
 #include <optional>
+#include <pybind11/functional.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -55,6 +57,21 @@ template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, I
         rule.emplace_back(p_values.segment<T>(T * i));
     }
     return make_law<T>(coefficients, rule, uniform);
+}
+
+/// Lets Python answer signals, Ctrl-C among them, every 50 ms; what their handlers raise ends the
+/// search.
+std::function<void()> heed_signals() {
+    using Clock = std::chrono::steady_clock;
+    return [last = Clock::now()]() mutable {
+        const auto now = Clock::now();
+        if (now - last < std::chrono::milliseconds(50))
+            return;
+        last = now;
+        const py::gil_scoped_acquire acquire;
+        if (PyErr_CheckSignals() != 0)
+            throw py::error_already_set();
+    };
 }
 
 Solution solve_any(const Operator &op, const Array &mu, const std::optional<Array> &p,
@@ -141,12 +158,14 @@ void bind_condensed(py::module_ &m) {
                const std::optional<Array> &stiffness,
                const std::optional<Array> &tangential_stiffness,
                const std::optional<Array> &tied_stiffness, double external, double max_seconds,
-               int max_iterations, int newton_iterations, bool fallbacks) {
+               int max_iterations, int newton_iterations, bool fallbacks,
+               const std::optional<std::function<void(double, const std::array<int, 3> &)>>
+                   &monitor) {
                 const Scales scales{optional(stiffness), optional(tangential_stiffness),
                                     optional(tied_stiffness), external};
                 return solve_any(op, mu, p, q, starts,
                                  {tol, slip_tol, max_seconds, max_iterations, newton_iterations,
-                                  fallbacks, scales});
+                                  fallbacks, scales, heed_signals(), monitor.value_or(nullptr)});
             },
             py::arg("mu"), py::arg("p"), py::arg("q"), py::arg("starts"), py::arg("tol"),
             py::arg("slip_tol"), py::arg("stiffness") = py::none(),
@@ -154,5 +173,5 @@ void bind_condensed(py::module_ &m) {
             py::arg("external") = 0.0,
             py::arg("max_seconds") = std::numeric_limits<double>::infinity(),
             py::arg("max_iterations") = 200'000, py::arg("newton_iterations") = 60,
-            py::arg("fallbacks") = true);
+            py::arg("fallbacks") = true, py::arg("monitor") = py::none());
 }

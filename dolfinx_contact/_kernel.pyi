@@ -345,6 +345,10 @@ class CondensedOperator:
         max_iterations: typing.SupportsInt | typing.SupportsIndex = 200000,
         newton_iterations: typing.SupportsInt | typing.SupportsIndex = 60,
         fallbacks: bool = True,
+        monitor: collections.abc.Callable[
+            [float, typing.Annotated[list[int], "FixedSize(3)"]], None
+        ]
+        | None = None,
     ) -> CondensedSolution: ...
     @property
     def dim(self) -> int: ...

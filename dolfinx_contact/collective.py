@@ -19,7 +19,7 @@ def raised_together(comm):
     error = None
     try:
         yield
-    except Exception as caught:  # whatever it is, the other ranks must not be left waiting
+    except BaseException as caught:  # Ctrl-C, too: the other ranks must not be left waiting
         error = caught
     first = comm.allreduce(comm.rank if error is not None else comm.size, op=MPI.MIN)
     if first == comm.size:
@@ -28,6 +28,36 @@ def raised_together(comm):
     if error is not None:
         raise error
     raise kind(f"{message} (found on rank {first})")
+
+
+def by_first_rank(comm, work, tell=None):
+    """What ``work(monitor)`` returns on rank 0, or its error, on all ranks.
+
+    Every ``line`` that it gives its monitor becomes ``tell(*line)`` on all ranks, whose error ends the work; without
+    ``tell`` it has no monitor.  Collective.
+    """
+    failed = result = None
+
+    def monitor(*line) -> None:
+        comm.bcast(line, root=0)
+        tell(*line)
+
+    if comm.rank == 0:
+        try:
+            result = work(monitor if tell else None)
+        except BaseException as caught:
+            failed = caught
+        if tell:
+            comm.bcast(None, root=0)
+    while comm.rank > 0 and tell and (line := comm.bcast(None, root=0)) is not None:
+        try:
+            tell(*line)
+        except BaseException as caught:  # raised on rank 0, too
+            failed = caught
+    with raised_together(comm):
+        if failed is not None:
+            raise failed
+    return comm.bcast(result, root=0)
 
 
 def agree(comm, **values) -> None:

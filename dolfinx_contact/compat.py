@@ -120,6 +120,11 @@ def bc_dofs(bc, size: int):
     return np.asarray(dofs)[np.asarray(dofs) < size]
 
 
+def bc_constants(bcs) -> list:
+    """The values of conditions that are constants, each with a ``value``; those that are Functions have none."""
+    return [bc.g for bc in bcs if hasattr(bc.g, "value") and not hasattr(bc.g, "x")]
+
+
 def set_bc_values(array, bcs) -> None:
     """Write boundary values into a local array, ghosts included: ``bc.set`` in DOLFINx >= 0.9."""
     for bc in bcs:

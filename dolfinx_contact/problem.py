@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     ProblemOptions,
     check_alive,
@@ -42,12 +43,9 @@ from dolfinx_contact.results.record import (
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.condensed import KEPT
 from dolfinx_contact.step import LoadStep, nodal_stiffness
-from dolfinx_contact.trial import may_touch, presses, refined
+from dolfinx_contact.trial import without_reactions
 
 LOG = logging.getLogger("dolfinx_contact")
-
-
-NOTHING = "none: nothing touches"
 
 
 class ContactProblem(ProblemOptions):
@@ -67,8 +65,9 @@ class ContactProblem(ProblemOptions):
         petsc_options_prefix: Their prefix.
 
     Attributes:
-        monitor: None, or a function ``f(iteration, error, counts)`` that is called on all ranks whenever a
-            solver evaluates the residual of the whole body, with the largest error and ``Counts``.
+        monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
+            in the step, largest error and ``Counts``.  Of the condensed problem's iterates (steps of Newton's method,
+            sweeps) the error is the residual over the largest reaction; then come the body's own errors.
 
     ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0.
 
@@ -174,7 +173,11 @@ class ContactProblem(ProblemOptions):
                 )
         except BaseException as failure:
             self._log(f"step failed: {type(failure).__name__}: {failure}")
+            if not isinstance(failure, Exception) or isinstance(failure, PETSc.Error):
+                self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
+                self.body.forget()
             self._restore()
+            raise_interrupt(failure)
             raise
         self._states = [found.x, self._states[0]]
         self._show(found.x)
@@ -242,17 +245,11 @@ class ContactProblem(ProblemOptions):
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
-        with stage("contact: elastic solve"):
-            trial = self.body.free_state(step.b, rough=True)
-            if not (self.body.known.exact or presses(self.body, self.contacts, trial)):
-                trial = self.body.free_state(step.b)  # whether anything touches takes all digits
-        if not may_touch(self.body, self.contacts, trial):
-            trial = refined(self.body, step, trial)
-            if step.errors.within(self.tol):
-                return step, SolverResult(trial, 0, 0.0, NOTHING)
-        with stage("contact: iterations"):
-            found = self.bound().solve(step)
-        step.measure(found.x)
+        found = without_reactions(self.body, self.contacts, step)
+        if found is None:
+            with stage("contact: iterations"):
+                found = self.bound().solve(step)
+            step.measure(found.x)
         return step, found
 
     def _unbind(self) -> None:

@@ -16,7 +16,7 @@ from dolfinx_contact.error import (
     contact_rounding,
 )
 from dolfinx_contact.law.maps import ReturnMap
-from dolfinx_contact.results.record import counts
+from dolfinx_contact.results.record import Counts, counts
 
 
 def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
@@ -51,7 +51,7 @@ class LoadStep:
         self.b, self.external, self.tol = b, external, tol
         self._starts, self._unit, self._monitor = starts, unit, monitor
         self._before = None  # reactions of the state judged before
-        self._evaluations = 0
+        self._told = 0
         self._known = None  # a displacement, and the forces b - K x that it leaves
         self._measured = None  # displacement and contact states whose errors were measured with F
 
@@ -161,13 +161,21 @@ class LoadStep:
         self._judge(x, -self.body.residual(x))
         return self.errors
 
+    @property
+    def monitored(self) -> bool:
+        """Whether the user wants to be told."""
+        return self._monitor is not None
+
+    def tell(self, error: float, nodes) -> None:
+        """Tell the user's monitor the error of another iterate, and its nodes by status.  Collective."""
+        with raised_together(self.body.comm):
+            self._monitor(self._told, error, Counts(*nodes))
+        self._told += 1
+
     def _tell(self) -> None:
-        """Tell the user's monitor the errors of another state."""
-        if self._monitor is not None:
-            now = counts(self.body, self.contacts)
-            with raised_together(self.body.comm):
-                self._monitor(self._evaluations, self.errors.largest, now)
-        self._evaluations += 1
+        """Tell the errors of another state of the body."""
+        if self.monitored:
+            self.tell(self.errors.largest, counts(self.body, self.contacts))
 
     def _asked(self, forces: np.ndarray):
         """The contacts, each with the reactions that balance the forces at its nodes."""

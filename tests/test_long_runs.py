@@ -8,12 +8,12 @@ A test that hangs here means that one rank raised and another waits for it.
 import gc
 import logging
 import multiprocessing
-import signal
 
 import numpy as np
 import pytest
 import scenes
-from petsc4py import PETSc
+import ufl
+from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
 
@@ -65,7 +65,8 @@ def memory() -> float:
     ],
 )
 def test_problems_leave_nothing_behind(end, solver):
-    """Two hundred problems of 735 unknowns, closed or just dropped, take no more memory than one."""
+    """Problems of 735 unknowns, closed or just dropped, two hundred on one rank, take no more memory than one: 50 MB for
+    a thousand."""
     scene = scenes.block(cells=(6, 6, 4), solver=solver)
     assert scene.V.dofmap.index_map.size_global * 3 == 735
     scene.move_top(0.001, 0.0, -0.01)
@@ -79,10 +80,32 @@ def test_problems_leave_nothing_behind(end, solver):
     for _ in range(10):
         once()
     gc.collect()
-    before = memory()
-    for _ in range(200):
+    before, count = memory(), 200 if COMM.size == 1 else 40
+    for _ in range(count):
         once()
-    assert memory() - before < 10.0
+    assert memory() - before < 0.05 * count
+
+
+@pytest.mark.slow
+def test_meshes_leave_nothing_behind():
+    """A run that makes a mesh for each problem and closes it, as the class asks for on several ranks, does not grow."""
+
+    def once():
+        scene = scenes.block(cells=(2, 2, 2))
+        scene.move_top(0.001, 0.0, -0.01)
+        with scene.problem:
+            scene.problem.solve()
+
+    for _ in range(10):
+        once()
+    gc.collect()
+    before = memory()
+    for _ in range(40):
+        once()
+    gc.collect()
+    assert (
+        memory() - before < 8.0
+    )  # 20 MB that PETSc and DOLFINx were seen to keep of a hundred meshes
 
 
 @pytest.mark.slow
@@ -230,6 +253,45 @@ def test_what_differs_between_ranks_from_a_step_on_is_refused(what):
     scene.problem.solve()
 
 
+@SEVERAL
+@pytest.mark.parametrize("kind", [np.array, "constant"])
+def test_boundary_values_that_differ_between_ranks_are_refused(kind):
+    """A constant that a condition holds is compared as those of F are, also when it is changed between steps."""
+    scene = scenes.block(cells=(2, 2, 2))
+    top = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[2], 0.6))
+    value = np.array([0.0, 0.0, -0.01]) - (kind != "constant") * 1e-3 * LAST
+    value = fem.Constant(scene.mesh, value) if kind == "constant" else value
+    held = fem.dirichletbc(value, fem.locate_dofs_topological(scene.V, 2, top), scene.V)
+    problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], bcs=[held])
+    if kind == "constant":
+        problem.solve()
+        value.value[0] = 1e-3 * LAST
+    with pytest.raises(ValueError, match="boundary condition differs between ranks"):
+        problem.solve()
+    if kind == "constant":
+        value.value[0] = 1e-3
+        problem.solve()
+
+
+@SEVERAL
+def test_of_functions_the_owners_values_count():
+    """Ghosts that were not brought up to date, of boundary values, loads and moduli, change nothing."""
+    found = []
+    for stale in (False, True):
+        scene = scenes.block(cells=(3, 3, 2))
+        load = fem.Function(scene.V)
+        load.x.array[:] = np.tile((100.0, 0.0, 0.0), load.x.array.size // 3)
+        F = scene.F - ufl.inner(load, ufl.TestFunction(scene.V)) * ufl.dx
+        scene.problem = dc.ContactProblem(F, scene.u, [scene.contact], bcs=scene.bcs, tol=1e-10)
+        scene.move_top(0.001, 0.0, -0.01)
+        if stale:
+            owned = scene.problem.body.size
+            load.x.array[owned:] = scene.held.x.array[owned:] = 1e3 * (1 + COMM.rank)
+        scene.problem.solve()
+        found.append(scenes.gathered(scene.contact)[1])
+    assert np.allclose(*found, atol=1e-9 * np.abs(found[0]).max())
+
+
 @pytest.mark.parametrize("solver", [None, dc.CondensedNewton(), dc.FixedPoint()])
 def test_every_solver_calls_the_monitor(solver):
     """With the errors of the states it judges, the last of which is that of the record."""
@@ -307,30 +369,3 @@ def test_misspelt_petsc_options_are_warned_of():
     warned(scene.problem.solve, r"petsc_options \['ksp_max_itt'\] were not read")
     scene.modulus.value = 200e3
     scene.problem.solve()
-
-
-@pytest.mark.skipif(COMM.size > 1, reason="a signal reaches one process")
-def test_an_interrupt_ends_an_iterative_solve_at_once():
-    """Ctrl-C during a solve that would go on for hours is answered, and the last state is in place."""
-    options = {
-        "ksp_type": "richardson",
-        "ksp_richardson_scale": 1e-15,
-        "ksp_max_it": 10**8,
-        "pc_type": "jacobi",
-    }
-    scene = scenes.block(petsc_options=options, solver=dc.FixedPoint())
-    scene.move_top(0, 0, -0.01)
-
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, 1.0)
-    try:
-        # PETSc 3.18 lets what a callback raises through, 3.25 raises an error of its own from it.
-        with pytest.raises((KeyboardInterrupt, PETSc.Error)):
-            scene.problem.solve()
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-    assert not scene.u.x.array.any()

@@ -270,6 +270,33 @@ TEST(Condensed, caps) {
     EXPECT_EQ(found.tried.size(), 1u);
 }
 
+// Whoever watches is told every iterate, and asked in every iteration whether to go on.
+TEST(Condensed, watched) {
+    Random random(9);
+    const auto problem = random_problem<2>(random, 6, 18, {0.9, 0.3}, {0.01, 1.0});
+    const Solution plain = problem.solve();
+    Options options;
+    int told = 0, asked = 0;
+    double last = 1.0;
+    options.monitor = [&](double error, const std::array<int, 3> &counts) {
+        EXPECT_EQ(counts[0] + counts[1] + counts[2], 6);
+        last = error;
+        ++told;
+    };
+    options.heed = [&] { ++asked; };
+    const Solution found = problem.solve(options);
+    EXPECT_TRUE((found.reaction.array() == plain.reaction.array()).all());
+    EXPECT_GE(told, found.iterations);
+    EXPECT_GE(asked, found.iterations);
+    EXPECT_LT(last, 1e-6);
+    options.heed = [&] {
+        if (--asked == 0)
+            throw std::runtime_error("enough");
+    };
+    asked = 3;
+    EXPECT_THROW(problem.solve(options), std::runtime_error);
+}
+
 // Nothing depends on time, addresses or the state of a random generator.
 TEST(Condensed, the_same_bits_twice) {
     Random random(13);

@@ -44,16 +44,22 @@ def check_dilation(body) -> None:
         )
 
 
-def check_constants(constants, comm) -> None:
-    """Raise a ``ValueError`` if a constant of a form differs between ranks, which would solve different problems."""
-    mine = [np.array(constant.value) for constant in constants]
+def agree_on_values(parameters, comm) -> None:
+    """Raise a ``ValueError`` if a constant of forms or conditions differs between ranks: different problems.
+
+    Of Functions the values of the ranks that own them count: ghosts are brought up to date.  Collective.
+    """
+    for function in parameters:
+        if hasattr(function, "x"):
+            function.x.scatter_forward()
+    mine = [np.array(each.value) for each in parameters if not hasattr(each, "x")]
     first = comm.bcast(mine, root=0)
     with raised_together(comm):
         for here, there in zip(mine, first):
             if not np.array_equal(here, there, equal_nan=True):
                 raise ValueError(
-                    f"a constant in F differs between ranks: here {here.tolist()}, on rank 0 {there.tolist()}. Give the "
-                    "same on all."
+                    f"a constant in F or a boundary condition differs between ranks: here {here.tolist()}, on rank 0 "
+                    f"{there.tolist()}. Give the same on all."
                 )
 
 

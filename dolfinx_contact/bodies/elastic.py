@@ -16,7 +16,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.checks import (
-    check_constants,
+    agree_on_values,
     check_diagonal,
     check_dilation,
     warn_of_unread,
@@ -57,7 +57,6 @@ class ElasticBody(OverRanks):
         self._stiffness_form = fem.form(derivative)
         self._parameters = [*derivative.coefficients(), *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
-        self._constants = list(F.constants())
         self._work = fem.Function(self.V)
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
@@ -78,7 +77,8 @@ class ElasticBody(OverRanks):
         Returns:
             How often it was assembled so far: a number that changes with the matrix.
         """
-        check_constants(self._constants, self.comm)
+        given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
+        agree_on_values(given, self.comm)
         digest = digest_of(self._parameters)
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies

@@ -60,6 +60,13 @@ def _heed_signals(*_) -> None:
     """A monitor of every iteration: Python answers Ctrl-C only while it runs itself."""
 
 
+def raise_interrupt(failure: BaseException) -> None:
+    """Raise Ctrl-C from an error that PETSc made of it: since 3.25 what a callback raises is hidden behind one."""
+    cause = failure.__cause__ if isinstance(failure, PETSc.Error) else None
+    if isinstance(cause, KeyboardInterrupt):
+        raise cause
+
+
 class LinearSolverError(RuntimeError):
     """PETSc's linear solver did not solve; the message has its reason and options."""
 

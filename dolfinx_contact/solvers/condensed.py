@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.collective import by_first_rank
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
@@ -96,7 +96,7 @@ class CondensedBody:
         starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
-            result = self._reactions(q + rounding, factor * step.tol, starts, acting)
+            result = self._reactions(step, q + rounding, factor * step.tol, starts, acting)
             iterations += result.iterations
             force = np.concatenate((result.reaction.ravel(), result.tied))
             x, previous = self.displacement(base, force - known), error
@@ -168,24 +168,21 @@ class CondensedBody:
         self._parts[1].add_forces(force[self.dim * self.nodes :], forces)
         return forces
 
-    def _reactions(self, q: np.ndarray, tol: float, starts, acting: float):
+    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
-        found, result = None, None
-        if self.comm.rank == 0:
+
+        def solve(monitor):
             try:
                 with warnings.catch_warnings():  # the body's own rounding counts
                     warnings.simplefilter("ignore", RoundingWarning)
-                    result = self._options.solve_condensed(
-                        self.operator, self.friction, q, max(tol, 1e-14), starts, external=acting, **self._scales
+                    return self._options.solve_condensed(
+                        self.operator, self.friction, q, max(tol, 1e-14), starts,
+                        monitor=monitor, external=acting, **self._scales,
                     )  # fmt: skip
             except CondensedNotConverged as failure:
-                result = failure.best
-            except Exception as caught:  # the other ranks must not be left waiting
-                found = caught
-        with raised_together(self.comm):
-            if found is not None:
-                raise found
-        return self.comm.bcast(result, root=0)
+                return failure.best
+
+        return by_first_rank(self.comm, solve, step.tell if step.monitored else None)
 
     # -- starts ----------------------------------------------------------------------------------
 

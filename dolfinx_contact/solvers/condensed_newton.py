@@ -131,12 +131,13 @@ class CondensedNewton:
         return f"CondensedNewton({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
 
     def solve_condensed(
-        self, operator, friction: Friction, q, tol, starts=(), **scales
+        self, operator, friction: Friction, q, tol, starts=(), monitor=None, **scales
     ) -> CondensedResult:
         """Solve with a kernel operator; ``solve_condensed`` is the public entry.
 
         Args:
             q, starts: With the tied rows of the operator, if it has any, at the end.
+            monitor: None, or a function of residual and contacts open, sticking and slipping of every iterate.
             scales: Of the errors: ``stiffness`` (n,), ``tangential_stiffness`` (n, T, T),
                 ``tied_stiffness`` (tied,), force per length, and ``external``, a force that acts
                 beside the reactions.
@@ -159,6 +160,7 @@ class CondensedNewton:
             max_iterations=self.max_iterations,
             newton_iterations=self.newton_iterations,
             fallbacks=self.fallbacks,
+            monitor=monitor,
             **scales,
         )
         tried = tuple(

@@ -17,10 +17,7 @@ template <int T, int P> class Attempts {
     Attempts(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
         : op_(op), q_(q), options_(options),
           judge_(op, law, q, options.scales, std::min(options.tol, options.slip_tol)),
-          scaling_(op, law, q) {
-        budget_.max_seconds = options.max_seconds;
-        budget_.max_iterations = options.max_iterations;
-    }
+          scaling_(op, law, q) {}
 
   protected:
     /// Whether scaled reactions are a solution; keeps the best state.
@@ -70,6 +67,7 @@ template <int T, int P> class Attempts {
             system.right.template cast<Real>().asDiagonal();
         const typename Exact::Vector q =
             system.left.template cast<Real>().cwiseProduct(system.q.template cast<Real>());
+        ++budget_.iterations;
         for (const auto &r : Exact(A, system.smooth[0]).candidates(q))
             if (certify(system, r.template cast<double>())) {
                 Newton<T> newton(system);
@@ -128,7 +126,7 @@ template <int T, int P> class Attempts {
                 VectorXl cover = VectorXl::Ones(3 * op_.nodes());
                 for (Index i = 0; i < cover.size() && k > 0; ++i)
                     cover[i] = std::pow(10.0, uniform(random) - 0.5);
-                if (accept(plane.pivots(cover)))
+                if (accept(plane.pivots(cover, options_.heed)))
                     return;
             }
             if (op_.nodes() <= few)
@@ -190,10 +188,10 @@ template <int T, int P> class Attempts {
 
     const Operator &op_;
     const VectorXd &q_;
-    Options options_;
+    const Options &options_;
     Judge<P> judge_;
     Scaling<T, P> scaling_;
-    Budget budget_;
+    Budget budget_{options_};
     Solution best_;
     double last_error_ = 0.0; // of the state certified last
 };

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "condensed_direction.h"
+#include "condensed_solution.h"
 #include <chrono>
 #include <deque>
 
@@ -15,12 +16,30 @@ enum class End { converged, line_search, stalled, iterations, seconds, not_finit
 /// Iterations and seconds that all attempts share.
 struct Budget {
     using Clock = std::chrono::steady_clock;
+    const Options &options;
     Clock::time_point start = Clock::now();
-    double max_seconds;
-    int iterations = 0, max_iterations;
+    int iterations = 0;
 
     double seconds() const { return std::chrono::duration<double>(Clock::now() - start).count(); }
-    bool spent() const { return iterations >= max_iterations || seconds() >= max_seconds; }
+    bool late() const { return seconds() >= options.max_seconds; }
+    /// Asked in every iteration, so the place where others may end them.
+    bool spent() const {
+        if (options.heed)
+            options.heed();
+        return iterations >= options.max_iterations || late();
+    }
+
+    /// The iterate r for who wants to see it, its residual over the largest reaction or one.
+    template <int T> void tell(const State<T> &state, const VectorXd &r) const {
+        if (!options.monitor)
+            return;
+        std::array<int, 3> counts{};
+        for (const auto &point : state.points)
+            ++counts[static_cast<std::size_t>(point.branch)];
+        options.monitor(std::sqrt(2.0 * state.merit) /
+                            std::max(1.0, r.template lpNorm<Eigen::Infinity>()),
+                        counts);
+    }
 };
 
 /// Newton's method on the residual of a System with a nonmonotone line search
@@ -43,14 +62,13 @@ template <int T> class Newton {
                 r = best;
                 return End::not_finite;
             }
+            budget.tell(state_, r);
             const double size = std::max(1.0, r.template lpNorm<Eigen::Infinity>());
             if (std::sqrt(2.0 * state_.merit) <= target * size && certified(state_.mapped()))
                 return End::converged;
             if (iteration == max_iterations || budget.spent()) {
                 r = best;
-                return iteration == max_iterations || budget.seconds() < budget.max_seconds
-                           ? End::iterations
-                           : End::seconds;
+                return iteration < max_iterations && budget.late() ? End::seconds : End::iterations;
             }
             if (in_vain > patience) {
                 r = best;

@@ -6,13 +6,15 @@
 #pragma once
 
 #include "condensed_system.h"
+#include <functional>
 
 namespace dolfinx_contact::condensed {
 using MatrixXl = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
 /// z >= 0, M z + q >= 0, orthogonal, by C. E. Lemke's complementary pivots [Manage. Sci. 11 (1965)]
-/// from the covering vector d > 0; empty if they end in a ray.
-inline VectorXl lemke(const MatrixXl &M, const VectorXl &q, const VectorXl &d, int max_pivots) {
+/// from the covering vector d > 0; empty if they end in a ray. `heed` is called for each pivot.
+inline VectorXl lemke(const MatrixXl &M, const VectorXl &q, const VectorXl &d, int max_pivots,
+                      const std::function<void()> &heed) {
     const Index m = q.size(), covering = 2 * m, right = 2 * m + 1;
     MatrixXl tableau(m, 2 * m + 2); // w - M z - d z0 = q
     tableau << MatrixXl::Identity(m, m), -M, -d, q;
@@ -24,6 +26,8 @@ inline VectorXl lemke(const MatrixXl &M, const VectorXl &q, const VectorXl &d, i
             row = i;
     }
     for (int pivot = 0; q.minCoeff() < 0.0L; ++pivot) {
+        if (heed)
+            heed();
         const Index leaving = basis[static_cast<std::size_t>(row)];
         tableau.row(row) /= Real(tableau(row, entering));
         for (Index i = 0; i < m; ++i)
@@ -71,7 +75,7 @@ class Plane {
 
     /// Reactions by Lemke's method, empty in a ray. With b = r_t + r_n, c = r_n - r_t, w_t = p - m:
     /// z = (r_n, b, m), complements (w_n, p, c).
-    VectorXd pivots(const VectorXl &cover) const {
+    VectorXd pivots(const VectorXl &cover, const std::function<void()> &heed) const {
         MatrixXl M = MatrixXl::Zero(3 * n_, 3 * n_);
         VectorXl q = VectorXl::Zero(3 * n_);
         for (Index i = 0; i < n_; ++i) {
@@ -89,7 +93,7 @@ class Plane {
             q[i] = q_[2 * i + 1];
             q[n_ + i] = q_[2 * i];
         }
-        const VectorXl z = lemke(M, q, cover, 50 * static_cast<int>(n_) + 50);
+        const VectorXl z = lemke(M, q, cover, 50 * static_cast<int>(n_) + 50, heed);
         if (z.size() == 0)
             return {};
         VectorXd r(2 * n_);

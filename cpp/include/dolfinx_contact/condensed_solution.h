@@ -6,6 +6,8 @@
 #pragma once
 
 #include "condensed_operator.h"
+#include <array>
+#include <functional>
 #include <string>
 
 namespace dolfinx_contact::condensed {
@@ -53,6 +55,10 @@ struct Options {
     int newton_iterations = 60;   ///< Newton iterations of one attempt
     bool fallbacks = true;
     Scales scales = {};
+    /// Called in every iteration of every method; what it throws ends the search.
+    std::function<void()> heed = {};
+    /// Told every iterate: its residual, dimensionless, and contacts open, sticking and slipping.
+    std::function<void(double, const std::array<int, 3> &)> monitor = {};
 };
 
 /// Solves w = q + W r with the law between r and w at every contact.
