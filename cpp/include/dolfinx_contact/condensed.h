@@ -46,32 +46,19 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
-        if (attempt("proximal point", [&] { this->swept(given, 300); }) ||
+        std::minstd_rand random(1);
+        const auto paths = [&](int count) {
+            for (int k = 0; k < count && !best_.converged && !budget_.spent(); ++k)
+                this->follow(random);
+        };
+        constexpr int few = 5;
+        if (attempt("continuation", [&] { paths(few); }) ||
+            attempt("proximal point", [&] { this->swept(given, 300); }) ||
             attempt("sweeps", [&] { this->swept(zero, 2000); }))
             return;
-        for (const auto &[normal, tangential] :
-             {std::pair{1.0, 0.1}, {1.0, 1.0}, {100.0, 10.0}, {10.0, 10.0}, {0.1, 0.1}})
-            if (attempt("newton, other metric",
-                        [&, n = normal, t = tangential] { this->newton(given, n, t); }))
-                return;
-        if (T > 0 && !scaling_.associated() && attempt("continuation in p", [&] {
-                VectorXd r = zero;
-                if (this->follow(r))
-                    this->newton(r, 10.0, 1.0);
-            }))
-            return;
-        attempt("random starts", [this] { random_starts(); });
-    }
-
-    /// Solutions that no path leads to: from anywhere, and from near the best state so far.
-    void random_starts() {
-        std::minstd_rand random(1);
         const auto size = static_cast<double>(scaling_.size());
-        const int starts = static_cast<int>(std::min(3000.0, 4e6 / (size * size)));
-        for (int k = 0; k < starts && !best_.converged && !budget_.spent(); ++k)
-            this->newton(k % 2 == 0 ? start_near(random, scaling_.scaled(best_.reaction))
-                                    : random_start<T>(random, op_.nodes(), op_.tied()),
-                         k % 3 == 1 ? 1.0 : 10.0, k % 3 == 2 ? 0.1 : 1.0);
+        attempt("continuation, many starts",
+                [&] { paths(static_cast<int>(std::min(1000.0, 3e6 / (size * size)))); });
     }
 
     /// The start of the smallest residual, scaled; zero is always one.

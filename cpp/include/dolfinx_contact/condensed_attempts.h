@@ -9,6 +9,7 @@
 #include "condensed_proximal.h"
 #include "condensed_scaling.h"
 #include "condensed_starts.h"
+#include <utility>
 
 namespace dolfinx_contact::condensed {
 /// P tangential directions, T of them with friction (T = P or 0).
@@ -135,42 +136,47 @@ template <int T, int P> class Attempts {
     }
     static double worst(const Solution &s) { return std::max(s.error, s.slip_error); }
 
-    /// Follows the solution from the associated rule, p / mu to the power 0, to 1, steps halved on
-    /// failure and doubled after success.
-    bool follow(VectorXd &r) {
-        double reached = -1.0, step = 0.25;
-        VectorXd before;
-        double reached_before = -1.0;
-        constexpr double shortest = 1e-4;
-        const int last_iteration = budget_.iterations + 2000;
-        for (int failures = 0; reached < 1.0;) {
-            const double s = reached < 0.0 ? 0.0 : std::min(1.0, reached + step);
-            System<T> system = scaling_.make(s);
+    /// Newton's method at the end of a path of solutions from an easier problem, solved from a
+    /// random start: there contacts give way more, by `shift` times the mean compliance, friction
+    /// is that of the mean coefficient, the slip rule is associated, or some of these. Steps are
+    /// halved where Newton's method fails and doubled where it does not.
+    void follow(std::minstd_rand &random) {
+        constexpr double shortest = 1e-3, longest = 0.5;
+        const double shift = uniform(random) < 0.2 ? 0.0 : power_of_ten(random, -1.0, 1.5);
+        const bool friction = uniform(random) < 0.7;
+        VectorXd r = random_start<T>(random, op_.nodes(), op_.tied()), before;
+        double reached = 0.0, reached_before = 0.0, step = 0.25;
+        const auto solved = [&](double s, VectorXd &trial) {
+            System<T> system = scaling_.make(friction ? s : 1.0, s);
+            system.shift = (1.0 - s) * shift * op_.mean_normal();
             system.set_metric(10.0, 1.0);
+            if (s == 1.0)
+                finish(system, trial);
+            return s == 1.0
+                       ? best_.converged
+                       : Newton<T>(system).solve(trial, 1e-6, budget_, options_.newton_iterations,
+                                                 [](const VectorXd &) { return true; }) ==
+                             End::converged;
+        };
+        if (!solved(0.0, r))
+            return;
+        while (reached < 1.0 && step >= shortest && !budget_.spent()) {
+            const double s = std::min(1.0, reached + step);
             VectorXd trial = r;
-            if (before.size() > 0 && failures == 0)
+            if (before.size() > 0)
                 trial += (s - reached) / (reached - reached_before) * (r - before);
-            const End end =
-                Newton<T>(system).solve(trial, 1e-6, budget_, options_.newton_iterations,
-                                        [](const VectorXd &) { return true; });
-            if (end == End::converged) {
-                if (reached >= 0.0) {
-                    before = r;
-                    reached_before = reached;
-                    step *= 2.0;
-                }
-                r = trial;
-                reached = s;
-                failures = 0;
-            } else {
-                step *= 0.5;
-                ++failures;
-                if (step < shortest || reached < 0.0 || budget_.spent() ||
-                    budget_.iterations >= last_iteration)
-                    return false;
+            bool found = solved(s, trial);
+            if (!found && before.size() > 0) {
+                trial = r;
+                found = solved(s, trial);
             }
+            if (found) {
+                before = std::exchange(r, trial);
+                reached_before = std::exchange(reached, s);
+                step = std::min(longest, 2.0 * step);
+            } else
+                step *= 0.5;
         }
-        return true;
     }
 
     template <class Try> bool attempt(const char *name, Try &&action) {

@@ -17,7 +17,6 @@ template <int T, int P> class Scaling {
         set_length(free_length());
     }
 
-    bool associated() const { return coefficients_.associated(); }
     Index nodes() const { return op_.nodes(); }
     Index size() const { return D * op_.nodes() + op_.tied(); }
     auto contact_part(const VectorXd &v) const { return v.head(D * op_.nodes()); }
@@ -52,8 +51,9 @@ template <int T, int P> class Scaling {
         return reaction;
     }
 
-    /// The problem with p / mu to the power `rule`.
-    System<T> make(double rule = 1.0) const {
+    /// The problem with mu over its mean of all directions to the power `friction`, and with p / mu
+    /// to the power `rule`.
+    System<T> make(double friction = 1.0, double rule = 1.0) const {
         System<T> system;
         system.nodes = op_.nodes();
         system.tied = op_.tied();
@@ -69,8 +69,11 @@ template <int T, int P> class Scaling {
             if constexpr (T > 0) {
                 const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
                 system.smooth[static_cast<std::size_t>(i)] = smooth;
+                const double mean = smooth ? 1.0 : std::exp(coefficients_.mu.row(i).log().mean());
                 for (int c = 0; c < T; ++c) {
-                    const double mu = smooth ? 1.0 : coefficients_.mu(i, c);
+                    double mu = smooth ? 1.0 : coefficients_.mu(i, c);
+                    if (friction != 1.0)
+                        mu = mean * std::pow(mu / mean, friction);
                     system.right[D * i + c] = mu * force_;
                     system.left[D * i + c] = mu * std::pow(coefficients_.q2(i, c), rule) / length_;
                     system.q[D * i + c] = q_[(P + 1) * i + c];

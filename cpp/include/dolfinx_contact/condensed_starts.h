@@ -13,26 +13,22 @@ inline double uniform(std::minstd_rand &random) {
            static_cast<double>(std::minstd_rand::max() - std::minstd_rand::min());
 }
 
+/// Ten to a power between two, all alike probable.
+inline double power_of_ten(std::minstd_rand &random, double low, double high) {
+    return std::pow(10.0, low + (high - low) * uniform(random));
+}
+
 /// Scaled reactions in the cone, of any size about one; those of tied rows are zero.
 template <int T> VectorXd random_start(std::minstd_rand &random, Index nodes, Index tied) {
     constexpr int D = T + 1;
     VectorXd r = VectorXd::Zero(D * nodes + tied);
-    const double size = std::pow(10.0, 2.0 * uniform(random) - 1.0);
+    const double size = power_of_ten(random, -1.0, 1.0);
     for (Index i = 0; i < nodes; ++i) {
         const double normal = uniform(random) < 0.3 ? 0.0 : size * uniform(random);
         r[D * i + T] = normal;
         for (int c = 0; c < T; ++c)
             r[D * i + c] = normal * (1.4 * uniform(random) - 0.7);
     }
-    return r;
-}
-
-/// Reactions r, every component moved by up to 1e-3 to 1 of the largest.
-inline VectorXd start_near(std::minstd_rand &random, VectorXd r) {
-    const double size =
-        std::pow(10.0, -3.0 * uniform(random)) * r.template lpNorm<Eigen::Infinity>();
-    for (double &component : r)
-        component += size * (2.0 * uniform(random) - 1.0);
     return r;
 }
 } // namespace dolfinx_contact::condensed

@@ -30,7 +30,6 @@ template <int T> struct Coefficients {
     }
 
     bool frictionless() const { return (mu == 0.0).all(); }
-    bool associated() const { return (q2 == 1.0).all(); }
 };
 
 /// w = left * (q + W (right * r)) with r and w dimensionless and scaled: r_t in units of mu R, w_t
