@@ -16,57 +16,42 @@ from pathlib import Path
 from mpi4py import MPI
 from tqdm import tqdm
 
-from studies.punch.model import CASES, Parameters, programme
+from studies.punch.model import CASES, Parameters, add_options, programme
 from studies.punch.run import Run, compute
 
 COMM = MPI.COMM_WORLD
 
 
-def variants(base: Parameters, cycles: int, unload_to, levels) -> dict[str, Parameters]:
-    """What the paper leaves open, one change at a time.
-
-    Args:
-        base: What is changed.
-        cycles: Of the variants, but for meshes: those run one cycle.
-        unload_to: Ends of unloading, mm.
-        levels: How often the mesh is refined, for each variant; -1 coarsens it.
-    """
+def variants(base: Parameters, options) -> dict[str, Parameters]:
+    """What the paper leaves open, one change at a time; on other meshes one cycle."""
+    cycles = options.explore_cycles
     few = replace(base, cycles=cycles)
-    runs = {f"unload to {low:g} mm": replace(few, unload_to=low) for low in unload_to}
+    ends = [low for low in options.explore_unload_to if low != base.unload_to]
+    runs = {f"unload to {low:g} mm": replace(few, unload_to=low) for low in ends}
     deeper = tuple(base.depth * (0.6 - 0.4 * k / max(cycles - 1, 1)) for k in range(cycles))
     runs["deeper every cycle"] = replace(few, unload_to=deeper)
     runs["top free"] = replace(few, top="free")
     for factor in (2, 4):
-        increments = factor * base.loading, factor * base.unloading
-        name = "{}+{} increments".format(*increments)
-        runs[name] = replace(few, loading=increments[0], unloading=increments[1])
-    for level in levels:
-        name = f"mesh refined {level}x" if level > 0 else "mesh coarsened"
-        runs[name] = replace(base, cycles=1, refine=base.refine + level)
+        loading, unloading = factor * base.loading, factor * base.unloading
+        runs[f"{loading}+{unloading} increments"] = replace(
+            few, loading=loading, unloading=unloading
+        )
+    if options.divisions * 2**base.refine % 4 == options.layers * 2**base.refine % 2 == 0:
+        runs["mesh coarsened"] = replace(base, cycles=1, refine=base.refine - 1)
+    for level in range(1, options.explore_refine + 1):
+        runs[f"mesh refined {level}x"] = replace(base, cycles=1, refine=base.refine + level)
     return runs
 
 
 def plan(options) -> dict[str, dict[str, Parameters]]:
     """Parameters by variant and case; the paper's own programme is ``base``."""
-    unload_to = tuple(options.unload_to)
+    ends, names = options.unload_to, ("cycles", "loading", "unloading", "top", "tol", "refine")
     base = Parameters(
-        cycles=options.cycles,
-        unload_to=unload_to if len(unload_to) > 1 else unload_to[0],
-        loading=options.loading,
-        unloading=options.unloading,
-        top=options.top,
-        tol=options.tol,
-        refine=options.refine,
+        unload_to=tuple(ends) if len(ends) > 1 else ends[0],
         point=tuple(options.point[0]) if options.point else None,
+        **{name: getattr(options, name) for name in names},
     )
-    runs = {"base": base}
-    if options.explore:
-        ends = [low for low in options.explore_unload_to if low != base.unload_to]
-        halves = (
-            options.divisions * 2**options.refine % 4 == options.layers * 2**options.refine % 2 == 0
-        )
-        levels = [-1] * halves + list(range(1, options.explore_refine + 1))
-        runs.update(variants(base, options.explore_cycles, ends, levels))
+    runs = {"base": base, **(variants(base, options) if options.explore else {})}
     return {
         name: {case: replace(parameters, case=case) for case in options.cases}
         for name, parameters in runs.items()
@@ -79,51 +64,31 @@ def compute_all(runs, output: Path, points, mesh_options):
     Returns:
         Complete runs by variant and case, read by rank 0; and those that did not converge.
     """
-    failures = []
+    complete, failures = {}, []
     total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
     hidden = True if COMM.rank != 0 else None  # None: where there is no terminal
     with tqdm(total=total, unit="step", disable=hidden, smoothing=0.1) as bar:
         for name, cases in runs.items():
             for case, parameters in cases.items():
                 bar.set_description(f"case {case}, {name}")
-                directory = directory_of(output, name, case)
+                directory = output / "runs" / name.replace(" ", "_") / case
                 reason = compute(parameters, directory, points, bar, **mesh_options)
                 if reason:  # a variant less, not a study less
                     failures.append({"variant": name, "case": case, "not_converged": reason})
-    if COMM.rank != 0:
-        return {}, failures
-    failed = [(failure["variant"], failure["case"]) for failure in failures]
-    complete = {
-        name: {
-            case: Run(directory_of(output, name, case))
-            for case in cases
-            if (name, case) not in failed
-        }
-        for name, cases in runs.items()
-    }
-    return {name: cases for name, cases in complete.items() if cases}, failures
-
-
-def directory_of(output: Path, name: str, case: str) -> Path:
-    return output / "runs" / name.replace(" ", "_") / case
+                elif COMM.rank == 0:
+                    complete.setdefault(name, {})[case] = Run(directory)
+    return complete, failures
 
 
 def arguments(argv=None) -> argparse.Namespace:
-    default = Parameters()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     add = parser.add_argument
     add("--cases", nargs="+", choices=CASES, default=list(CASES), help="Table 1 of the paper")
-    add("--cycles", type=int, default=6, help="of loading and unloading")
-    add("--loading", type=int, default=default.loading, help="increments of a loading")
-    add("--unloading", type=int, default=default.unloading, help="increments of an unloading")
+    add_options(parser, cycles=6)
     unload_to = dict(type=float, nargs="+", metavar="MM")
-    add("--unload-to", **unload_to, default=[default.unload_to], help="end of unloading: one for "
-        "all cycles, or one for each")  # fmt: skip
-    add("--top", choices=("bonded", "free"), default=default.top, help="top face, sideways")
-    add("--tol", type=float, default=default.tol, help="error at which a step ends")
-    add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
+    add("--unload-to", **unload_to, default=[Parameters.unload_to], help="one end, or one a cycle")
     add("--divisions", type=int, default=8, help="of the sides of the mesh's blocks")
     add("--layers", type=int, default=4, help="of the mesh")
     add("--point", type=float, nargs=2, action="append", metavar=("X", "Y"),

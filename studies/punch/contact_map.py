@@ -16,11 +16,13 @@ from matplotlib.patches import Patch
 
 OPEN, STICK, SLIP, REVERSE = 0, 1, 2, 3
 ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
-    STICK: Patch(facecolor="#4a90c4", edgecolor="black", label="stick, $f<0$"),
-    SLIP: Patch(facecolor="#f0a33a", edgecolor="#f0a33a", label="slip, $f=0$"),
-    OPEN: Patch(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
+    STICK: dict(facecolor="#4a90c4", edgecolor="black", label="stick, $f<0$"),
+    SLIP: dict(facecolor="#f0a33a", edgecolor="#f0a33a", label="slip outwards, $f=0$"),
+    REVERSE: dict(facecolor="#c25700", edgecolor="#c25700", label="slip inwards, $f=0$"),
+    OPEN: dict(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
 }
-INWARD = Patch(facecolor="#c25700", edgecolor="#c25700", label="reverse slip, inwards, $f=0$")
+HANDLES = [Patch(**style) for style in ZONES.values()]
+LEGEND = dict(handles=HANDLES, loc="outside lower center", ncols=4, frameon=False)
 
 
 class ContactMap(NamedTuple):
@@ -50,28 +52,41 @@ class ContactMap(NamedTuple):
         quarter = ((x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)).sum(-1)) / 2
         return np.bincount(self.faces.ravel(), quarter.ravel(), minlength=len(self.x))
 
+    def inward(self) -> np.ndarray:
+        """Nodes that slip towards the axis of the punch, ``shape=(n,)``."""
+        return (self.status == SLIP) & ((self.slip_increment * self.x).sum(axis=1) < 0)
+
     def borders(self) -> np.ndarray:
         """Lines between quarters of different status, ``shape=(k, 2, 2)``."""
-        quarters = self.quarters()
         differs = self.status[self.faces] != self.status[np.roll(self.faces, -1, axis=1)]
-        return quarters[differs][:, 1:3]
+        return self.quarters()[differs][:, 1:3]
 
     def rim(self) -> np.ndarray:
         """Edges of one face only, ``shape=(k, 2, 2)``: the edge of the disc."""
         edges = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        _, first, count = np.unique(
-            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        _, edge, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
         )
-        return self.x[edges[first[count == 1]]]
+        return self.x[edges[count[edge.ravel()] == 1]]
 
     def mean_pressure(self) -> float:
         """Normal reaction over the area of the disc, MPa; 1 where nothing touches."""
         return self.reaction[:, 2].sum() / self.area().sum() or 1.0
 
 
+def at_nodes(punch, *values) -> list:
+    """Global numbers of the contact nodes, ascending, and their values, on rank 0.  Collective."""
+    numbers = punch.V.dofmap.index_map.local_to_global(punch.contact.nodes.astype(np.int32))
+    parts = punch.comm.gather((numbers, *values))
+    if parts is None:
+        return [None] * (1 + len(values))
+    columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
+    return [column[np.argsort(columns[0])] for column in columns]
+
+
 def gather(punch) -> ContactMap | None:
     """The present state of ``punch.contact`` on rank 0; None on the others.  Collective."""
-    contact, V, comm = punch.contact, punch.V, punch.comm
+    contact, V = punch.contact, punch.V
     owned = punch.mesh.topology.index_map(2).size_local
     facets = punch.facet_tags.find(CONTACT)
     position = V.tabulate_dof_coordinates()[:, :2]
@@ -80,27 +95,17 @@ def gather(punch) -> ContactMap | None:
         nodes = fem.locate_dofs_topological(V, 2, np.array([facet], dtype=np.int32), remote=False)
         spoke = position[nodes] - position[nodes].mean(axis=0)
         faces.append(nodes[np.argsort(np.arctan2(spoke[:, 1], spoke[:, 0]))])
-    numbering = V.dofmap.index_map
-    faces = np.array(faces, dtype=np.int32).reshape(-1, 4)
-    mine = (
-        numbering.local_to_global(contact.nodes.astype(np.int32)),
-        numbering.local_to_global(faces.ravel()).reshape(-1, 4),
-        contact.x[:, :2],
-        contact.reaction,
-        contact.slip_increment,
-        contact.status,
-        contact.load_function,
-    )
-    parts = comm.gather(mine)
-    if parts is None:
+    faces = V.dofmap.index_map.local_to_global(np.array(faces, dtype=np.int32).ravel())
+    faces = punch.comm.gather(faces)
+    values = [getattr(contact, name) for name in ContactMap._fields[2:]]
+    node, *values = at_nodes(punch, contact.x[:, :2], *values)
+    if node is None:
         return None
-    node, faces, x, *values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    order = np.argsort(node)
-    faces = np.searchsorted(node[order], faces)
-    return ContactMap(x[order], faces, *(value[order] for value in values))
+    x, *values = values
+    return ContactMap(x, np.searchsorted(node, np.concatenate(faces)).reshape(-1, 4), *values)
 
 
-def draw(maps, title, file, point=None) -> None:
+def draw(maps, title, file, point) -> None:
     """Draw contact maps side by side and write a picture.
 
     Above, the load function f with stick, slip and open zones and the slip of the last increment;
@@ -116,73 +121,55 @@ def draw(maps, title, file, point=None) -> None:
     with rc_context({"font.size": 14, "hatch.linewidth": 0.6}):
         figure = Figure(figsize=(4.6 * len(maps) + 1.2, 10.0), layout="constrained")
         axes = figure.subplots(2, len(maps), squeeze=False)
+        spot = dict(boxstyle="circle,pad=0.15", facecolor="white")
         for (above, below), (name, disc) in zip(axes.T, maps, strict=True):
             zones = draw_zones(above, disc)
             pressure = draw_tractions(below, disc)
             above.set_title(name)
-            if point is not None:
-                spot = dict(boxstyle="circle,pad=0.15", facecolor="white")
-                above.text(*point[:2], "P", bbox=spot, ha="center", va="center", fontsize=12)
+            above.text(*point[:2], "P", bbox=spot, ha="center", va="center", fontsize=12)
         scale = dict(shrink=0.8, aspect=25)
         label = "{} / mean pressure".format
         figure.colorbar(zones, ax=axes[0], label=label("load function $f$"), extend="min", **scale)
         figure.colorbar(pressure, ax=axes[1], label=label("pressure"), extend="max", **scale)
-        figure.legend(handles=[*ZONES.values()], loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(**LEGEND)
         figure.suptitle(title)
         figure.savefig(file, dpi=150)
 
 
-def draw_zones(axes, disc: ContactMap, inward=None):
-    """Map of f with zones and slip vectors; returns what a colour bar needs.
-
-    Args:
-        axes: Where to draw.
-        disc: What to draw.
-        inward: Nodes whose slip has a colour of its own, ``shape=(n,)``; None for none.
-    """
-    status = disc.status[disc.faces.ravel()]
-    zones = {SLIP: ZONES[SLIP], OPEN: ZONES[OPEN]}
-    if inward is not None:
-        inward = np.asarray(inward)[disc.faces.ravel()] & (status == SLIP)
-        status = np.where(inward, REVERSE, status)
-        zones[REVERSE] = INWARD
+def draw_zones(axes, disc: ContactMap):
+    """Map of f with zones and slip vectors; returns what a colour bar needs."""
+    zone = np.where(disc.inward(), REVERSE, disc.status)[disc.faces.ravel()]
     f = disc.load_function / disc.area() / disc.mean_pressure()
-    image = paint(axes, disc, f, status == STICK, cmap="Blues_r", clim=(-1.2, 0))
-    for zone, patch in zones.items():
-        axes.add_collection(
-            PolyCollection(
-                disc.quarters().reshape(-1, 4, 2)[status == zone],
-                facecolor=patch.get_facecolor(),
-                edgecolor=patch.get_edgecolor(),
-                hatch=patch.get_hatch(),
-                linewidth=0 if zone == OPEN else 0.6,
-            )
-        )
+    image = paint(axes, disc, f, zone == STICK, cmap="Blues_r", clim=(-1.2, 0))
+    for number in (SLIP, OPEN, REVERSE):
+        quarters, width = disc.quarters().reshape(-1, 4, 2), 0 if number == OPEN else 0.6
+        style = dict(linewidth=width, **ZONES[number])
+        axes.add_collection(PolyCollection(quarters[zone == number], **style))
     axes.add_collection(LineCollection(disc.borders(), colors="black", linewidths=1.8))
     _arrows(axes, disc, 1e3 * disc.slip_increment, disc.status == SLIP, "slip {:g} µm")
-    frame_disc(axes, disc)
     return image
 
 
 def draw_tractions(axes, disc: ContactMap):
     """Pressure with the tangential tractions on it; returns what a colour bar needs."""
     traction = disc.reaction / disc.area()[:, None]
-    pressure = traction[:, 2] / disc.mean_pressure()
-    everywhere = np.ones(disc.faces.size, dtype=bool)
-    image = paint(axes, disc, pressure, everywhere, cmap="Greys", clim=(0, 2))
+    image = paint(axes, disc, traction[:, 2] / disc.mean_pressure(), cmap="Greys", clim=(0, 2))
     _arrows(axes, disc, traction[:, :2], disc.status != OPEN, "traction {:g} MPa")
-    frame_disc(axes, disc)
     return image
 
 
-def paint(axes, disc, values, shown, **colours):
-    """Quarters in the colour of their node's value."""
+def paint(axes, disc, values, shown=slice(None), **colours):
+    """The disc's edge, and its quarters that are ``shown`` in the colour of their node's value."""
     values, quarters = values[disc.faces.ravel()][shown], disc.quarters().reshape(-1, 4, 2)[shown]
     order = np.argsort(-values.round(9), kind="stable")  # edges overlap: alike on all sides
     image = PolyCollection(quarters[order], array=values[order], **colours)
     # without edges, or with pixels rounded, the background would shine through seams
     image.set(edgecolor="face", linewidth=0.6, snap=False)
     axes.add_collection(image)
+    axes.add_collection(LineCollection(disc.rim(), colors="black", linewidths=0.8, zorder=1.5))
+    size = 1.18 * np.abs(disc.x).max()
+    axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")
+    axes.set_axis_off()
     return image
 
 
@@ -202,11 +189,3 @@ def _arrows(axes, disc, vectors, shown, label) -> None:
     key = float(f"{longest:.1g}")
     text = dict(labelpos="N", labelsep=0.05, fontproperties=dict(size=12))
     axes.quiverkey(arrows, 0.87, 0.01, key, label.format(key), **text)
-
-
-def frame_disc(axes, disc: ContactMap) -> None:
-    """Edge of the disc, and axes of its size."""
-    axes.add_collection(LineCollection(disc.rim(), colors="black", linewidths=0.8))
-    size = 1.18 * np.abs(disc.x).max()
-    axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")
-    axes.set_axis_off()

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from studies.punch.contact_map import SLIP, STICK
+from studies.punch.contact_map import STICK
 from studies.punch.run import Run
 
 RIM = 0.75  # of the radius: beyond it a node is called peripheral
@@ -25,11 +25,6 @@ class Zones(NamedTuple):
     inner: float  # radius of the innermost node that slips inwards, over R; nan if there is none
 
 
-def inward(disc) -> np.ndarray:
-    """Nodes that slip towards the axis of the punch, ``shape=(n,)``."""
-    return (disc.status == SLIP) & ((disc.slip_increment * disc.x).sum(axis=1) < 0)
-
-
 def zones(run: Run, step: int) -> Zones:
     """Stick zones and reverse slip after a step."""
     disc, area = run.disc(step), run.area
@@ -38,7 +33,7 @@ def zones(run: Run, step: int) -> Zones:
     both = stick[a] & stick[b]
     graph = coo_matrix((np.ones(both.sum()), (a[both], b[both])), shape=(len(stick),) * 2)
     _, label = connected_components(graph, directed=False)
-    rim, reverse = radius > RIM, inward(disc)
+    rim, reverse = radius > RIM, disc.inward()
     return Zones(
         count=len(np.unique(label[stick])),
         fraction=area[stick].sum() / area.sum(),
@@ -48,20 +43,19 @@ def zones(run: Run, step: int) -> Zones:
     )
 
 
-def unloading(run: Run, cycle: int) -> list[Zones]:
-    """Zones from the loaded state of a cycle to its unloaded one."""
-    return [zones(run, step) for step in range(run.loaded(cycle), run.unloaded(cycle) + 1)]
+def tracked(run: Run, quantity: str, node: int = 0) -> np.ndarray:
+    """Both tangential components at a tracked node from the start on, ``shape=(2, steps + 1)``."""
+    return np.c_[[0.0, 0.0], [run.table[f"node{node}_{quantity}_{t}"] for t in ("t1", "t2")]]
 
 
 def slip_of_point(run: Run, node: int = 0) -> np.ndarray:
     """|u_t| of a tracked node relative to the plane, from the start on, mm, ``shape=(steps + 1,)``."""
-    u = [run.table[f"node{node}_displacement_{t}"] for t in ("t1", "t2")]
-    return np.concatenate([[0.0], np.hypot(*u)])
+    return np.hypot(*tracked(run, "displacement", node))
 
 
 def force(run: Run) -> np.ndarray:
     """Normal force on the punch from the start on, N, ``shape=(steps + 1,)``."""
-    return np.concatenate([[0.0], run.table["contact0_force_z"]])
+    return np.r_[0.0, run.table["contact0_force_z"]]
 
 
 def nonlinearity(run: Run, first: int, last: int) -> float:
@@ -69,14 +63,6 @@ def nonlinearity(run: Run, first: int, last: int) -> float:
     F, s = force(run)[first : last + 1], slip_of_point(run)[first : last + 1]
     chord = s[0] + (s[-1] - s[0]) * (F - F[0]) / (F[-1] - F[0])
     return float(np.abs(s - chord).max() / (np.ptp(s) or 1.0))
-
-
-def loading_nonlinearity(run: Run, cycle: int) -> float:
-    return nonlinearity(run, run.unloaded(cycle - 1), run.loaded(cycle))
-
-
-def unloading_nonlinearity(run: Run, cycle: int) -> float:
-    return nonlinearity(run, run.loaded(cycle), run.unloaded(cycle))
 
 
 def hysteresis(run: Run, cycle: int) -> float:
@@ -92,8 +78,7 @@ def hysteresis(run: Run, cycle: int) -> float:
 def plateau(run: Run, cycle: int) -> tuple[float, float]:
     """Parts of loading and unloading, next to the peak, in which P is still."""
     start, top, end = run.unloaded(cycle - 1), run.loaded(cycle), run.unloaded(cycle)
-    u = np.array([run.table[f"node0_displacement_{t}"] for t in ("t1", "t2")])
-    moved = np.linalg.norm(np.diff(np.c_[[0, 0], u], axis=1), axis=0)[start:end]
+    moved = np.linalg.norm(np.diff(tracked(run, "displacement")), axis=0)[start:end]
     still = moved < STILL * moved.max()
     before, after = still[: top - start][::-1], still[top - start :]
     return tuple(float(np.argmin(np.r_[s, False])) / len(s) for s in (before, after))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 import gmsh
+import numpy as np
 from scipy.optimize import brentq
 
 from dolfinx_contact.compat import model_to_mesh
@@ -36,11 +37,8 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
 
     Raises:
-        ValueError: a ``refine`` that is no whole number, or with it an odd number of divisions or no
-            whole number of layers; a size <= 0.
+        ValueError: with ``refine`` an odd number of divisions or no whole number of layers; a size <= 0.
     """
-    if refine != int(refine):
-        raise ValueError(f"refine must be a whole number, got {refine!r}.")
     divisions, layers = divisions * 2.0**refine, layers * 2.0**refine
     if divisions < 2 or divisions % 2 or layers < 1 or layers % 1:
         raise ValueError(
@@ -56,9 +54,8 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
         if comm.rank == 0:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.model.add("punch")
-            _build(
-                height / radius, int(divisions), **_layers(int(layers), lowest and lowest / height)
-            )
+            shares = _layers(int(layers), lowest and lowest / height)
+            _build(height / radius, int(divisions), **shares)
         punch = model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()
@@ -71,12 +68,11 @@ def _layers(count, lowest):
     if lowest is None:
         return dict(numElements=[count])
 
-    def top(growth, k):
-        return lowest * math.expm1(k * growth) / math.expm1(growth)
+    def tops(growth):
+        return lowest * np.expm1(growth * np.arange(1, count + 1)) / np.expm1(growth)
 
-    growth = brentq(lambda growth: top(growth, count) - 1, 1e-9, math.log(1 / lowest))
-    tops = [top(growth, k) for k in range(1, count)] + [1.0]
-    return dict(numElements=[1] * count, heights=tops)
+    growth = brentq(lambda growth: tops(growth)[-1] - 1, 1e-9, -math.log(lowest))
+    return dict(numElements=[1] * count, heights=[*tops(growth)[:-1], 1.0])
 
 
 def _build(height, divisions, **layers):

@@ -68,11 +68,7 @@ class Parameters:
 class Punch:
     """Body, plane, friction and supports; ``press`` computes one load step after another.
 
-    Args:
-        parameters: What to compute.
-        comm: MPI communicator.
-        solver: As in ``dc.ContactProblem``.
-        mesh_options: Further arguments of ``punch_mesh``, such as ``divisions``.
+    ``solver`` as in ``dc.ContactProblem``; ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.
     """
 
     def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, solver=None, **mesh_options):
@@ -104,24 +100,23 @@ class Punch:
 
     def _supports(self):
         """The top face goes down; sideways it is bonded, or held by as little as possible."""
-        fdim, R, H = 2, self.parameters.radius, self.parameters.height
+        R, H = self.parameters.radius, self.parameters.height
+        top, zero = self.facet_tags.find(TOP), fem.Constant(self.mesh, PETSc.ScalarType(0))
         self.mesh.topology.create_connectivity(0, 3)
 
-        def fix(component, dim, entities, value=None):
+        def fix(component, dim, entities, value=zero):
             V = self.V.sub(component)
-            value = fem.Constant(self.mesh, PETSc.ScalarType(0)) if value is None else value
             return fem.dirichletbc(value, fem.locate_dofs_topological(V, dim, entities), V)
 
         def node_at(*point):
-            def close(x):
-                return np.linalg.norm(x.T - point, axis=1) < 1e-6 * R
+            near = 1e-6 * R
+            return locate_entities(
+                self.mesh, 0, lambda x: np.linalg.norm(x.T - point, axis=1) < near
+            )
 
-            return locate_entities(self.mesh, 0, close)
-
-        top = self.facet_tags.find(TOP)
-        down = fix(2, fdim, top, self.approach)
+        down = fix(2, 2, top, self.approach)
         if self.parameters.top == "bonded":
-            return [down, fix(0, fdim, top), fix(1, fdim, top)]
+            return [down, fix(0, 2, top), fix(1, 2, top)]
         if self.parameters.top == "free":
             centre, rim = node_at(0, 0, H), node_at(R, 0, H)
             return [down, fix(0, 0, centre), fix(1, 0, centre), fix(1, 0, rim)]
@@ -148,9 +143,7 @@ class Punch:
             "displacement": displacement,
             "normal_reaction": float(contact.force() @ contact.plane.normal),
             "tangential_reaction_sum": float(self.comm.allreduce(tangential)),
-            "open": int(step.counts.open),
-            "stick": int(step.counts.stick),
-            "slip": int(step.counts.slip),
+            **{name: int(count) for name, count in step.counts._asdict().items()},
             "error": float(step.error),
             "bipotential_gap": float(step.bipotential_gap),
             "iterations": int(step.iterations),
@@ -192,17 +185,29 @@ def programme(parameters: Parameters) -> list[float]:
     for name in ("cycles", "loading", "unloading"):
         if getattr(parameters, name) < 1:
             raise ValueError(f"{name} must be at least 1, got {getattr(parameters, name)}.")
-    lows, high = np.ravel(parameters.unload_to).tolist(), parameters.depth
-    if not all(0 <= low < high for low in lows):
-        shown = lows[0] if len(lows) == 1 else lows
-        raise ValueError(f"unload_to must lie in [0, depth), got {shown} with depth {high}.")
-    if len(lows) not in (1, parameters.cycles):
+    lows, high, cycles = np.ravel(parameters.unload_to), parameters.depth, parameters.cycles
+    if len(lows) not in (1, cycles) or not ((0 <= lows) & (lows < high)).all():
         raise ValueError(
-            f"unload_to must be one number or one per cycle ({parameters.cycles}), got {lows}."
+            f"unload_to must be one number in [0, depth), or one per cycle, got "
+            f"{parameters.unload_to} with depth {high} and {cycles} cycles."
         )
     start, steps = 0.0, []
-    for low in lows if len(lows) > 1 else lows * parameters.cycles:
+    for low in np.broadcast_to(lows, cycles):
         steps += np.linspace(start, high, parameters.loading + 1)[1:].tolist()
         steps += np.linspace(high, low, parameters.unloading + 1)[1:].tolist()
         start = low
     return steps
+
+
+def add_options(parser, **defaults) -> None:
+    """What both programs, the demo and the study, let vary of the parameters, on the command line."""
+    for name, text in {
+        "cycles": "of loading and unloading",
+        "loading": "increments of a loading",
+        "unloading": "increments of an unloading",
+        "tol": "error at which a step ends",
+        "refine": "0 is the paper's mesh; 1 doubles it",
+    }.items():
+        default = defaults.get(name, getattr(Parameters, name))
+        parser.add_argument(f"--{name}", type=type(default), default=default, help=text)
+    parser.add_argument("--top", choices=("bonded", "free"), default="bonded", help="sideways")

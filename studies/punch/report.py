@@ -26,6 +26,14 @@ CAPTIONS = {  # in the order of the page; what to see in each figure stands in d
     "energy": "The energy balance and what it leaves open in each step: docs/dissipation.md says what it proves.",
     "convergence": "Work of friction in the first cycle against increments and mesh.",
 }
+SOURCE = (
+    "G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, Comportement hystérétique du frottement anisotrope, "
+    "18e Congrès Français de Mécanique, 2007, Section 3, computed anew."
+)
+DECIDED = (
+    "Every statement is decided by a number, in every run: the base runs and, where computed (--explore), "
+    "variants of what the paper leaves open. The bounds are ours; all numbers are in figures/answers.csv."
+)
 
 
 def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=()) -> None:
@@ -45,7 +53,7 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
     figures.unloading(1, "unloading1")
     if figures.cycles > 1:
         figures.unloading(figures.cycles, "unloading_last")
-    for node in range(1 + len(next(iter(base.values())).points)):
+    for node in range(1 + len(figures.first.points)):
         figures.point(node)
     work.maps(figures, wear)
     work.energy(figures)
@@ -58,7 +66,30 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
     )  # fmt: skip
     for name, rows in tables.items():
         write_csv(figures.directory / f"{name}.csv", rows)
-    write_page(output / "study.html", base, figures.directory, tables, wear)
+    parts = [
+        page.paragraph(SOURCE),
+        "<h2>What the paper says, and what holds</h2>", page.paragraph(DECIDED), page.table(tables["statements"]),
+        "<h2>Figures</h2>", *pictures(figures.directory),
+        "<h2>Work of friction and wear, cycle by cycle</h2>", page.table(tables["cycles"]),
+        page.paragraph(f"Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it."),
+        "<h2>Variants</h2>", page.table(variants),
+        page.paragraph("Against the mesh: order of the last three meshes, and the limit if that order lasted."),
+        page.table(tables["mesh"]),
+        "<h2>Times and errors</h2>", page.table(tables["times"]),
+        "<h2>Parameters</h2>", page.table(settings(base)),
+    ]  # fmt: skip
+    title = f"Cyclic punch with anisotropic friction: cases {', '.join(base)}"
+    page.write(output / "study.html", title, parts)
+
+
+def pictures(directory: Path) -> list[str]:
+    """All that was drawn, in the order of the captions; then other tracked nodes."""
+    drawn = {file.stem: file for file in sorted(directory.glob("*.svg"))}
+    order = [name for name in CAPTIONS if name in drawn]
+    return [
+        page.picture(drawn[name], f"{CAPTIONS.get(name, 'Another tracked node.')} ({name}.csv)")
+        for name in dict.fromkeys([*order, *drawn])
+    ]
 
 
 def verdicts(answers: list[dict]) -> list[dict]:
@@ -83,45 +114,20 @@ def verdicts(answers: list[dict]) -> list[dict]:
 
 def times(base: dict[str, Run]) -> list[dict]:
     """Wall times and largest errors of the base runs."""
-    rows = []
-    for case, run in base.items():
-        of = run.table
-        rows.append(dict(
-            case=case, steps=len(of["step"]), seconds=float(of["seconds"].sum()), slowest_step=float(of["seconds"].max()),
+    return [
+        dict(
+            case=case, steps=len(of), seconds=float(of["seconds"].sum()), slowest_step=float(of["seconds"].max()),
             iterations=int(of["iterations"].sum()), largest_error=float(of["error"].max()),
             largest_slip_error=float(of["slip_error"].max()), energy_left_open=float(work.relative_residual(run).max()),
-        ))  # fmt: skip
-    return rows
-
-
-def write_page(file: Path, base: dict[str, Run], directory: Path, tables: dict, wear: float):
-    """All of it in one file; what was computed and by what is its last table, one column a case."""
-    heads = {
-        case: {k: v for key, of in run.head.items() for k, v in (of.items() if isinstance(of, dict) else [(key, of)])}
-        for case, run in base.items()
-    }  # fmt: skip
-    settings = [
-        {"": key, **{case: head[key] for case, head in heads.items()}}
-        for key in next(iter(heads.values()))
-    ]
-    drawn = [file.stem for file in sorted(directory.glob("*.svg"))]
-    order = [name for name in CAPTIONS if name in drawn] + [n for n in drawn if n not in CAPTIONS]
-    parts = [
-        page.paragraph("G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, Comportement hystérétique du frottement anisotrope, "
-            "18e Congrès Français de Mécanique, 2007, Section 3, computed anew."),
-        "<h2>What the paper says, and what holds</h2>",
-        page.paragraph("Every statement is decided by a number, in every run: the base runs and, where computed (--explore), "
-            "variants of what the paper leaves open. The bounds are ours; all numbers are in figures/answers.csv."),
-        page.table(tables["statements"]),
-        "<h2>Figures</h2>",
-        *(page.picture(directory / f"{name}.svg", f"{CAPTIONS.get(name, f'Another tracked node: {name}.')} ({name}.csv)")
-          for name in order),
-        "<h2>Work of friction and wear, cycle by cycle</h2>", page.table(tables["cycles"]),
-        page.paragraph(f"Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it."),
-        "<h2>Variants</h2>", page.table(tables["variants"]),
-        page.paragraph("Against the mesh: order of the last three meshes, and the limit if that order lasted."),
-        page.table(tables["mesh"]),
-        "<h2>Times and errors</h2>", page.table(tables["times"]),
-        "<h2>Parameters</h2>", page.table(settings),
+        )
+        for case, run in base.items() for of in [run.table]
     ]  # fmt: skip
-    page.write(file, f"Cyclic punch with anisotropic friction: cases {', '.join(base)}", parts)
+
+
+def settings(base: dict[str, Run]) -> list[dict]:
+    """What was computed and by what, one column a case."""
+    heads = {}
+    for case, run in base.items():
+        groups = [of if isinstance(of, dict) else {key: of} for key, of in run.head.items()]
+        heads[case] = {key: value for group in groups for key, value in group.items()}
+    return [{"": key, **{case: heads[case][key] for case in base}} for key in next(iter(heads.values()))]  # fmt: skip

@@ -7,24 +7,25 @@ and one checkpoint.
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
 
 import dolfinx_contact as dc
-from studies.punch.contact_map import ContactMap, gather
-from studies.punch.model import CASES, Parameters, Punch, programme
+from studies.punch.contact_map import ContactMap, at_nodes, gather
+from studies.punch.model import Parameters, Punch, programme
 
 # isort: split
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from tqdm import tqdm
 
+COMM = MPI.COMM_WORLD
 FAILED = "not_converged.txt"
-FIELDS = ("gap", "displacement", "dissipation", "slip_path")  # beside those of a ContactMap
+FIELDS = (*ContactMap._fields[2:], "displacement", "dissipation")  # kept after every step
 
 
 class EnergyBalance:
@@ -55,123 +56,108 @@ class EnergyBalance:
 
         self.forms = energy(punch.u), energy(self.increment)
 
+    def _state(self):
+        contact, punch = self.punch.contact, self.punch
+        displacement, depth = punch.u.x.array.copy(), float(punch.approach.value)
+        totals = self._integral(0), contact.force()[2], depth, contact.dissipation.sum()
+        return contact.reaction.copy(), contact.gap.copy(), displacement, *totals
+
     def open(self) -> None:
         """Remember the state before a step.  Collective."""
-        contact = self.punch.contact
-        self.u = self.punch.u.x.array.copy()
-        self.before = contact.reaction.copy(), contact.gap.copy(), contact.dissipation.copy()
-        self.energy, self.force = self._integral(0), contact.force()[2]
-        self.depth = float(self.punch.approach.value)
+        self.before = self._state()
 
     def close(self) -> dict[str, float]:
         """The terms of the step that was solved since ``open``.  Collective."""
-        contact = self.punch.contact
-        reaction, gap, dissipation = self.before
-        self.increment.x.array[:] = self.punch.u.x.array - self.u
-        force, moved = contact.force()[2], self.depth - float(self.punch.approach.value)
-        end, mean = (
-            -(forces[:, :2] * contact.slip_increment).sum()
-            for forces in (contact.reaction, 0.5 * (reaction + contact.reaction))
-        )
-        closing = (contact.reaction[:, 2] * gap).sum()
-        opening = (reaction[:, 2] * contact.gap).sum()
-        work = (contact.dissipation - dissipation).sum()
-        sums = np.array([end, mean, work, closing, opening])
-        self.punch.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-        end, mean, work, closing, opening = sums.tolist()
-        row = {
-            "platen_work": force * moved,
-            "elastic_change": self._integral(0) - self.energy,
+        r0, gap0, u0, energy0, force0, depth0, friction0 = self.before
+        r1, gap1, u1, energy1, force1, depth1, friction1 = self._state()
+        self.increment.x.array[:] = u1 - u0
+        moved, slip = depth0 - depth1, self.punch.contact.slip_increment
+        sums = [
+            -(r1[:, :2] * slip).sum(),
+            -0.5 * ((r0 + r1)[:, :2] * slip).sum(),
+            (r1[:, 2] * gap0).sum(),
+            (r0[:, 2] * gap1).sum(),
+            friction1 - friction0,
+        ]
+        end, mean, closing, opening, friction = self.punch.comm.allreduce(np.array(sums))
+        terms = {
+            "elastic_change": energy1 - energy0,
             "dissipation_end": end,
             "half_du_K_du": self._integral(1),
             "closing": closing,
         }
-        row["residual"] = row["platen_work"] - sum(list(row.values())[1:])
-        row["work_of_friction"] = work
-        row["platen_work_mean"] = 0.5 * (self.force + force) * moved
-        row["dissipation_mean"] = mean
-        row["closing_mean"] = 0.5 * (closing - opening)
-        row["residual_mean"] = (
-            row["platen_work_mean"] - row["elastic_change"] - mean - row["closing_mean"]
-        )
+        work, work_mean = force1 * moved, 0.5 * (force0 + force1) * moved
+        left = work_mean - terms["elastic_change"] - mean - 0.5 * (closing - opening)
+        row = {"platen_work": work, **terms, "residual": work - sum(terms.values())}
+        row |= {"work_of_friction": friction, "residual_mean": left}
         return {name: float(value) for name, value in row.items()}
 
     def _integral(self, which: int) -> float:
         return self.punch.comm.allreduce(fem.assemble_scalar(self.forms[which]).real)
 
 
-def settings(parameters: Parameters, points, mesh_options) -> dict:
-    """All that the numbers of a run depend on, as JSON knows it."""
-    everything = dict(parameters=asdict(parameters), points=list(points), mesh=mesh_options)
-    return json.loads(json.dumps(everything))
-
-
-def compute(parameters, directory, points=(), bar=None, comm=MPI.COMM_WORLD, **mesh_options) -> str:
-    """Compute a run, or what is missing of it.  Collective.
+def compute(parameters, directory, points=(), bar=None, **mesh_options) -> str:
+    """Compute a run, or what is missing of it, on the number of ranks that it was begun on.  Collective.
 
     Args:
         parameters: Of the punch.
         directory: Of the run. What is there with other settings is removed.
         points: Nodes to track beside P, pairs (x, y), mm: the contact nodes nearest to them.
         bar: A tqdm bar that is moved on by one per step; None for none.
-        comm: MPI communicator; a run continues on the number of ranks that it was begun on.
         mesh_options: Further arguments of ``punch_mesh``.
 
     Returns:
         The step that did not converge and why; empty if all did. Such a run is not tried again, as
         long as its directory is there.
     """
-    directory = Path(directory)
-    wanted = settings(parameters, points, mesh_options)
+    directory, bar = Path(directory), tqdm(disable=True) if bar is None else bar
+    settings = dict(parameters=asdict(parameters), points=list(points), mesh=mesh_options)
+    settings = json.loads(json.dumps(settings))  # all that the numbers depend on, as JSON knows it
     displacements = programme(parameters)
-    done, reason = comm.bcast(_found(directory, wanted) if comm.rank == 0 else None)
-    if bar is not None:
-        bar.update(done)
+    done, reason = COMM.bcast(_found(directory, settings) if COMM.rank == 0 else None)
+    bar.update(done)
     if done == len(displacements) or reason:
         return reason
-    punch = Punch(parameters, comm, **mesh_options)
+    punch = Punch(parameters, **mesh_options)
     contact, balance = punch.contact, EnergyBalance(punch)
     positions = [(*xy, 0.0) for xy in (parameters.target, *points)]
     if done:
         punch.problem.load(_checkpoint(directory, done))
         punch.approach.value = -displacements[done - 1]
     else:
-        _begin(punch, directory, wanted)
-    comm.barrier()
+        _begin(punch, directory, settings)
+    COMM.barrier()
     history = dc.History(punch.problem, directory / "history.csv", positions, resume=done)
-    per_cycle = parameters.loading + parameters.unloading
-    for index, displacement in enumerate(displacements[done:], start=done):
+    for number, displacement in enumerate(displacements[done:], start=done + 1):
         balance.open()
         punch.approach.value = -displacement
         try:
             step = punch.problem.solve()
         except dc.NotConverged as error:
-            reason = f"step {index + 1}: {error}"
-            if comm.rank == 0:
+            reason = f"step {number}: {error}"
+            if COMM.rank == 0:
                 (directory / FAILED).write_text(reason)
             return reason
-        cycle = index // per_cycle + 1
+        cycle = (number - 1) // (parameters.loading + parameters.unloading) + 1
         history.record(step, cycle=cycle, displacement=displacement, **balance.close())
-        names = (*ContactMap._fields[2:], *FIELDS)
-        fields = {name: _gathered(punch, getattr(contact, name)) for name in names}
-        if comm.rank == 0:
-            np.savez(directory / "steps" / f"{index + 1:04d}.npz", **fields)
-        punch.problem.save(_checkpoint(directory, index + 1))  # last: now the step is done
-        if comm.rank == 0:
-            _checkpoint(directory, index).unlink(missing_ok=True)
-        if bar is not None:
-            bar.update()
+        _, *fields = at_nodes(punch, *(getattr(contact, name) for name in FIELDS))
+        if COMM.rank == 0:
+            np.savez(directory / "steps" / f"{number:04d}.npz", **dict(zip(FIELDS, fields)))
+        punch.problem.save(_checkpoint(directory, number))  # last: now the step is done
+        if COMM.rank == 0:
+            _checkpoint(directory, number - 1).unlink(missing_ok=True)
+        bar.update()
     return ""
 
 
-def _begin(punch, directory: Path, wanted: dict) -> None:
+def _begin(punch, directory: Path, settings: dict) -> None:
     """An empty directory with what the run is.  Collective."""
-    disc, area, head = gather(punch), _gathered(punch, punch.contact.area), punch.head()
-    if punch.comm.rank == 0:
+    disc, (_, area), head = gather(punch), at_nodes(punch, punch.contact.area), punch.head()
+    if COMM.rank == 0:
         shutil.rmtree(directory, ignore_errors=True)
         (directory / "steps").mkdir(parents=True)
         np.savez(directory / "disc.npz", x=disc.x, faces=disc.faces, area=area)
-        description = json.dumps({"settings": wanted, "head": head}, indent=1)
+        description = json.dumps({"settings": settings, "head": head}, indent=1)
         (directory / "run.json").write_text(description + "\n")
 
 
@@ -179,28 +165,17 @@ def _checkpoint(directory: Path, step: int) -> Path:
     return directory / f"checkpoint_{step:04d}.npz"
 
 
-def _found(directory: Path, wanted: dict) -> tuple[int, str]:
+def _found(directory: Path, settings: dict) -> tuple[int, str]:
     """Steps that are kept, and what did not converge then; nothing if they have other settings."""
     try:
         found = json.loads((directory / "run.json").read_text())["settings"]
     except (FileNotFoundError, json.JSONDecodeError):
         found = None
-    if found != wanted:
+    if found != settings:
         return 0, ""
     steps = [int(file.stem[-4:]) for file in directory.glob("checkpoint_*.npz")]
     failed = directory / FAILED
     return max(steps, default=0), failed.read_text() if failed.exists() else ""
-
-
-def _gathered(punch, values):
-    """Nodal values of all ranks in the order of ``gather``, on rank 0; None on the others."""
-    numbering = punch.V.dofmap.index_map
-    mine = numbering.local_to_global(punch.contact.nodes.astype(np.int32)), values
-    parts = punch.comm.gather(mine)
-    if parts is None:
-        return None
-    node, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return values[np.argsort(node)]
 
 
 class Run:
@@ -211,27 +186,19 @@ class Run:
         head: What was computed, and by what.
         points: Tracked nodes beside P are those nearest to these, mm.
         table: Columns of the history, arrays over the steps.
-        area: Nodal areas, ``shape=(n,)``, mm^2.
+        x, faces, area: Nodes of the contact disc, its quadrilaterals, and nodal areas, mm^2.
     """
 
     def __init__(self, directory):
         self.directory = Path(directory)
         description = json.loads((self.directory / "run.json").read_text())
-        self.head = description["head"]
-        stored = description["settings"]["parameters"]
-        self.points = description["settings"]["points"]
+        self.head, settings = description["head"], description["settings"]
+        self.points, stored = settings["points"], settings["parameters"]
         lists = {key: tuple(value) for key, value in stored.items() if isinstance(value, list)}
         self.parameters = Parameters(**{**stored, **lists})
-        with open(self.directory / "history.csv", newline="") as file:
-            rows = list(csv.DictReader(file))
-        self.table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+        self.table = np.genfromtxt(self.directory / "history.csv", delimiter=",", names=True)
         disc = np.load(self.directory / "disc.npz")
         self.x, self.faces, self.area = disc["x"], disc["faces"], disc["area"]
-        self.friction = CASES[self.parameters.case]
-
-    @property
-    def case(self) -> str:
-        return self.parameters.case
 
     def loaded(self, cycle: int) -> int:
         """Number of the step at whose end the punch is fully loaded, from 1."""

@@ -11,22 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from studies.punch.measures import (
-    RIM,
-    STILL,
-    hysteresis,
-    loading_nonlinearity,
-    plateau,
-    total,
-    unloading,
-    unloading_nonlinearity,
-    zones,
-)
+from studies.punch.measures import RIM, STILL, hysteresis, nonlinearity, plateau, total, zones
 from studies.punch.run import Run
 
 SMALL = 0.05  # what "quasi-linear" and "no noticeable difference" may deviate, relative
 ROUNDING = 1e-9  # radii that differ by less, over R, are one
-NOT_ASKED = np.nan, None  # of runs without anything to compare
+CYCLES = "first", "last"  # a statement about the last one is not asked of runs of one cycle
 
 
 class Statement(NamedTuple):
@@ -37,77 +27,66 @@ class Statement(NamedTuple):
     text: str
     measure: str
     cases: str  # which cases it is about; several at once if ``together``
-    decide: Callable  # Run, or dict of Runs by case -> value, whether it holds
-    cycles: int = 1  # that a run must have to be asked
+    values: Callable  # (Run, or dict of Runs by case; cycle) -> the number, and what else decides; nan: not asked
+    holds: Callable  # of these values
+    cycle: str = "first"
     together: bool = False
 
 
-def _over(bound, measure):
-    """Decided by ``measure``: holds above the bound; not asked where it is None."""
-    return lambda runs: NOT_ASKED if (value := measure(runs)) is None else (value, value > bound)
+def loaded(run: Run, cycle: int):
+    now = zones(run, run.loaded(cycle))
+    return now.count, now.central
 
 
-def _most(bound, measure):
-    """As ``_over``, but holds up to the bound."""
-    return lambda runs: NOT_ASKED if (value := measure(runs)) is None else (value, value <= bound)
+def unloading(run: Run, cycle: int) -> list:
+    """Zones from the loaded state of a cycle to its unloaded one."""
+    return [zones(run, step) for step in range(run.loaded(cycle), run.unloaded(cycle) + 1)]
 
 
-def _centre(run):
-    now = zones(run, run.loaded(1))
-    return now.count, now.central and now.count == 1
+def peripheral(run: Run, cycle: int) -> float:
+    before, *steps = (z.peripheral for z in unloading(run, cycle))
+    return max(steps) - before
 
 
-def _peripheral(run):
-    steps = unloading(run, 1)
-    return max(z.peripheral for z in steps[1:]) - steps[0].peripheral
-
-
-def _ends(run) -> list:
+def ends(run: Run) -> list:
     """Zones at the end of every cycle."""
     return [zones(run, run.unloaded(c)) for c in range(1, run.parameters.cycles + 1)]
 
 
-def _shrink(run):
-    first, last = (_ends(run)[k].fraction for k in (0, -1))
-    return (last / first, last < 0.9 * first) if first else NOT_ASKED
+def stuck(run: Run, cycle: int) -> float:
+    first, *_, last = ends(run)
+    return last.fraction / first.fraction if first.fraction else np.nan
 
 
-def _fragment(run):
-    first, last = (_ends(run)[k].count for k in (0, -1))
-    return last - first if first else None
+def pieces(run: Run, cycle: int) -> float:
+    first, *_, last = ends(run)
+    return last.count - first.count if first.count else np.nan
 
 
-def _within(run):
-    return float(np.ptp([z.count for z in unloading(run, 1)]) - np.ptp([z.count for z in _ends(run)]))  # fmt: skip
+def breaking(run: Run, cycle: int) -> float:
+    within = np.ptp([z.count for z in unloading(run, 1)])
+    return float(within - np.ptp([z.count for z in ends(run)]))
 
 
-def _reverse(cycle):
-    def decide(run):
-        inner = np.array([z.inner for z in unloading(run, cycle(run))[1:]])
-        inner = inner[~np.isnan(inner)]
-        if len(inner) < 2:
-            return NOT_ASKED
-        return inner[-1] - inner[0], inner[0] > RIM and inner[-1] < inner[0] - ROUNDING
-
-    return decide
+def reverse(run: Run, cycle: int):
+    inner = np.array([z.inner for z in unloading(run, cycle)[1:]])
+    inner = inner[~np.isnan(inner)]
+    return (inner[-1] - inner[0], inner[0]) if len(inner) > 1 else np.nan
 
 
-def _asymmetric(cycle):
-    def decide(run):
-        up, down = loading_nonlinearity(run, cycle(run)), unloading_nonlinearity(run, cycle(run))
-        return up, up <= SMALL < down
-
-    return decide
+def curvature(run: Run, cycle: int):
+    """Non-linearity of a loading, and of the unloading after it."""
+    start, top, end = run.unloaded(cycle - 1), run.loaded(cycle), run.unloaded(cycle)
+    return nonlinearity(run, start, top), nonlinearity(run, top, end)
 
 
-def _plateau(side):
-    return lambda run: min(plateau(run, c)[side] for c in range(2, run.parameters.cycles + 1))
+def still(side: int):
+    return lambda run, last: min(plateau(run, cycle)[side] for cycle in range(2, last + 1))
 
 
-def _plateau_elsewhere(run):
-    """Area of the nodes that slip in the last cycle but are still at its last loading increment."""
-    n = run.parameters.cycles
-    start, top, end = run.unloaded(n - 1), run.loaded(n), run.unloaded(n)
+def still_elsewhere(run: Run, cycle: int) -> float:
+    """Area of the nodes that slip in a cycle but are still at its last loading increment."""
+    start, top, end = run.unloaded(cycle - 1), run.loaded(cycle), run.unloaded(cycle)
     slips = [run.fields(k)["slip_increment"] for k in range(start + 1, end + 1)]
     moved = np.linalg.norm(slips, axis=-1)
     most = moved.max(axis=0)
@@ -115,92 +94,71 @@ def _plateau_elsewhere(run):
     return run.area[chosen].sum() / run.area.sum()
 
 
-def _spread(cycle):
-    def ratio(runs):
-        works = [total(run, cycle(run)) for run in runs.values()]
-        return max(works) / min(works)
-
-    return ratio
+def spread(runs: dict[str, Run], cycle: int) -> float:
+    works = [total(run, cycle) for run in runs.values()]
+    return max(works) / min(works)
 
 
-def _against(a, b):
-    def ratio(runs):
-        works = [runs[case].dissipation(runs[case].parameters.cycles).sum() for case in (a, b)]
-        return works[1] / works[0]
-
-    return ratio
+def all_work(runs: dict[str, Run]) -> np.ndarray:
+    """Work of friction of all cycles by case and node."""
+    return np.array([run.dissipation(run.parameters.cycles) for run in runs.values()])
 
 
-def tenfold_area(runs) -> float:
+def second_over_first(runs: dict[str, Run], cycle: int) -> float:
+    one, other = all_work(runs).sum(axis=1)
+    return other / one
+
+
+def tenfold_area(runs: dict[str, Run], cycle: int) -> float:
     """Area share where the cases' densities of work differ tenfold, in all cycles together.
 
     Not counted are nodes at which no case reaches a tenth of the mean density of work.
     """
-    area = next(iter(runs.values())).area
-    works = np.array([run.dissipation(run.parameters.cycles) for run in runs.values()])
+    area, works = next(iter(runs.values())).area, all_work(runs)
     counts = (works / area).max(axis=0) >= 0.1 * works.mean(axis=0).sum() / area.sum()
     tenfold = works.max(axis=0) >= 10 * works.min(axis=0)
     return float(area[counts & tenfold].sum() / area.sum())
 
 
-def first(run) -> int:
-    return 1
-
-
-def last(run) -> int:
-    return run.parameters.cycles
-
-
-S, F = "Section 3, ", "Fig. {}".format
+FIG3, FIG4, FIG6, FIG7 = ("Section 3, Fig. " + number for number in "3467")
 STATEMENTS = [
-    Statement("centre", S + F(3), "After the first loading, sticking is one zone at the centre.",
-        "number of stick zones; one, with the centre", "ABC", _centre),
-    Statement("peripheral", S + F(3), "During the first unloading the periphery (r > 3/4 R) "
-        "begins to stick.", "area fraction of the periphery gained; > 0.1", "ABC", _over(0.1, _peripheral)),
-    Statement("shrink", S + F(3), "From cycle to cycle the stick zones after unloading shrink.",
-        "stuck area, last cycle over first; < 0.9", "ABC", _shrink, 2),
-    Statement("fragment", S + F(3), "From cycle to cycle they break into more pieces.",
-        "pieces after the last unloading less those after the first; > 0", "ABC", _over(0, _fragment), 2),
-    Statement("reverse1", S + F(3), "Reverse slip begins at the rim and advances inwards "
-        "(first unloading).", "change of its innermost radius / R; begins beyond 3/4, < 0",
-        "ABC", _reverse(first)),
-    Statement("reverseN", S + F(3), "Reverse slip begins at the rim and advances inwards "
-        "(last unloading).", "the same", "ABC", _reverse(last), 2),
-    Statement("A_closed", S + F(4), "Isotropic: loading and unloading show no noticeable difference "
-        "in the force-slip curve of P (last cycle).", "difference in slip / range; <= 0.05",
-        "A", _most(SMALL, lambda run: hysteresis(run, last(run))), 2),
-    Statement("BC_first", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
-        "(first cycle).", "non-linearity of loading; <= 0.05 < that of unloading", "BC",
-        _asymmetric(first)),
-    Statement("BC_last", S + F(4), "Anisotropic: loading is quasi-linear, unloading is not "
-        "(last cycle).", "the same", "BC", _asymmetric(last), 2),
-    Statement("plateau", S + F(6), "From the second cycle on P is still at the end of loading, before "
-        "the peak.", "part of loading before the peak; > 0", "ABC", _over(0, _plateau(0)), 2),
-    Statement("plateau_elsewhere", S + F(6), "There are other choices of P for which it is so (last "
-        "cycle).", "share of the area that slips in the cycle but is still before the peak; > 0.05",
-        "ABC", _over(SMALL, _plateau_elsewhere), 2),
-    Statement("A_linear", S + F(7), "Isotropic: the force-slip curve is quasi-linear (loading of the "
-        "last cycle).", "non-linearity of loading; <= 0.05", "A",
-        _most(SMALL, lambda run: loading_nonlinearity(run, last(run))), 2),
-    Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more "
-        "than A by a fifth or more.", "all work of B over that of A; > 1.2", "AB",
-        _over(1.2, _against("A", "B")), together=True),
-    Statement("nonassociated", "Section 4", "The slip rule alone has a strong influence: C dissipates "
-        "more than B by a fifth or more.", "all work of C over that of B; > 1.2", "BC",
-        _over(1.2, _against("B", "C")), together=True),
-    Statement("within", "observed", "Stick zones break up within one unloading more than from cycle to "
-        "cycle.", "range of the pieces' number, within first less between; > 0", "ABC", _over(0, _within), 2),
+    Statement("centre", FIG3, "After the first loading, sticking is one zone at the centre.",
+        "number of stick zones; one, with the centre", "ABC", loaded, lambda n, central: central and n == 1),
+    Statement("peripheral", FIG3, "During the first unloading the periphery (r > 3/4 R) begins to stick.",
+        "area fraction of the periphery gained; > 0.1", "ABC", peripheral, lambda gain: gain > 0.1),
+    Statement("shrink", FIG3, "From cycle to cycle the stick zones after unloading shrink.",
+        "stuck area, last cycle over first; < 0.9", "ABC", stuck, lambda ratio: ratio < 0.9, "last"),
+    Statement("fragment", FIG3, "From cycle to cycle they break into more pieces.",
+        "pieces after the last unloading less those after the first; > 0", "ABC", pieces, lambda more: more > 0, "last"),
+    *(Statement(f"reverse_{cycle}", FIG3, f"Reverse slip begins at the rim and advances inwards ({cycle} unloading).",
+        "change of its innermost radius / R; begins beyond 3/4, < 0", "ABC", reverse,
+        lambda change, begin: begin > RIM and change < -ROUNDING, cycle) for cycle in CYCLES),
+    Statement("A_closed", FIG4, "Isotropic: loading and unloading show no noticeable difference in the force-slip curve "
+        "of P (last cycle).", "difference in slip / range; <= 0.05", "A", hysteresis, lambda width: width <= SMALL, "last"),
+    *(Statement(f"BC_{cycle}", FIG4, f"Anisotropic: loading is quasi-linear, unloading is not ({cycle} cycle).",
+        "non-linearity of loading; <= 0.05 < that of unloading", "BC", curvature,
+        lambda up, down: up <= SMALL < down, cycle) for cycle in CYCLES),
+    Statement("plateau", FIG6, "From the second cycle on P is still at the end of loading, before the peak.",
+        "part of loading before the peak; > 0", "ABC", still(0), lambda part: part > 0, "last"),
+    Statement("plateau_elsewhere", FIG6, "There are other choices of P for which it is so (last cycle).",
+        "share of the area that slips in the cycle but is still before the peak; > 0.05",
+        "ABC", still_elsewhere, lambda share: share > SMALL, "last"),
+    Statement("A_linear", FIG7, "Isotropic: the force-slip curve is quasi-linear (loading of the last cycle).",
+        "non-linearity of loading; <= 0.05", "A", curvature, lambda up, down: up <= SMALL, "last"),
+    Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more than A by a fifth "
+        "or more.", "all work of B over that of A; > 1.2", "AB", second_over_first, lambda ratio: ratio > 1.2, together=True),
+    Statement("nonassociated", "Section 4", "The slip rule alone has a strong influence: C dissipates more than B by a "
+        "fifth or more.", "all work of C over that of B; > 1.2", "BC", second_over_first, lambda ratio: ratio > 1.2,
+        together=True),
+    Statement("within", "observed", "Stick zones break up within one unloading more than from cycle to cycle.",
+        "range of the pieces' number, within first less between; > 0", "ABC", breaking, lambda more: more > 0, "last"),
     Statement("after", "observed", "From the second cycle on P is still after the peak.",
-        "part of unloading after the peak; > 0", "ABC", _over(0, _plateau(1)), 2),
-    Statement("A_unlinear", "observed", "Even the isotropic force-slip curve is not quasi-linear (last "
-        "cycle).", "non-linearity of loading; > 0.05", "A",
-        _over(SMALL, lambda run: loading_nonlinearity(run, last(run))), 2),
-    Statement("spread1", "observed", "The cases dissipate alike within 30 % or so (first cycle).",
-        "largest over smallest work; <= 1.35", "ABC", _most(1.35, _spread(first)), together=True),
-    Statement("spreadN", "observed", "The cases dissipate alike within 30 % or so (last cycle).",
-        "the same", "ABC", _most(1.35, _spread(last)), 2, True),
-    Statement("local", "observed", "Locally the cases differ tenfold.", "share of the area where "
-        "the work differs tenfold; > 0.05", "ABC", _over(SMALL, tenfold_area), together=True),
+        "part of unloading after the peak; > 0", "ABC", still(1), lambda part: part > 0, "last"),
+    *(Statement(f"spread_{cycle}", "observed", f"The cases dissipate alike within 30 % or so ({cycle} cycle).",
+        "largest over smallest work; <= 1.35", "ABC", spread, lambda ratio: ratio <= 1.35, cycle, True)
+        for cycle in CYCLES),
+    Statement("local", "observed", "Locally the cases differ tenfold.", "share of the area where the work differs "
+        "tenfold; > 0.05", "ABC", tenfold_area, lambda share: share > SMALL, together=True),
 ]  # fmt: skip
 
 
@@ -209,16 +167,16 @@ def ask(runs: dict[str, dict[str, Run]]) -> list[dict]:
     rows = []
     for statement in STATEMENTS:
         for variant, cases in runs.items():
-            wanted = {case: cases[case] for case in statement.cases if case in cases}
+            asked = {case: cases[case] for case in statement.cases if case in cases}
+            cycles = min((run.parameters.cycles for run in asked.values()), default=0)
+            if not asked or statement.cycle == "last" and cycles < 2:
+                continue
             if statement.together:
-                asked = {"+".join(wanted): wanted} if len(wanted) == len(statement.cases) else {}
-            else:
-                asked = wanted
+                asked = {"+".join(asked): asked} if len(asked) == len(statement.cases) else {}
             for case, subject in asked.items():
-                if min(run.parameters.cycles for run in wanted.values()) < statement.cycles:
-                    continue
-                value, holds = statement.decide(subject)
-                if holds is not None:
+                cycle = cycles if statement.cycle == "last" else 1
+                values = np.atleast_1d(statement.values(subject, cycle)).tolist()
+                if not np.isnan(values[0]):
                     rows.append(dict(statement=statement.key, variant=variant, case=case,
-                                     value=float(value), holds=int(holds)))  # fmt: skip
+                                     value=float(values[0]), holds=int(statement.holds(*values))))  # fmt: skip
     return rows

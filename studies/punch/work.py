@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.colors import LogNorm
 
 from mechanics.convergence import richardson
+from studies.punch.contact_map import paint
 from studies.punch.figures import COLOURS, NAMES, Figures, write_csv
 from studies.punch.measures import total
 from studies.punch.run import Run
@@ -30,13 +32,12 @@ def energy(figures: Figures) -> None:
     with figures.drawn("energy", (4.8 * len(runs), 11)) as figure:
         axes = figure.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
         for (above, middle, below), (case, run) in zip(axes.T, runs.items()):
-            at = np.arange(len(run.table["step"]) + 1) / run.unloaded(1)
-            work = np.r_[0, np.cumsum(run.table["platen_work"])]
-            above.plot(at, work, color="black", linewidth=2, label="work of the platen")
-            for key, (label, colour, style) in TERMS.items():
+            at = np.arange(len(run.table) + 1) / run.unloaded(1)
+            platen = {"platen_work": ("work of the platen", "black", "-")}
+            for key, (label, colour, style) in (platen | TERMS).items():
                 values = np.r_[0, np.cumsum(run.table[key])]
                 above.plot(at, values, style, color=colour, label=label)
-                if key not in ("elastic_change", "half_du_K_du"):
+                if key not in ("platen_work", "elastic_change", "half_du_K_du"):
                     middle.plot(at, values, style, color=colour)
             below.semilogy(at[1:], np.maximum(relative_residual(run), 1e-17), ".", color="black")
             below.axhline(run.parameters.tol, color="#d55e00", linewidth=1)
@@ -44,50 +45,38 @@ def energy(figures: Figures) -> None:
             above.set(title=NAMES[case], ylabel="accumulated [N mm]")
             middle.set(ylabel="the small terms [N mm]")
             below.set(xlabel="cycles", ylabel="|open balance| / largest term", ylim=(1e-17, 1e-7))
-            for ax in (above, middle, below):
-                ax.grid(alpha=0.3)
-                ax.label_outer()
+        for ax in axes.flat:
+            ax.grid(alpha=0.3)
+            ax.label_outer()
         handles = axes[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
         figure.suptitle("The work of the platen is the sum of the next four terms of the legend")
-    names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual",
-             "platen_work_mean", "dissipation_mean", "closing_mean", "residual_mean")  # fmt: skip
-    rows = [
-        {"case": case, **{name: float(run.table[name][k]) for name in names}}
-        for case, run in runs.items()
-        for k in range(len(run.table["step"]))
-    ]
-    write_csv(figures.directory / "energy.csv", rows)
+    names = ("step", "cycle", "displacement", "platen_work", *TERMS, "residual", "residual_mean")
+    figures.write("energy", lambda run: [{name: run.table[name] for name in names}])
 
 
-def cycle_table(runs: dict[str, Run], wear: float) -> list[dict]:
-    """Per case and cycle: work of friction, its ratio to the cycle before, wear, drift."""
+def cycles(figures: Figures, wear: float) -> list[dict]:
+    """Per case and cycle: work of friction, its ratio to the cycle before, wear, drift; figure and table."""
     rows = []
-    for case, run in runs.items():
+    for case, run in figures.runs.items():
         for c in range(1, run.parameters.cycles + 1):
-            steps = slice(run.unloaded(c - 1), run.unloaded(c))
+            table = run.table[run.unloaded(c - 1) : run.unloaded(c)]
             work, before = total(run, c), total(run, c - 1) if c > 1 else np.nan
             ends = [run.fields(run.unloaded(k))["displacement"] for k in (c - 1, c) if k]
             drift = np.linalg.norm((ends[-1] - ends[0])[:, :2], axis=1).max() if c > 1 else np.nan
             rows.append(dict(
                 case=case, cycle=c, dissipation_Nmm=work, of_previous_cycle=work / before,
-                end_of_step_rule_Nmm=float(run.table["dissipation_end"][steps].sum()), worn_volume_mm3=wear * work,
-                largest_drift_um=1e3 * float(drift), seconds=float(run.table["seconds"][steps].sum()),
+                worn_volume_mm3=wear * work, largest_drift_um=1e3 * float(drift), seconds=float(table["seconds"].sum()),
             ))  # fmt: skip
-    return rows
-
-
-def cycles(figures: Figures, wear: float) -> list[dict]:
-    """Work of friction per cycle and how it settles, and the drift of the nodes."""
-    rows = cycle_table(figures.runs, wear)
     with figures.drawn("cycles", (14, 4.4)) as figure:
         work, settled, drift = figure.subplots(1, 3)
         for case in figures.runs:
-            mine = [row for row in rows if row["case"] == case]
-            n, style = [row["cycle"] for row in mine], _style(case)
-            work.plot(n, [row["dissipation_Nmm"] for row in mine], label=NAMES[case], **style)
-            settled.semilogy(n[1:], [abs(row["of_previous_cycle"] - 1) for row in mine[1:]], **style)  # fmt: skip
-            drift.semilogy(n[1:], [row["largest_drift_um"] for row in mine[1:]], **style)
+            names = ("cycle", "dissipation_Nmm", "of_previous_cycle", "largest_drift_um")
+            mine = [[row[name] for name in names] for row in rows if row["case"] == case]
+            n, works, ratio, drifts = np.transpose(mine)
+            work.plot(n, works, label=NAMES[case], **_style(case))
+            settled.semilogy(n[1:], np.abs(ratio[1:] - 1), **_style(case))
+            drift.semilogy(n[1:], drifts[1:], **_style(case))
         work.set(title="Work of friction per cycle", ylabel="N mm", ylim=(0, None))
         settled.set(title="Its change to the cycle before", ylabel="relative")
         drift.set(title="Largest drift of a node per cycle", ylabel="µm")
@@ -105,32 +94,44 @@ def _style(case: str) -> dict:
 def maps(figures: Figures, wear: float) -> None:
     """Density of the work of friction in the first and last cycle and in all; worn depth."""
     last = figures.cycles
-    columns = {"cycle 1": lambda run: run.dissipation(1) / run.area}
+    works = {"cycle 1": lambda run: run.dissipation(1) / run.area}
     if last > 1:
-        columns[f"cycle {last}"] = lambda run: (
+        works[f"cycle {last}"] = lambda run: (
             (run.dissipation(last) - run.dissipation(last - 1)) / run.area
         )
-        columns["all cycles"] = lambda run: run.dissipation(last) / run.area
-    figures.densities("dissipation", "Work of friction per area", columns, "N mm / mm²")
-    title = f"Worn depth after {last} cycles, coefficient {wear:g} mm³/(N mm)"
+        works["all cycles"] = lambda run: run.dissipation(last) / run.area
     depth = {"depth_nm": lambda run: 1e6 * wear * run.dissipation(last) / run.area}
-    volumes = {
-        case: f"{wear * run.dissipation(last).sum():.3g} mm³" for case, run in figures.runs.items()
-    }
-    figures.densities("wear", title, depth, "nm", across=volumes)
+    worn = f"Worn depth after {last} cycles, coefficient {wear:g} mm³/(N mm)"
+    _densities(figures, "dissipation", "Work of friction per area", works, "N mm / mm²")
+    _densities(figures, "wear", worn, depth, "nm")
+
+
+def _densities(figures: Figures, name, title, columns, label) -> None:
+    """Positive nodal fields, functions of a run by heading, on one logarithmic scale."""
+    top = max(field(run).max() for field in columns.values() for run in figures.runs.values())
+    colours = dict(cmap="cividis", norm=LogNorm(1e-3 * top, top))
+
+    def show(ax, run, field):
+        return paint(ax, run.disc(1), np.maximum(field(run), 1e-3 * top), **colours)
+
+    def tables(run):
+        at = dict(x=run.x[:, 0], y=run.x[:, 1], area=run.area)
+        return [at | {key: field(run) for key, field in columns.items()}]
+
+    figures.discs(name, title, columns, show, label)
+    figures.write(name, tables)
 
 
 def comparison(runs: dict[str, dict[str, Run]], failures=()) -> list[dict]:
-    """Work of friction in the first cycle, with both rules, for all variants, the failed ones too."""
+    """Work of friction in the first cycle, for all variants, the failed ones too."""
     rows = []
     for name, cases in runs.items():
         for case, run in cases.items():
-            first, own, work = slice(0, run.unloaded(1)), run.parameters, total(run, 1)
+            own, work = run.parameters, total(run, 1)
             rows.append(dict(
                 variant=name, case=case, first_cycle_Nmm=work, of_base=work / total(runs["base"][case], 1),
-                end_of_step_rule_Nmm=float(run.table["dissipation_end"][first].sum()), last_cycle=own.cycles,
-                last_cycle_Nmm=total(run, own.cycles), increments=own.loading + own.unloading, contact_nodes=len(run.x),
-                iterations_per_step=float(run.table["iterations"].mean()),
+                last_cycle=own.cycles, last_cycle_Nmm=total(run, own.cycles), increments=own.loading + own.unloading,
+                contact_nodes=len(run.x), iterations_per_step=float(run.table["iterations"].mean()),
                 seconds_per_step=float(run.table["seconds"].mean()), not_converged="",
             ))  # fmt: skip
     return rows + [dict.fromkeys(rows[0], np.nan) | failure for failure in failures]
@@ -141,17 +142,18 @@ def mesh_orders(runs: dict[str, dict[str, Run]]) -> list[dict]:
     and limit from three meshes, nan where their changes do not fall."""
     rows = []
     for case in runs["base"]:
-        meshes = [cases[case] for name, cases in runs.items()
-                  if case in cases and name.startswith(("base", "mesh "))]  # fmt: skip
-        work = {run.parameters.refine: total(run, 1) for run in meshes}
-        for run in sorted(meshes, key=lambda run: run.parameters.refine):
-            level = run.parameters.refine
+        meshes = {
+            cases[case].parameters.refine: cases[case]
+            for name, cases in runs.items()
+            if case in cases and name.startswith(("base", "mesh "))
+        }
+        work = {level: total(run, 1) for level, run in meshes.items()}
+        for level in sorted(meshes):
             last = [work[k] for k in (level - 2, level - 1, level) if k in work]
-            limit, order = richardson([4, 2, 1], last, (1e-9, 60)) if len(last) == 3 else (0, None)
-            before = work.get(level - 1, np.nan)
+            limit, order = richardson([4, 2, 1], last, (1e-9, 60))
             rows.append(dict(
-                case=case, refine=level, contact_nodes=len(run.x), first_cycle_Nmm=work[level],
-                change_relative=(work[level] - before) / before, observed_order=order or np.nan,
+                case=case, refine=level, contact_nodes=len(meshes[level].x), first_cycle_Nmm=work[level],
+                change_relative=work[level] / work.get(level - 1, np.nan) - 1, observed_order=order or np.nan,
                 limit_at_that_order_Nmm=limit if order else np.nan,
             ))  # fmt: skip
     return rows
@@ -159,30 +161,27 @@ def mesh_orders(runs: dict[str, dict[str, Run]]) -> list[dict]:
 
 def convergence(figures: Figures, rows: list[dict]) -> None:
     """Dissipation of the first cycle against increments and mesh, where there are several."""
-    panels = [("increments", " increments"), ("contact_nodes", "mesh ")]
-    shown = [
-        (key, [row for row in rows if not row["not_converged"] and (row["variant"] == "base" or part in row["variant"])])
-        for key, part in panels
-    ]  # fmt: skip
-    if max(len({row[key] for row in of}) for key, of in shown) < 2:
+    rows = [row for row in rows if not row["not_converged"]]
+    panels = {
+        key: [row for row in rows if row["variant"] == "base" or part in row["variant"]]
+        for key, part in {"increments": " increments", "contact_nodes": "mesh "}.items()
+    }
+    shown = [row for row in rows if any(row in panel for panel in panels.values())]
+    if {row["variant"] for row in shown} == {"base"}:
         return
     with figures.drawn("convergence", (11, 4.6)) as figure:
         axes = figure.subplots(1, 2, sharey=True)
-        for ax, (key, of) in zip(axes, shown):
+        for ax, (key, panel) in zip(axes, panels.items()):
             for case in figures.runs:
-                mine = sorted((row for row in of if row["case"] == case), key=lambda row: row[key])
-                for rule, dash, name in (
-                    ("first_cycle_Nmm", "-", "the library's rule"),
-                    ("end_of_step_rule_Nmm", ":", "end of step"),
-                ):
-                    x, y = [row[key] for row in mine], [row[rule] for row in mine]
-                    ax.semilogx(x, y, dash, label=f"{case}, {name}", **_style(case))
-            ticks = sorted({row[key] for row in of})
+                points = [
+                    (row[key], row["first_cycle_Nmm"]) for row in panel if row["case"] == case
+                ]
+                ax.semilogx(*zip(*sorted(points)), label=NAMES[case], **_style(case))
+            ticks = sorted({row[key] for row in panel})
             ax.set_xticks(ticks, [str(size) for size in ticks])
             ax.minorticks_off()
             ax.set(xlabel=key.replace("_", " "))
             ax.grid(alpha=0.3)
         axes[0].set(ylabel="work of friction, first cycle [N mm]", ylim=(0, None))
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center")
-    rows = [row for _, of in shown for row in of]
-    write_csv(figures.directory / "convergence.csv", list({id(row): row for row in rows}.values()))
+        axes[0].legend()
+    write_csv(figures.directory / "convergence.csv", shown)
