@@ -38,9 +38,8 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
-from demo_partial_slip import COMM, A, R, cylinder
-from picture import picture
-from rounded_body import along_face
+from demo_partial_slip import A, R, cylinder
+from helpers import along_face, picture, say
 
 YOUNG, POISSON = 1000.0, 0.3
 COEFFICIENT = 30.0  # 1/MPa: far above a real one, so that few cycles show what wear does
@@ -119,9 +118,8 @@ def main() -> list[dict]:
         loop = np.diff(work)[-1]
         found.append(third)
         lacking.append(1 - loop / third)
-        if COMM.rank == 0:
-            print(f"without wear, {quarter} steps a quarter: dissipation {second:.4e}", end=", ")
-            print(f"{third:.4e} N a cycle, work of the plane {loop:.4e}")
+        say(f"without wear, {quarter} steps a quarter: dissipation {second:.4e}, {third:.4e} N a cycle, "
+            f"work of the plane {loop:.4e}")  # fmt: skip
         assert abs(third / second - 1) < 1e-6
     assert abs(found[1] / found[0] - 1) < 1e-3
     assert 0 < 3 * lacking[1] < lacking[0] < 0.06  # towards a quarter
@@ -141,21 +139,13 @@ def main() -> list[dict]:
     assert core[middle] and not core[deepest]
     change = [worn["pressure"][node] / new["pressure"][node] - 1 for node in (middle, deepest)]
     touching = [np.count_nonzero(profile["pressure"]) for profile in (new, worn)]
-    if COMM.rank == 0:
-        print(
-            f"with wear: deepest {worn['depth'].max():.2e} mm, load {load:.4f} N, pressure", end=" "
-        )
-        print(f"{change[0]:+.1%} in the middle, {change[1]:+.1%} where it is deepest;", end=" ")
-        print(f"{touching[0]} nodes touch at first, {touching[1]} at last")
+    say(f"with wear: deepest {worn['depth'].max():.2e} mm, load {load:.4f} N, pressure "
+        f"{change[0]:+.1%} in the middle, {change[1]:+.1%} where it is deepest; "
+        f"{touching[0]} nodes touch at first, {touching[1]} at last")  # fmt: skip
     assert change[0] > 0.05 and change[1] < -0.3 and touching[1] > touching[0]
     return profiles
 
 
-# %% [markdown]
-# In a notebook the picture is below; `python demos/demo_fretting.py picture.png` writes it to a file.
-
-
-# %%
 def draw(figure, profiles) -> None:
     """Pressure and worn depth along the face, before and after each cycle."""
     above, below = figure.subplots(2, 1, sharex=True)

@@ -47,11 +47,8 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
-from picture import picture
-from rounded_body import along_face, rounded_body
+from helpers import along_face, hooke, picture, rounded_body, say
 
-COMM = MPI.COMM_WORLD
 E, NU, MU = 1000.0, 0.499, 0.3
 E_STAR = E / (1 - NU**2)
 R, A = 1000.0, 0.1  # radius; half width for which the mesh is made
@@ -60,26 +57,7 @@ L = 16 * A
 
 # %% [markdown]
 # ## Code
-
-
-# %%
-def cylinder(E: float, nu: float, wear=None, cells: int = 32, size: float = L):
-    """Body, plane and friction; the far boundary is held, its displacement is the second result."""
-    domain, face, far = rounded_body(COMM, R, A, size, cells, crossed=True)
-    V = functionspace(domain, ("Lagrange", 1, (2,)))
-    u, v = fem.Function(V), ufl.TestFunction(V)
-    strain = ufl.sym(ufl.grad(u))
-    lame, shear = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
-    stress = lame * ufl.tr(strain) * ufl.Identity(2) + 2 * shear * strain
-    F = ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
-    held = fem.Constant(domain, np.zeros(2))
-    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
-    plane = dc.RigidPlane(point=(0, 0), normal=(0, 1))
-    contact = dc.Contact(V, face, plane, dc.Friction(mu=MU), wear=wear)
-    return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10), held
-
-
-# %% [markdown]
+#
 # The sticking part is measured twice. By the status of the nodes it is known to the width of a
 # cell, here $a/11$ in the middle and $a/7$ near the edge. By second moments it is known better:
 # for the closed form $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that
@@ -87,6 +65,19 @@ def cylinder(E: float, nu: float, wear=None, cells: int = 32, size: float = L):
 
 
 # %%
+def cylinder(E: float, nu: float, wear=None, cells: int = 32, size: float = L):
+    """Body, plane and friction; the far boundary is held, its displacement is the second result."""
+    domain, face, far = rounded_body(R, A, size, cells, crossed=True)
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, nu), ufl.sym(ufl.grad(v))) * ufl.dx
+    held = fem.Constant(domain, np.zeros(2))
+    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
+    plane = dc.RigidPlane(point=(0, 0), normal=(0, 1))
+    contact = dc.Contact(V, face, plane, dc.Friction(mu=MU), wear=wear)
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10), held
+
+
 def observe(contact: dc.Contact) -> dict:
     """Forces, second moments, and the node positions by status."""
     x, r, status, area = along_face(contact, contact.reaction, contact.status, contact.area)
@@ -130,14 +121,8 @@ def residual_tractions() -> None:
     found = []
     for cells, size in ((32, L), (64, L), (64, 2 * L)):
         problem, held = cylinder(E, NU, cells=cells, size=size)
-        parts = []
-        for approach in (
-            2.6,
-            2.8,
-            3.0,
-            3.2,
-            3.4,
-        ):  # the mean: where the edge lies in its cell matters
+        parts = []  # their mean is taken: where the edge lies in its cell matters
+        for approach in (2.6, 2.8, 3.0, 3.2, 3.4):
             problem.reset()
             held.value[:] = 0.0, -approach * A**2 / (2 * R)
             problem.solve()
@@ -147,9 +132,8 @@ def residual_tractions() -> None:
             both = np.abs(smooth).sum(), np.abs(q[1:-1] - smooth).sum()
             parts.append(np.array(both) / (MU * r[:, 1].sum()))
         found.append(np.mean(parts, axis=0))
-        if COMM.rank == 0:
-            print(f"pressed, {cells} cells, L = {size / A:.0f} A: sum |q| / (mu P)", end=" ")
-            print("smooth {:.3f}, from node to node {:.3f}".format(*found[-1]))
+        say(f"pressed, {cells} cells, L = {size / A:.0f} A: sum |q| / (mu P) "
+            "smooth {:.3f}, from node to node {:.3f}".format(*found[-1]))  # fmt: skip
     (_, coarse), (here, fine), (twice, _) = found
     assert fine < 0.75 * coarse  # the mesh's part falls
     assert 1.8 < here / twice < 2.8  # the body's part, of first order or a little more
@@ -165,8 +149,7 @@ def main() -> list[dict]:
     pressed = observe(contact)
     a = np.sqrt(4 * pressed["P"] * R / (np.pi * E_STAR))
     measured = np.sqrt(4 * pressed["moment_p"] / pressed["P"])
-    if COMM.rank == 0:
-        print(f"a {a:.4f} mm, by the second moment {measured:.4f} mm")
+    say(f"a {a:.4f} mm, by the second moment {measured:.4f} mm")
     assert pressed["spread_q"] < 0.1 * MU * pressed["P"]
     assert abs(measured / a - 1) < 0.01
 
@@ -182,9 +165,8 @@ def main() -> list[dict]:
             closed, moments = sticking_part(now, before, times)
             stick = np.abs(now["stick"])
             must_stick = np.count_nonzero(np.abs(inside) < closed * a - h)
-            if COMM.rank == 0:
-                print(f"Q/(mu P) {now['Q'] / (MU * now['P']):.3f}: c/a closed form", end=" ")
-                print(f"{closed:.3f}, moments {moments:.3f}, last node {stick.max() / a:.3f}")
+            say(f"Q/(mu P) {now['Q'] / (MU * now['P']):.3f}: c/a closed form {closed:.3f}, "
+                f"moments {moments:.3f}, last node {stick.max() / a:.3f}")  # fmt: skip
             assert abs(now["P"] / pressed["P"] - 1) < 1e-3
             assert abs(moments - closed) < 0.005
             assert stick.max() < closed * a + h
@@ -195,23 +177,16 @@ def main() -> list[dict]:
     return states
 
 
-# %% [markdown]
-# In a notebook the picture is below; `python demos/demo_partial_slip.py picture.png` writes it to a file.
-
-
-# %%
 def draw(figure, states) -> None:
     """Tangential tractions of the nodes and of the closed form, for the three displacements."""
     axes, s = figure.subplots(), np.linspace(-1, 1, 1001)
     for now, colour in zip(states, ("#0072b2", "#d55e00", "#009e73")):
         a, c = now["a"], now["c"]
-        limit = 2 * MU * now["P"] / (np.pi * a)  # mu p0
+        limit = np.sign(now["Q"]) * 2 * MU * now["P"] / (np.pi * a)  # mu p0
         inner = c / a * np.sqrt(np.maximum(1 - (s * a / c) ** 2, 0))
         label = f"Q / (mu P) = {now['Q'] / (MU * now['P']):.2f}"
         axes.plot(s, np.sqrt(1 - s**2) - inner, color=colour)
-        axes.plot(
-            now["x"] / a, np.sign(now["Q"]) * now["q"] / limit, ".", color=colour, label=label
-        )
+        axes.plot(now["x"] / a, now["q"] / limit, ".", color=colour, label=label)
     axes.set(xlabel="x / a", ylabel="q / (mu p0); lines: closed form", xlim=(-1.3, 1.3))
     axes.legend()
 

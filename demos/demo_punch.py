@@ -46,6 +46,7 @@ import dolfinx_contact as dc
 from studies.punch import CASES, Parameters, Punch, programme
 from studies.punch.contact_map import draw, gather
 from studies.punch.fields import FieldWriter
+from studies.punch.model import add_options
 
 # %% [markdown]
 # ## Code
@@ -58,38 +59,26 @@ SOLVERS = {
     "paper": lambda: dc.FixedPoint(map="bipotential"),
     "condensed": dc.CondensedNewton,
 }
+HEAD = "  step    d [mm]   normal [N]  tangential [N]   open stick  slip   error  iter.  seconds"
+ROW = (
+    "{step:6d}{displacement:10.4f}{normal_reaction:13.1f}{tangential_reaction_sum:16.1f}"
+    "{open:7d}{stick:6d}{slip:6d}{error:8.0e}{iterations:7d}{seconds:9.3f}"
+)
 
 
 def run(punch: Punch) -> Iterator[dict]:
     """Compute the whole programme with a progress bar; yields the record of each step."""
-    displacements = programme(punch.parameters)
     hidden = True if punch.comm.rank != 0 else None  # None: where there is no terminal
-    with tqdm(displacements, f"case {punch.parameters.case}", disable=hidden) as bar:
+    label = f"case {punch.parameters.case}"
+    with tqdm(programme(punch.parameters), label, disable=hidden) as bar:
 
         def show(iteration, error, counts):
-            state = f"iteration {iteration}, error {error:.0e}"
+            state = f"{-punch.approach.value:.3f} mm, iteration {iteration}, error {error:.0e}"
             bar.set_postfix_str(f"{state}, {{}} open, {{}} stick, {{}} slip".format(*counts))
 
         punch.problem.monitor = show
         for displacement in bar:
-            record = punch.press(displacement)
-            counts = "{open} open, {stick} stick, {slip} slip".format(**record)
-            bar.set_postfix_str(f"{displacement:.3f} mm, error {record['error']:.0e}, {counts}")
-            yield record
-
-
-def table(records: list[dict]) -> str:
-    """The records as text, one line a step."""
-    lines = [
-        "  step    d [mm]   normal [N]  tangential [N]   open stick  slip   error  iter.  seconds"
-    ]
-    for index, record in enumerate(records, start=1):
-        lines.append(
-            f"{index:6d}"
-            "{displacement:10.4f}{normal_reaction:13.1f}{tangential_reaction_sum:16.1f}"
-            "{open:7d}{stick:6d}{slip:6d}{error:8.0e}{iterations:7d}{seconds:9.3f}".format(**record)
-        )
-    return "\n".join(lines)
+            yield punch.press(displacement)
 
 
 # %% [markdown]
@@ -102,22 +91,16 @@ def table(records: list[dict]) -> str:
 
 # %%
 def arguments(argv=None) -> argparse.Namespace:
-    default = Parameters()
     parser = argparse.ArgumentParser(
         description="The punch of [dSFMH07, Section 3]; the scene is in studies/punch. Runs on any "
         "number of MPI ranks.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
-    add("--case", choices=CASES, default=default.case, help="friction, Table 1 of the paper")
-    add("--cycles", type=int, default=default.cycles, help="of loading and unloading")
-    add("--unload-to", type=float, default=default.unload_to, help="end of unloading, mm")
-    add("--loading", type=int, default=default.loading, help="increments of a loading")
-    add("--unloading", type=int, default=default.unloading, help="increments of an unloading")
-    add("--top", choices=("bonded", "free"), default=default.top, help="top face, sideways")
+    add("--case", choices=CASES, default="C", help="friction, Table 1 of the paper")
+    add_options(parser)
+    add("--unload-to", type=float, default=Parameters.unload_to, help="end of unloading, mm")
     add("--point", type=float, nargs=2, metavar=("X", "Y"), help="P, mm; 3/4 R at 45 degrees")
-    add("--tol", type=float, default=default.tol, help="error at which a step ends")
-    add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")
     add("--lowest", type=float, help="height of elements on the plane, mm; else all are as high")
     add("--solver", choices=SOLVERS, default="auto", help="paper: fixed point with its own map")
     add("--json", type=Path, metavar="FILE", help="numbers of all steps; DIR/punch.json")
@@ -129,11 +112,9 @@ def main(argv=None) -> None:
     """Compute, print the table, write numbers, picture and ParaView files."""
     logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
     options = vars(arguments(argv))
-    output = options.pop("output")
-    solver = SOLVERS[options.pop("solver")]()
+    output, solver = options.pop("output"), SOLVERS[options.pop("solver")]()
     json_file = options.pop("json") or output / "punch.json"
-    point = options.pop("point")
-    parameters = Parameters(**options, point=None if point is None else tuple(point))
+    parameters = Parameters(**{**options, "point": options["point"] and tuple(options["point"])})
     last = len(programme(parameters)) - 1
     loaded = last - parameters.unloading
     shown = {loaded: "loaded", (loaded + last) // 2: "unloading", last: "unloaded"}
@@ -152,14 +133,13 @@ def main(argv=None) -> None:
             failure = f"Step {len(records) + 1}: {error}"
     head = punch.head()
     if punch.comm.rank == 0:
-        print(table(records))
+        rows = [ROW.format(step=step, **record) for step, record in enumerate(records, start=1)]
+        print(HEAD, *rows, sep="\n")
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps({"head": head, "steps": records}, indent=1) + "\n")
         print(f"\nnumbers   {json_file}\nParaView  {fields.path}")
         if maps:
-            title = "Punch, case {case}: $\\mu$ = {friction[mu]}, $p$ = {friction[p]}".format(
-                **head
-            )
+            title = "Punch, case {case}: $\\mu$ = {friction[mu]}, $p$ = {friction[p]}".format(**head)  # fmt: skip
             title += f"; cycle {parameters.cycles}; x to the right, y up"
             draw(maps, title, output / "punch.png", head["point"])
             print(f"picture   {output / 'punch.png'}")

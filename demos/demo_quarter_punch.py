@@ -38,10 +38,8 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from mpi4py import MPI
-from picture import picture
+from helpers import COMM, everywhere, hooke, picture, say
 
-COMM = MPI.COMM_WORLD
 RADIUS, HEIGHT, E, NU = 10.0, 10.0, 210e3, 0.3
 MU, P = (0.30, 0.15), (0.05, 0.20)  # case C of [dSFMH07, Table 1]
 DEPTHS = (0.05, 0.1, 0.08, 0.05, 0.02)  # loading, then unloading, with reverse slip
@@ -51,53 +49,41 @@ DEPTHS = (0.05, 0.1, 0.08, 0.05, 0.02)  # loading, then unloading, with reverse 
 # ## Code
 #
 # The cross section is a square of $n \times n$ quadrilaterals bent into a disc, $(x, y) \mapsto (x
-# \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole.
+# \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole. A
+# node on one plane of symmetry has half the reaction, the node on both a quarter, because the other
+# part is that of the missing body; along the held direction the reaction of the whole is zero.
 
 
 # %%
 def punch(quarter: bool, cells: int = 8):
     """The punch or its quarter, ``cells`` across the diameter; the problem and a setter of the depth."""
     low, across = (0.0, cells // 2) if quarter else (-1.0, cells)
-    domain = mesh.create_box(
-        COMM,
-        [np.array([low, low, 0.0]), np.array([1.0, 1.0, 1.0])],
-        [across, across, cells // 2],
-        cell_type=mesh.CellType.hexahedron,
-    )
-    facets = {
-        name: mesh.locate_entities_boundary(
-            domain, 2, lambda x, i=axis, at=value: np.isclose(x[i], at)
-        )
-        for name, axis, value in (("bottom", 2, 0), ("top", 2, 1), ("x", 0, 0), ("y", 1, 0))
-    }
+    corners, bricks = [np.array([low, low, 0.0]), np.ones(3)], mesh.CellType.hexahedron
+    domain = mesh.create_box(COMM, corners, [across, across, cells // 2], cell_type=bricks)
+
+    def facets(axis, value):
+        return mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[axis], value))
+
+    bottom, top, *sides = facets(2, 0), facets(2, 1), facets(0, 0), facets(1, 0)
     x, y, z = domain.geometry.x.T.copy()
-    disc = [x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)]
-    domain.geometry.x[:] = np.stack([RADIUS * disc[0], RADIUS * disc[1], HEIGHT * z], axis=1)
+    disc = np.array([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)])
+    domain.geometry.x[:] = np.stack([*(RADIUS * disc), HEIGHT * z], axis=1)
 
     V = functionspace(domain, ("Lagrange", 1, (3,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
-    strain = ufl.sym(ufl.grad(u))
-    lame, shear = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
-    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2 * shear * strain
-    F = ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx(metadata={"quadrature_degree": 3})
+    dx = ufl.dx(metadata={"quadrature_degree": 3})
+    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, NU), ufl.sym(ufl.grad(v))) * dx
 
     pressed, zero = fem.Constant(domain, np.zeros(3)), fem.Constant(domain, 0.0)
-    bcs = [fem.dirichletbc(pressed, fem.locate_dofs_topological(V, 2, facets["top"]), V)]
-    for i, side in enumerate("xy" if quarter else ""):
-        dofs = fem.locate_dofs_topological(V.sub(i), 2, facets[side])
+    bcs = [fem.dirichletbc(pressed, fem.locate_dofs_topological(V, 2, top), V)]
+    for i, side in enumerate(sides if quarter else ()):
+        dofs = fem.locate_dofs_topological(V.sub(i), 2, side)
         bcs.append(fem.dirichletbc(zero, dofs, V.sub(i)))
     plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
-    contact = dc.Contact(V, facets["bottom"], plane, dc.Friction(mu=MU, p=P))
+    contact = dc.Contact(V, bottom, plane, dc.Friction(mu=MU, p=P))
     return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-11), pressed
 
 
-# %% [markdown]
-# A node on one plane of symmetry has half the reaction, the node on both a quarter, because the
-# other part is that of the missing body; along the held direction the reaction of the whole is
-# zero.
-
-
-# %%
 def run(quarter: bool) -> list[dict]:
     """Press and unload; for each step totals, and reactions of the nodes with x, y >= 0, by position."""
     problem, pressed = punch(quarter)
@@ -105,14 +91,13 @@ def run(quarter: bool) -> list[dict]:
     for depth in DEPTHS:
         pressed.value[2] = -depth
         step = problem.solve()
-        x, r = (np.concatenate(COMM.allgather(part)) for part in (contact.x, contact.reaction))
-        dissipation = COMM.allreduce(contact.dissipation.sum(), op=MPI.SUM)
+        x, r, work = everywhere(contact.x, contact.reaction, contact.dissipation)
         here = (x[:, :2] > -1e-9 * RADIUS).all(axis=1)
         x, r = x[here], r[here]
         if quarter:
             r = r * 2.0 ** np.isclose(x[:, :2], 0.0).sum(axis=1)[:, None]
         order = np.lexsort(np.round(x / RADIUS, 9).T)
-        totals = np.array([contact.force()[2], dissipation])
+        totals = np.array([contact.force()[2], work.sum()])
         results.append({"x": x[order], "r": r[order], "totals": totals, "counts": step.counts})
     return results
 
@@ -129,33 +114,21 @@ def main() -> tuple[dict, dict]:
     """Solve both and compare; the last states."""
     for whole, part, depth in zip(run(False), run(True), DEPTHS):
         assert np.abs(whole["x"] - part["x"]).max() < 1e-9 * RADIUS
-        largest = np.abs(whole["r"]).max()
-        difference = np.abs(whole["r"] - part["r"]).max() / largest
+        difference = np.abs(whole["r"] - part["r"]).max() / np.abs(whole["r"]).max()
         totals = np.abs(4 * part["totals"] / whole["totals"] - 1).max()
-        if COMM.rank == 0:
-            stick, slip = whole["counts"].stick, whole["counts"].slip
-            print(
-                f"{depth:.2f} mm: whole {whole['totals'][0]:.1f} N, {stick} stick, {slip} slip;",
-                end=" ",
-            )
-            print(f"4 quarters {4 * part['totals'][0]:.1f} N, nodes differ by {difference:.0e}")
+        _, stick, slip = whole["counts"]
+        say(f"{depth:.2f} mm: whole {whole['totals'][0]:.1f} N, {stick} stick, {slip} slip; "
+            f"4 quarters {4 * part['totals'][0]:.1f} N, nodes differ by {difference:.0e}")  # fmt: skip
         assert difference < 1e-8 and totals < 1e-8
     return whole, part
 
 
-# %% [markdown]
-# In a notebook the picture is below; `python demos/demo_quarter_punch.py picture.png` writes it to a file.
-
-
-# %%
 def draw(figure, whole, part) -> None:
     """Friction forces at the last step, of the whole and of the quarter, on each other."""
     axes = figure.subplots()
-    for found, width, colour, name in (
-        (whole, 9e-3, "#e69f00", "whole"),
-        (part, 3e-3, "black", "quarter"),
-    ):
-        axes.quiver(*found["x"].T[:2], *found["r"].T[:2], width=width, color=colour, label=name)
+    orange, black = (dict(width=9e-3, color="#e69f00"), dict(width=3e-3, color="black"))
+    for found, name, style in ((whole, "whole", orange), (part, "quarter", black)):
+        axes.quiver(*found["x"].T[:2], *found["r"].T[:2], label=name, **style)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     axes.legend()
 

@@ -52,33 +52,31 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from mpi4py import MPI
-from picture import picture
+from helpers import COMM, everywhere, hooke, picture, say
 
-COMM = MPI.COMM_WORLD
 MU, P = np.array([0.30, 0.15]), np.array([0.05, 0.20])  # case C of [dSFMH07, Table 1]
 STEP = 0.5  # |Delta s|, mm
 
 
 # %% [markdown]
-# ## Code: the block
+# ## Code
+#
+# The block, the path, the closed form; `drag` moves the plane along the path. For each step it
+# records the total force, how far the total and the worst node are from the closed form, and the
+# work of friction.
 
 
 # %%
-def block(depth: float, friction: dc.Friction, comm=COMM) -> dc.ContactProblem:
+def block(depth: float, friction: dc.Friction) -> dc.ContactProblem:
     """A pad of 10 x 10 x 4 mm; its top face is pressed down by ``depth``, against the plane z = 0."""
-    size, E, nu = np.array([10.0, 10.0, 4.0]), 2000.0, 0.3
-    domain = mesh.create_box(
-        comm, [np.zeros(3), size], [4, 4, 2], cell_type=mesh.CellType.hexahedron
-    )
+    size, bricks = np.array([10.0, 10.0, 4.0]), mesh.CellType.hexahedron
+    domain = mesh.create_box(COMM, [np.zeros(3), size], [4, 4, 2], cell_type=bricks)
     bottom = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.0))
     top = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], size[2]))
 
     V = functionspace(domain, ("Lagrange", 1, (3,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
-    strain = ufl.sym(ufl.grad(u))
-    lame, shear = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
-    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2 * shear * strain
+    stress = hooke(ufl.sym(ufl.grad(u)), E=2000.0, nu=0.3)
     F = ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
 
     pressed = np.array([0.0, 0.0, -depth])
@@ -88,11 +86,6 @@ def block(depth: float, friction: dc.Friction, comm=COMM) -> dc.ContactProblem:
     return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10)
 
 
-# %% [markdown]
-# ## Code: the path and the closed form
-
-
-# %%
 STRAIGHT = 6  # steps before the turn, and after it
 
 
@@ -109,12 +102,6 @@ def closed_form(angle: float, p) -> np.ndarray:
     return force / np.linalg.norm(force / MU)
 
 
-# %% [markdown]
-# `drag` moves the plane along the path. For each step it records the total force, how far the
-# total and the worst node are from the closed form, and the work of friction.
-
-
-# %%
 def drag(depth: float, p) -> dict[str, np.ndarray]:
     """Drag the plane below a block pressed by ``depth``; arrays over the steps by name."""
     problem = block(depth, dc.Friction(mu=MU, p=p))
@@ -128,12 +115,10 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
         assert step.counts.slip == sum(step.counts)  # all nodes touch and slide
         force, expected = contact.force(), closed_form(angle, p)
         total = np.linalg.norm(force[:2] - force[2] * expected) / np.linalg.norm(force[:2])
-        r = contact.reaction
-        nodes = np.linalg.norm(r[:, :2] - r[:, 2:] * expected, axis=1).max(initial=0.0)
-        worst = COMM.allreduce(nodes, op=MPI.MAX) / force[2]
-        dissipation = COMM.allreduce(contact.dissipation.sum(), op=MPI.SUM)
-        rows.append((force, total, worst, dissipation - before))
-        before = dissipation
+        r, dissipation = everywhere(contact.reaction, contact.dissipation)
+        worst = np.linalg.norm(r[:, :2] - r[:, 2:] * expected, axis=1).max() / force[2]
+        rows.append((force, total, worst, dissipation.sum() - before))
+        before = dissipation.sum()
     return dict(zip(("force", "total", "worst", "work"), map(np.array, zip(*rows))))
 
 
@@ -175,23 +160,15 @@ def main() -> dict[str, np.ndarray]:
         degrees = np.rad2deg(np.arctan2(*tangential[STRAIGHT - 1, ::-1]))
         expected = np.rad2deg(np.arctan2(*closed_form(angles[0], p)[::-1]))
         assert abs(degrees - expected) < 1e-6
-        if COMM.rank == 0:
-            print(f"p = {p}: path at 20 degrees, force at {degrees:.4f} degrees", end=", ")
-            print(f"mu = {np.linalg.norm(tangential[-1]) / normal[-1]:.4f} on the last part")
+        say(f"p = {p}: path at 20 degrees, force at {degrees:.4f} degrees, "
+            f"mu = {np.linalg.norm(tangential[-1]) / normal[-1]:.4f} on the last part")  # fmt: skip
     ratios = np.divide(lags[:-1], lags[1:])
-    if COMM.rank == 0:
-        print(
-            "largest lag on the turn:", *(f"{lag:.4f}" for lag in lags), "ratios", ratios.round(3)
-        )
+    shown = " ".join(f"{lag:.4f}" for lag in lags)
+    say(f"largest lag on the turn: {shown} ratios {ratios.round(3)}")
     assert (np.abs(ratios - 2) < 0.25).all() and ratios[1] < ratios[0]  # towards two
     return traces
 
 
-# %% [markdown]
-# In a notebook the picture is below; `python demos/demo_turning_path.py picture.png` writes it to a file.
-
-
-# %%
 def draw(figure, traces) -> None:
     """The friction force on the ellipse, step by step, and where the closed form has it."""
     for axes, names in zip(figure.subplots(1, 2), (list(traces)[1:3], list(traces)[3:])):
@@ -201,9 +178,8 @@ def draw(figure, traces) -> None:
         axes.plot(*np.transpose([closed_form(a, p) for a in path()]), "kx", label="closed form")
         for name in names:
             axes.plot(*traces[name].T, ".-", label=name)
-        axes.set(
-            xlabel="force along x / normal", ylabel="along y", aspect="equal", ylim=(-0.2, 0.32)
-        )
+        axes.set(xlabel="force along x / normal", ylabel="along y")
+        axes.set(aspect="equal", ylim=(-0.2, 0.32))
         axes.legend(fontsize=8, loc="upper center")
 
 

@@ -1,0 +1,106 @@
+"""What the demos share: where they print and draw, Hooke's law, a body with a rounded face."""
+
+from __future__ import annotations
+
+import sys
+from io import BytesIO
+from pathlib import Path
+
+import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import mesh
+from mpi4py import MPI
+
+COMM = MPI.COMM_WORLD
+
+
+def say(text: str) -> None:
+    """Print on rank 0."""
+    if COMM.rank == 0:
+        print(text)
+
+
+def picture(draw, *data) -> None:
+    """Call ``draw(figure, *data)`` where somebody wants to see it.
+
+    In a notebook the figure is shown. A script writes it to the file that is its only argument, on rank
+    0; without one nothing is drawn, and matplotlib is not needed.
+    """
+    inside = "ipykernel" in sys.modules
+    if COMM.rank != 0 or not inside and len(sys.argv) < 2:
+        return
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4.5), layout="constrained")
+    draw(figure, *data)
+    file = BytesIO() if inside else Path(sys.argv[1])
+    figure.savefig(file, dpi=110)
+    if inside:
+        from IPython.display import Image, display
+
+        display(Image(file.getvalue()))
+
+
+def everywhere(*arrays) -> list[np.ndarray]:
+    """Rows of all ranks, on every rank."""
+    return [np.concatenate(COMM.allgather(array)) for array in arrays]
+
+
+def hooke(strain, E: float, nu: float):
+    """Stress of a strain; of a strain in two dimensions that of plane strain."""
+    lame, shear = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+    return lame * ufl.tr(strain) * ufl.Identity(strain.ufl_shape[0]) + 2 * shear * strain
+
+
+def rounded_body(radius: float, contact: float, size: float, cells: int, half=False, crossed=False):
+    """A body with a rounded face on the line y = 0, in two dimensions; it lies on -size < x < size, y < size.
+
+    The face is the parabola y = x^2 / (2 R), as in the theory of Hertz. Widths of the quadrilaterals grow
+    like ``cosh(x / fine)``; ``fine`` is such that a quarter of them are within ``contact``, and a node is at
+    that place.
+
+    Args:
+        radius: R of the face, length units.
+        contact: Expected half width of the contact.
+        size: Half width and height of the body, more than four times ``contact``.
+        cells: Cells from the middle to the side, and as many over the height; a multiple of four.
+        half: Only the half x > 0, for symmetry.
+        crossed: Each quadrilateral is cut into four triangles by its diagonals; in first order these
+            do not lock when the material hardly changes its volume [B. Mercier, RAIRO Anal. Numer. 13
+            (1979) 117], provided that the diagonals are straight.
+
+    Returns:
+        The mesh; the indices of the facets of the rounded face within twice ``contact``, and of the
+        far boundary, which is all the rest but the face and the line x = 0 of a half.
+    """
+    # sinh(y) = contact / fine and sinh(4 y) = size / fine: a cubic for cosh(y)
+    cosh = np.roots([8, 0, -4, -size / contact]).real.max()
+    fine = contact / np.sqrt(cosh**2 - 1)
+    corners = [np.array([0.0 if half else -1.0, 0.0]), np.ones(2)]
+    across = cells if half else 2 * cells
+    kind = mesh.CellType.triangle if crossed else mesh.CellType.quadrilateral
+    diagonal = mesh.DiagonalType.crossed
+    domain = mesh.create_rectangle(COMM, corners, [across, cells], kind, diagonal=diagonal)
+    width = np.arcsinh(2 * contact / fine) / np.arcsinh(size / fine)
+    face, far = (
+        mesh.locate_entities_boundary(domain, 1, where)
+        for where in (
+            lambda x: np.isclose(x[1], 0.0) & (np.abs(x[0]) < width),
+            lambda x: np.isclose(x[1], 1.0) | np.isclose(np.abs(x[0]), 1.0),
+        )
+    )
+    x = domain.geometry.x
+    lines = np.linspace(-1.0, 1.0, 2 * cells + 1)
+    x[:, :2] = np.interp(x[:, :2], lines, fine * np.sinh(np.arcsinh(size / fine) * lines))
+    x[:, 1] += (1 - x[:, 1] / size) * x[:, 0] ** 2 / (2 * radius)
+    return domain, face, far
+
+
+def along_face(contact, *arrays) -> list[np.ndarray]:
+    """Positions x of all contact nodes, sorted, and the rows of ``arrays`` with them, on every rank."""
+    x, *arrays = everywhere(contact.x[:, 0], *arrays)
+    order = np.argsort(x, kind="stable")
+    return [array[order] for array in (x, *arrays)]
