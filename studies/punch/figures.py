@@ -73,6 +73,7 @@ class Figures:
                     image = show(ax, run, column)
                     for collection in ax.collections:  # 1280 polygons: as pixels within the SVG
                         collection.set_rasterized(not isinstance(collection, LineCollection))
+                    heading = heading if n > 1 else ""
                     ax.set_title(f"{NAMES[case]}\n{heading}" if ax is line[0] else f"\n{heading}")
             figure.colorbar(image, ax=axes, label=label, shrink=0.7, aspect=30, extend="min")
             figure.suptitle(title)

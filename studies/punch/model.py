@@ -92,7 +92,8 @@ class Punch:
         self.problem = dc.ContactProblem(
             self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol
         )
-        self.tracked = self._nearest_node(parameters.target)
+        x = np.concatenate(comm.allgather(self.contact.x))
+        self.tracked = np.linalg.norm(x[:, :2] - parameters.target, axis=1).argmin()  # P
 
     def stress(self, u):
         """Hooke's law, as a UFL expression."""
@@ -122,13 +123,6 @@ class Punch:
             return [down, fix(0, 0, centre), fix(1, 0, centre), fix(1, 0, rim)]
         raise ValueError(f'top must be "bonded" or "free", got {self.parameters.top!r}.')
 
-    def _nearest_node(self, target) -> int | None:
-        """Index of the contact node nearest to ``target`` on the rank that owns it, else None."""
-        distance = np.linalg.norm(self.contact.x[:, :2] - target, axis=1)
-        mine = distance.min(initial=np.inf)
-        _, owner = self.comm.allreduce((mine, self.comm.rank), op=MPI.MINLOC)
-        return int(distance.argmin()) if owner == self.comm.rank else None
-
     def press(self, displacement: float) -> dict:
         """Move the top face to ``displacement`` mm below its first position; one load step.
 
@@ -153,9 +147,8 @@ class Punch:
         }
 
     def _at_point(self, values) -> list[float]:
-        """Row of the tracked node P, on all ranks."""
-        mine = None if self.tracked is None else values[self.tracked].tolist()
-        return next(row for row in self.comm.allgather(mine) if row is not None)
+        """Row of P, on all ranks."""
+        return np.concatenate(self.comm.allgather(values))[self.tracked].tolist()
 
     def head(self) -> dict:
         """What was computed, and by what."""
