@@ -1,16 +1,15 @@
 # %% [markdown]
 # # Hertz: a ball on a plane
 #
-# A ball of radius $R$ is pressed on a rigid plane without friction. The closed form is that of an
-# elastic half space; here it is the far field, not the contact, that a mesh has to be told about.
-# The demo measures both errors by themselves: that of the mesh, and that of the body's finite
-# size.
+# A ball of radius $R$ is pressed on a rigid plane without friction. The closed form is that of an elastic half space;
+# here it is the far field, not the contact, that a mesh has to be told about. The demo measures both errors by
+# themselves: that of the mesh, and that of the body's finite size.
 #
 # ## Notation
 #
-# Cylindrical coordinates $(r, z)$, $z$ up; displacement $u = (u_r, u_z)$; $E$, $\nu$ elastic
-# constants, $E^* = E / (1 - \nu^2)$; $\delta$ approach of the far field to the plane, $a$ contact
-# radius, $p$ pressure, $F$ force. Units: mm, N, MPa.
+# Cylindrical coordinates $(r, z)$, $z$ up; displacement $u = (u_r, u_z)$; $E$, $\nu$ elastic constants,
+# $E^* = E / (1 - \nu^2)$; $\delta$ approach of the far field to the plane, $a$ contact radius, $p$ pressure, $F$
+# force. Units: mm, N, MPa.
 #
 # ## Strong form
 #
@@ -18,9 +17,9 @@
 #    x_n = \frac{r^2}{2R} + u_z \ge 0, \quad p = -\sigma_{zz} \ge 0, \quad x_n\, p = 0, \quad \sigma_{rz} = 0
 #    \quad \text{on the face}. $$
 #
-# The gap comes from the reference positions: the face of the mesh *is* the parabola $z = r^2 /
-# 2R$, and `dc.Contact` measures its distance to the plane. The **closed form** [H. Hertz 1881; K.
-# L. Johnson, Contact Mechanics, 1985, Section 4.2] is
+# The gap comes from the reference positions: the face of the mesh *is* the parabola $z = r^2 / 2R$, and `dc.Contact`
+# measures its distance to the plane. The **closed form** [H. Hertz 1881; K. L. Johnson, Contact Mechanics, 1985,
+# Section 4.2] is
 #
 # $$ a = \sqrt{R \delta}, \qquad F = \tfrac{4}{3} E^* \sqrt{R}\, \delta^{3/2}, \qquad
 #    p(r) = p_0 \sqrt{1 - r^2/a^2}, \quad p_0 = \frac{2 E^* a}{\pi R}. $$
@@ -29,37 +28,34 @@
 #
 # ## The far field
 #
-# At a distance $\rho \gg a$ the half space sees the contact as a point force, whose displacement
-# is that of Boussinesq,
+# At a distance $\rho \gg a$ the half space sees the contact as a point force, whose displacement is that of
+# Boussinesq,
 #
 # $$ b_r = \frac{(1+\nu) F}{2 \pi E \rho} \Big( \frac{r z}{\rho^2} - \frac{(1 - 2\nu)\, r}{\rho + z} \Big), \qquad
 #    b_z = \frac{(1+\nu) F}{2 \pi E \rho} \Big( 2 (1 - \nu) + \frac{z^2}{\rho^2} \Big). $$
 #
-# A body of size $L$ whose far boundary is *held rigidly*, $u = (0, -\delta)$, is therefore too
-# stiff: its contact feels an approach that is too large by something between $b_z(L, 0) = F / (\pi
-# E^* L)$, beside the contact, and $b_z(0, L)$, above it, which is $\frac{3 - 2\nu}{2 - 2\nu}$
-# times as much. In parts of $\delta$ the first is $c = \frac{4}{3\pi} \frac{a}{L}$ for the force
-# of the closed form; and since force grows like approach to the power 3/2, it is too large by a
-# factor $1 + e$ with
+# A body of size $L$ whose far boundary is *held rigidly*, $u = (0, -\delta)$, is therefore too stiff: its contact
+# feels an approach that is too large by something between $b_z(L, 0) = F / (\pi E^* L)$, beside the contact, and
+# $b_z(0, L)$, above it, which is $\frac{3 - 2\nu}{2 - 2\nu}$ times as much. In parts of $\delta$ the first is
+# $c = \frac{4}{3\pi} \frac{a}{L}$ for the force of the closed form; and since force grows like approach to the power
+# 3/2, it is too large by a factor $1 + e$ with
 #
 # $$ (1 + e)^{2/3} = 1 + c\,(1 + e). $$
 #
-# At $L = 16 a$ these are 4 to 7 %, halved when $L$ is doubled: nobody refines that away. If $u =
-# (0, -\delta) + b$ is prescribed instead, what is left is the next moment of the pressure, of the
-# order $(a/L)^3$.
+# At $L = 16 a$ these are 4 to 7 %, halved when $L$ is doubled: nobody refines that away. If $u = (0, -\delta) + b$ is
+# prescribed instead, what is left is the next moment of the pressure, of the order $(a/L)^3$.
 #
 # ## Weak form
 #
 # A form in two dimensions with the weight $2 \pi r$; the hoop strain is $u_r / r$:
 #
-# $$ \int_\Omega \sigma(u) : \varepsilon(v) \; 2 \pi r \,\mathrm{d}r\,\mathrm{d}z = \sum_{\text{contact nodes}} r_i \cdot v_i, $$
+# $$ \int_\Omega \sigma(u) : \varepsilon(v) \; 2 \pi r \,\mathrm{d}r\,\mathrm{d}z
+#    = \sum_{\text{contact nodes}} r_i \cdot v_i, $$
 #
-# so that a nodal reaction is the force of a whole ring. On the axis $u_r = 0$: a support that
-# fixes the tangential displacement of a contact node.
+# so that a nodal reaction is the force of a whole ring. On the axis $u_r = 0$: a support that fixes the tangential
+# displacement of a contact node.
 
 # %%
-from __future__ import annotations
-
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import assemble_into, functionspace
 
@@ -80,11 +76,10 @@ P0 = 2 * E_STAR * A / (np.pi * R)
 # %% [markdown]
 # ## Code
 #
-# `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves
-# on one mesh. The pressure of a node is its force over the area of its ring, $\int 2 \pi r\,
-# \varphi_i \,\mathrm{d}s$. The radius is found twice: as the place of the last node that touches,
-# which cannot be better than the mesh, and from the second moment of the reactions, which is
-# $\frac{2}{5} a^2$ for the closed form.
+# `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves on one mesh. The
+# pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$. The radius is
+# found twice: as the place of the last node that touches, which cannot be better than the mesh, and from the second
+# moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
 
 
 # %%
@@ -148,17 +143,17 @@ def compare(contact: dc.Contact, r) -> dict:
 # %% [markdown]
 # ## Result
 #
-# **Convergence**, with $u = (0, -\delta) + b$ on the far boundary at $L = 16 a$, three meshes.
-# They have a node at $r = a$, so that errors fall evenly; with the edge inside a cell they depend
-# on where it is. The order is measured against the number of cells:
+# **Convergence**, with $u = (0, -\delta) + b$ on the far boundary at $L = 16 a$, three meshes. They have a node at
+# $r = a$, so that errors fall evenly; with the edge inside a cell they depend on where it is. The order is measured
+# against the number of cells:
 #
 # - force, and radius by the second moment: second order, as is usual for quantities of work;
-# - pressure, in the mean square: first order, because it ends like a square root, and the mesh
-#   replaces that by a polygon in the one cell where it ends;
+# - pressure, in the mean square: first order, because it ends like a square root, and the mesh replaces that by a
+#   polygon in the one cell where it ends;
 # - the last node that touches is at the edge, to less than one cell.
 #
-# **Finiteness**, on one mesh: the force of a rigidly held body minus that with $b$ lies between
-# the two estimates, for three sizes.
+# **Finiteness**, on one mesh: the force of a rigidly held body minus that with $b$ lies between the two estimates,
+# for three sizes.
 
 
 # %%

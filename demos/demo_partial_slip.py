@@ -1,36 +1,33 @@
 # %% [markdown]
 # # Partial slip: the problem of Cattaneo and Mindlin
 #
-# A cylinder is pressed on a plane, then the plane is pushed sideways. Before it slides as a whole,
-# the contact sticks in the middle and slips at both edges.
+# A cylinder is pressed on a plane, then the plane is pushed sideways. Before it slides as a whole, the contact sticks
+# in the middle and slips at both edges.
 #
 # ## Notation
 #
-# Two dimensions, plane strain; $u$ displacement, $E$, $\nu$ elastic constants, $E^* = E / (1 -
-# \nu^2)$, $R$ radius of the cylinder; per length of the cylinder, $P$ normal and $Q$ tangential
-# force; $\mu$ friction; the contact is $|x| < a$, its sticking part $|x| < c$; $p$ pressure, $q$
-# tangential traction. Units: mm, N, MPa.
+# Two dimensions, plane strain; $u$ displacement, $E$, $\nu$ elastic constants, $E^* = E / (1 - \nu^2)$, $R$ radius of
+# the cylinder; per length of the cylinder, $P$ normal and $Q$ tangential force; $\mu$ friction; the contact is
+# $|x| < a$, its sticking part $|x| < c$; $p$ pressure, $q$ tangential traction. Units: mm, N, MPa.
 #
 # ## Strong form and closed form
 #
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad x_n \ge 0, \quad p \ge 0, \quad x_n\, p = 0, \quad |q| \le \mu p, $$
 #
-# with $|q| = \mu p$ against the slip where there is any; gap $x_n = x^2/2R + u_n$. For a half
-# plane [C. Cattaneo 1938; R. D. Mindlin 1949; K. L. Johnson, Contact Mechanics, 1985, Section 7.2]
+# with $|q| = \mu p$ against the slip where there is any; gap $x_n = x^2/2R + u_n$. For a half plane [C. Cattaneo
+# 1938; R. D. Mindlin 1949; K. L. Johnson, Contact Mechanics, 1985, Section 7.2]
 #
 # $$ a^2 = \frac{4 P R}{\pi E^*}, \qquad p = p_0 \sqrt{1 - x^2/a^2}, \qquad
 #    \frac{c}{a} = \sqrt{1 - \frac{Q}{\mu P}}, $$
 #
-# and $q$ is $\mu p$ minus the like distribution over $|x| < c$. When $Q$ falls again from $Q_1$,
-# slip starts anew from the edges, against the former, and the sticking part is $c'/a = \sqrt{1 -
-# (Q_1 - Q) / 2 \mu P}$.
+# and $q$ is $\mu p$ minus the like distribution over $|x| < c$. When $Q$ falls again from $Q_1$, slip starts anew
+# from the edges, against the former, and the sticking part is $c'/a = \sqrt{1 - (Q_1 - Q) / 2 \mu P}$.
 #
-# **What it assumes.** Tangential tractions must not change the pressure, nor pressure move the
-# surface sideways. On a rigid plane this is true for $\nu = 1/2$ only: the coupling is Dundurs'
-# $\beta = (1 - 2\nu) / (2 - 2\nu)$. Here $\nu = 0.499$ and $\beta = 0.002$, and elements must not
-# lock: first-order triangles do not, if they are the four into which the diagonals cut a
-# quadrilateral. A body of finite size $L$ adds a uniform strain to the field of the contact, of
-# first order in $a/L$; it makes tractions that are odd in $x$, and so changes neither $Q$ nor,
+# **What it assumes.** Tangential tractions must not change the pressure, nor pressure move the surface sideways. On a
+# rigid plane this is true for $\nu = 1/2$ only: the coupling is Dundurs' $\beta = (1 - 2\nu) / (2 - 2\nu)$. Here
+# $\nu = 0.499$ and $\beta = 0.002$, and elements must not lock: first-order triangles do not, if they are the four
+# into which the diagonals cut a quadrilateral. A body of finite size $L$ adds a uniform strain to the field of the
+# contact, of first order in $a/L$; it makes tractions that are odd in $x$, and so changes neither $Q$ nor,
 # noticeably, $P(a)$, if these and not the displacements are compared.
 #
 # ## Weak form
@@ -38,8 +35,6 @@
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v. $$
 
 # %%
-from __future__ import annotations
-
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
 
@@ -58,10 +53,9 @@ L = 16 * A
 # %% [markdown]
 # ## Code
 #
-# The sticking part is measured twice. By the status of the nodes it is known to the width of a
-# cell, here $a/11$ in the middle and $a/7$ near the edge. By second moments it is known better:
-# for the closed form $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that
-# has turned round is twice as much.
+# The sticking part is measured twice. By the status of the nodes it is known to the width of a cell, here $a/11$ in
+# the middle and $a/7$ near the edge. By second moments it is known better: for the closed form
+# $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that has turned round is twice as much.
 
 
 # %%
@@ -104,15 +98,14 @@ def sticking_part(now: dict, before: dict, times: int) -> tuple[float, float]:
 # %% [markdown]
 # ## Result
 #
-# 1. The half width by the second moment of the pressure, $a^2/4$, is that of the closed form to 1 %.
-#    Pressing alone makes tangential tractions, where the closed form has none: $\int |q|$ is below a
-#    tenth of $\mu P$. The part that alternates from node to node is the mesh's: it falls with
-#    refinement (0.05, 0.03 and 0.01 for 32, 64 and 128 cells, in the mean over the place of the
-#    edge). The smooth part does not (0.04, 0.03, 0.03); it is the body's finite size, and half as
-#    much or less in a body of twice the size.
+# 1. The half width by the second moment of the pressure, $a^2/4$, is that of the closed form to 1 %. Pressing alone
+#    makes tangential tractions, where the closed form has none: $\int |q|$ is below a tenth of $\mu P$. The part that
+#    alternates from node to node is the mesh's: it falls with refinement (0.05, 0.03 and 0.01 for 32, 64 and 128
+#    cells, in the mean over the place of the edge). The smooth part does not (0.04, 0.03, 0.03); it is the body's
+#    finite size, and half as much or less in a body of twice the size.
 # 2. Shearing does not change $P$ by more than 0.1 %: the two directions are not coupled.
-# 3. For three displacements of the plane, and on the way back, the sticking part by second moments
-#    is that of the closed form to $0.005\, a$, and by the nodes' status to the width of a cell.
+# 3. For three displacements of the plane, and on the way back, the sticking part by second moments is that of the
+#    closed form to $0.005\, a$, and by the nodes' status to the width of a cell.
 
 
 # %%

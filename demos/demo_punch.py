@@ -1,26 +1,25 @@
 # %% [markdown]
 # # The paper's punch
 #
-# A steel cylinder stands on a plane with grooves; its top face goes down and up again. Poisson's
-# effect drives the contact nodes outwards against a friction that differs along and across the
-# grooves. Stick zones, slip outwards and, when unloading, reverse slip are what [dSFMH07, Section
-# 3] shows. This demo writes numbers, a picture and ParaView files; the scene itself is in
-# `studies/punch`, so it runs from the root of the clone: `python -m demos.demo_punch`, with options
-# (try `--help`), on any number of MPI ranks. As a notebook it needs that root on the path: start
-# Jupyter there with `PYTHONPATH=$PWD`. In an environment of your own: `pip install -e .` first.
+# A steel cylinder stands on a plane with grooves; its top face goes down and up again. Poisson's effect drives the
+# contact nodes outwards against a friction that differs along and across the grooves. Stick zones, slip outwards and,
+# when unloading, reverse slip are what [dSFMH07, Section 3] shows. This demo writes numbers, a picture and ParaView
+# files; the scene itself is in `studies/punch`, so it runs from the root of the clone: `python -m demos.demo_punch`,
+# with options (try `--help`), on any number of MPI ranks. As a notebook it needs that root on the path: start Jupyter
+# there with `PYTHONPATH= PWD`. In an environment of your own: `pip install -e .` first.
 #
 # ## Notation
 #
-# $u$ displacement, $\sigma$ stress, $E$, $\nu$ elastic constants; $r = (r_t, r_n)$ reaction of the
-# plane on the body, $x_n$ gap, $\Delta u_t$ slip increment of a step; $M = \mathrm{diag}(\mu_x,
-# \mu_y)$, $P = \mathrm{diag}(p_x, p_y)$. Units: mm, N, MPa.
+# $u$ displacement, $\sigma$ stress, $E$, $\nu$ elastic constants; $r = (r_t, r_n)$ reaction of the plane on the body,
+# $x_n$ gap, $\Delta u_t$ slip increment of a step; $M = \mathrm{diag}(\mu_x, \mu_y)$, $P = \mathrm{diag}(p_x, p_y)$.
+# Units: mm, N, MPa.
 #
 # ## Strong form
 #
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad u = (0, 0, -\delta) \text{ on the top face}, $$
 #
-# and on the bottom face $x_n \ge 0$, $r_n \ge 0$, $x_n r_n = 0$, $|M^{-1} r_t| \le r_n$, and where
-# there is slip [dSFMH07, Section 1]
+# and on the bottom face $x_n \ge 0$, $r_n \ge 0$, $x_n r_n = 0$, $|M^{-1} r_t| \le r_n$, and where there is slip
+# [dSFMH07, Section 1]
 #
 # $$ |M^{-1} r_t| = r_n, \qquad -\Delta u_t = \lambda\, P^{-2} r_t, \quad \lambda \ge 0. $$
 #
@@ -31,8 +30,6 @@
 # hexahedra of first order, one load step after another.
 
 # %%
-from __future__ import annotations
-
 import argparse
 import json
 import logging
@@ -84,9 +81,9 @@ def run(punch: Punch) -> Iterator[dict]:
 # %% [markdown]
 # ## Result
 #
-# The table of all steps. Above in the picture: where $f = |M^{-1} r_t| - r_n$ is negative the node
-# sticks; below: pressure and friction. While loading, the centre sticks and the rest slips
-# outwards; on unloading the rim sticks, then slips inwards.
+# The table of all steps. Above in the picture: where $f = |M^{-1} r_t| - r_n$ is negative the node sticks; below:
+# pressure and friction. While loading, the centre sticks and the rest slips outwards; on unloading the rim sticks,
+# then slips inwards.
 
 
 # %%

@@ -1,36 +1,32 @@
 # %% [markdown]
 # # A quarter of the punch
 #
-# The punch of [dSFMH07, Section 3] is symmetric about two planes, and so is its friction, whose
-# principal directions lie in them. A quarter of it with symmetry conditions is therefore enough.
-# Its contact nodes on the planes of symmetry are held in one tangential direction by a boundary
-# condition, which must not be mistaken for friction.
+# The punch of [dSFMH07, Section 3] is symmetric about two planes, and so is its friction, whose principal directions
+# lie in them. A quarter of it with symmetry conditions is therefore enough. Its contact nodes on the planes of
+# symmetry are held in one tangential direction by a boundary condition, which must not be mistaken for friction.
 #
 # ## Notation
 #
-# $u$ displacement, $\sigma$ stress, $r = (r_t, r_n)$ reaction of the plane on the body. Units: mm,
-# N, MPa.
+# $u$ displacement, $\sigma$ stress, $r = (r_t, r_n)$ reaction of the plane on the body. Units: mm, N, MPa.
 #
 # ## Strong form
 #
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad u = (0, 0, -\delta) \text{ on the top face}, $$
 #
-# contact and friction with the plane $z = 0$ on the bottom face, for the whole body; and for the
-# quarter $x, y > 0$ in addition
+# contact and friction with the plane $z = 0$ on the bottom face, for the whole body; and for the quarter $x, y > 0$
+# in addition
 #
-# $$ u_x = 0,\; \sigma_{xy} = \sigma_{xz} = 0 \text{ on } x = 0, \qquad u_y = 0,\; \sigma_{xy} = \sigma_{yz} = 0 \text{ on } y = 0. $$
+# $$ u_x = 0,\; \sigma_{xy} = \sigma_{xz} = 0 \text{ on } x = 0, \qquad
+#    u_y = 0,\; \sigma_{xy} = \sigma_{yz} = 0 \text{ on } y = 0. $$
 #
-# On a contact node with $x = 0$ there is neither slip nor friction along $x$: what the support
-# carries there is the force between the two halves of the body, not a reaction of the plane.
-# `dc.Contact` calls such directions `held`.
+# On a contact node with $x = 0$ there is neither slip nor friction along $x$: what the support carries there is the
+# force between the two halves of the body, not a reaction of the plane. `dc.Contact` calls such directions `held`.
 #
 # ## Weak form
 #
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v . $$
 
 # %%
-from __future__ import annotations
-
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
 
@@ -48,10 +44,10 @@ DEPTHS = (0.05, 0.1, 0.08, 0.05, 0.02)  # loading, then unloading, with reverse 
 # %% [markdown]
 # ## Code
 #
-# The cross section is a square of $n \times n$ quadrilaterals bent into a disc, $(x, y) \mapsto (x
-# \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole. A
-# node on one plane of symmetry has half the reaction, the node on both a quarter, because the other
-# part is that of the missing body; along the held direction the reaction of the whole is zero.
+# The cross section is a square of $n \times n$ quadrilaterals bent into a disc,
+# $(x, y) \mapsto (x \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole. A
+# node on one plane of symmetry has half the reaction, the node on both a quarter, because the other part is that of
+# the missing body; along the held direction the reaction of the whole is zero.
 
 
 # %%
@@ -105,8 +101,8 @@ def run(quarter: bool) -> list[dict]:
 # %% [markdown]
 # ## Result
 #
-# After each step of loading and unloading, the quarter has the reactions of the whole, node by
-# node, to 1e-8 of the largest, and a quarter of its total force and of its dissipation.
+# After each step of loading and unloading, the quarter has the reactions of the whole, node by node, to 1e-8 of the
+# largest, and a quarter of its total force and of its dissipation.
 
 
 # %%

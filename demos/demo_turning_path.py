@@ -1,40 +1,36 @@
 # %% [markdown]
 # # A block on a turning path
 #
-# A block is pressed on a plane with grooves, and the plane is dragged away below it: straight on,
-# along three quarters of a circle, and straight on again. Friction differs along and across the
-# grooves, and slip is not normal to the friction cone, so the force points neither along the path
-# nor where an associated rule would have it.
+# A block is pressed on a plane with grooves, and the plane is dragged away below it: straight on, along three
+# quarters of a circle, and straight on again. Friction differs along and across the grooves, and slip is not normal
+# to the friction cone, so the force points neither along the path nor where an associated rule would have it.
 #
 # ## Notation
 #
-# $u$ displacement, $\sigma$ stress, $E$, $\nu$ elastic constants; $r = (r_t, r_n)$ reaction of the
-# plane on the block, $M = \mathrm{diag}(\mu_x, \mu_y)$, $P = \mathrm{diag}(p_x, p_y)$; $s$
-# displacement of the plane and $d$ the unit vector along its increment $\Delta s$. Units: mm, N,
-# MPa.
+# $u$ displacement, $\sigma$ stress, $E$, $\nu$ elastic constants; $r = (r_t, r_n)$ reaction of the plane on the
+# block, $M = \mathrm{diag}(\mu_x, \mu_y)$, $P = \mathrm{diag}(p_x, p_y)$; $s$ displacement of the plane and $d$ the
+# unit vector along its increment $\Delta s$. Units: mm, N, MPa.
 #
 # ## Strong form
 #
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad u = (0, 0, -\delta) \text{ on the top face}, $$
 #
-# and on the bottom face, with the slip increment $\Delta u_t$ relative to the plane [dSFMH07,
-# Section 1]: $x_n \ge 0$, $r_n \ge 0$, $x_n r_n = 0$ for the gap $x_n$, $|M^{-1} r_t| \le r_n$,
-# and where there is slip
+# and on the bottom face, with the slip increment $\Delta u_t$ relative to the plane [dSFMH07, Section 1]:
+# $x_n \ge 0$, $r_n \ge 0$, $x_n r_n = 0$ for the gap $x_n$, $|M^{-1} r_t| \le r_n$, and where there is slip
 #
 # $$ |M^{-1} r_t| = r_n, \qquad -\Delta u_t = \lambda\, P^{-2} r_t, \quad \lambda \ge 0. $$
 #
-# A node that slides with the plane below it has $-\Delta u_t = \Delta s$, up to the change of its
-# own elastic displacement. Then $P^{-2} r_t$ is along $d$, which is the **closed form**
+# A node that slides with the plane below it has $-\Delta u_t = \Delta s$, up to the change of its own elastic
+# displacement. Then $P^{-2} r_t$ is along $d$, which is the **closed form**
 #
 # $$ r_t = r_n \frac{P^2 d}{|M^{-1} P^2 d|}. $$
 #
-# It holds for every node, and therefore for the total force. How much the elastic displacement
-# matters is a question of one length: $\ell = |r_t| / k_t$, the tangential force over the
-# tangential stiffness of the block. On a straight line the force reaches the closed form
-# exponentially, within a few $\ell$. Where the path turns, the elastic displacement turns with the
-# force, and the force lags behind the closed form by an error of first order in $\ell / |\Delta
-# s|$. A block that is pressed half as deep has half the force on the same stiffness, hence half
-# the $\ell$ and half the lag.
+# It holds for every node, and therefore for the total force. How much the elastic displacement matters is a question
+# of one length: $\ell = |r_t| / k_t$, the tangential force over the tangential stiffness of the block. On a straight
+# line the force reaches the closed form exponentially, within a few $\ell$. Where the path turns, the elastic
+# displacement turns with the force, and the force lags behind the closed form by an error of first order in
+# $\ell / |\Delta s|$. A block that is pressed half as deep has half the force on the same stiffness, hence half the
+# $\ell$ and half the lag.
 #
 # ## Weak form
 #
@@ -43,8 +39,6 @@
 # DOLFINx assembles the left side, `dolfinx_contact` finds the reactions on the right.
 
 # %%
-from __future__ import annotations
-
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
 
@@ -61,9 +55,8 @@ STEP = 0.5  # |Delta s|, mm
 # %% [markdown]
 # ## Code
 #
-# The block, the path, the closed form; `drag` moves the plane along the path. For each step it
-# records the total force, how far the total and the worst node are from the closed form, and the
-# work of friction.
+# The block, the path, the closed form; `drag` moves the plane along the path. For each step it records the total
+# force, how far the total and the worst node are from the closed form, and the work of friction.
 
 
 # %%
@@ -125,15 +118,13 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
 # %% [markdown]
 # ## Result
 #
-# 1. At the end of each straight part every node has the closed form, and the work of friction of a
-#    step is $r_n\, |\Delta s|\, d \cdot P^2 d / |M^{-1} P^2 d|$, both to 1e-9.
-# 2. On the turn the total force never leaves the ellipse, and it lags behind the closed form by an
-#    error of first order in $\ell / |\Delta s|$: three depths, each half of the one before, have
-#    lags with a ratio of two. The lag is largest where the path runs along the direction of large
-#    $\mu$ and small $p$: there the force swings from one side to the other while the path turns by
-#    two steps.
-# 3. The non-associated force is 75 degrees away from the associated one on the first straight
-#    part.
+# 1. At the end of each straight part every node has the closed form, and the work of friction of a step is
+#    $r_n\, |\Delta s|\, d \cdot P^2 d / |M^{-1} P^2 d|$, both to 1e-9.
+# 2. On the turn the total force never leaves the ellipse, and it lags behind the closed form by an error of first
+#    order in $\ell / |\Delta s|$: three depths, each half of the one before, have lags with a ratio of two. The lag
+#    is largest where the path runs along the direction of large $\mu$ and small $p$: there the force swings from one
+#    side to the other while the path turns by two steps.
+# 3. The non-associated force is 75 degrees away from the associated one on the first straight part.
 
 
 # %%

@@ -1,10 +1,6 @@
 """What the demos share: where they print and draw, Hooke's law, a body with a rounded face."""
 
-from __future__ import annotations
-
 import sys
-from io import BytesIO
-from pathlib import Path
 
 import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
 
@@ -32,16 +28,14 @@ def picture(draw, *data) -> None:
     inside = "ipykernel" in sys.modules
     if COMM.rank != 0 or not inside and len(sys.argv) < 2:
         return
-    from matplotlib.figure import Figure
+    from matplotlib import pyplot
 
-    figure = Figure(figsize=(9, 4.5), layout="constrained")
+    figure = pyplot.figure(figsize=(9, 4.5), layout="constrained")
     draw(figure, *data)
-    file = BytesIO() if inside else Path(sys.argv[1])
-    figure.savefig(file, dpi=110)
     if inside:
-        from IPython.display import Image, display
-
-        display(Image(file.getvalue()))
+        pyplot.show()
+    else:
+        figure.savefig(sys.argv[1], dpi=110)
 
 
 def everywhere(*arrays) -> list[np.ndarray]:

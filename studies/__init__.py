@@ -1,1 +1,1 @@
-"""Studies: programmes of computations that reproduce a paper. Run from the clone's root: ``python -m studies.punch``."""
+"""Studies: computations that reproduce a paper. From the clone's root: ``python -m studies.punch``."""

@@ -1,7 +1,5 @@
 """One HTML file with all that is shown: figures inside it, tables from rows; nothing is fetched from elsewhere."""
 
-from __future__ import annotations
-
 import base64
 import html
 import math

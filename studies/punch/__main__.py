@@ -5,8 +5,6 @@ begins anew.  With --explore also what the paper's text leaves open: ends of unl
 the top face, increments, mesh.  The page is OUTPUT/study.html.  Runs on any number of MPI ranks.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import sys

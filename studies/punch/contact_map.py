@@ -1,7 +1,5 @@
 """Pictures of the contact disc on the mesh's own faces: no interpolation that invents zones."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from studies.punch.mesh import CONTACT

@@ -1,7 +1,5 @@
 """ParaView files of a punch: displacement, stress and the state of its contact nodes, per step."""
 
-from __future__ import annotations
-
 from dolfinx_contact.compat import functionspace, interpolation_points
 
 # isort: split

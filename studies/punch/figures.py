@@ -1,7 +1,5 @@
 """Figures of the study, each as SVG and PNG, with the data behind it as CSV."""
 
-from __future__ import annotations
-
 import csv
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,14 +53,10 @@ class Figures:
         write_csv(self.directory / f"{name}.csv", rows)
 
     def discs(self, name, title, columns, show, label, legend=None) -> None:
-        """Discs, one row a case; a single column lies down.
+        """Discs, one row a case, or side by side if ``columns`` are one.
 
-        Args:
-            name, title: Of the figure.
-            columns: What ``show(axes, run, column)`` draws, by heading.
-            show: Draws one disc and returns what a colour bar needs.
-            label: Of the colours.
-            legend: Arguments of a legend.
+        ``show(axes, run, column)`` draws the disc of a case and of one of ``columns``, which are named by their
+        headings, and returns what a colour bar needs; ``label`` is that of the colours.
         """
         cases, n = len(self.runs), len(columns)
         high, wide = (cases, n) if n > 1 else (1, cases)
@@ -130,12 +124,11 @@ class Figures:
         by_cycle, by_time = "full: loading, dashed: unloading", "shaded: sticks"
 
         def history(run):
-            (u_x, u_y), (r_tx, r_ty) = (
-                tracked(run, quantity, node) for quantity in ("displacement", "reaction")
-            )
+            u_x, u_y = tracked(run, "displacement", node)
+            r_tx, r_ty = tracked(run, "reaction", node)
             sticks = np.r_[False, run.table[f"node{node}_status"] == STICK].astype(int)
-            return dict(cycles=np.arange(len(u_x)) / run.unloaded(1), u_x=1e3 * u_x, u_y=1e3 * u_y, r_tx=r_tx, r_ty=r_ty,
-                        force=force(run), slip=1e3 * slip_of_point(run, node), sticks=sticks)  # fmt: skip
+            return dict(cycles=np.arange(len(u_x)) / run.unloaded(1), u_x=1e3 * u_x, u_y=1e3 * u_y, r_tx=r_tx,
+                        r_ty=r_ty, force=force(run), slip=1e3 * slip_of_point(run, node), sticks=sticks)  # fmt: skip
 
         def trajectory(ax, run):
             of = history(run)

@@ -1,7 +1,5 @@
 """Measures of a run: stick zones, reverse slip, plateaus, force-slip curves, work of friction."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ as many around it; extruded in ``layers`` layers.  With 8 and 4 these are the 12
 its text, but a core and four blocks of 8 x 8 is the only O-grid with these numbers.
 """
 
-from __future__ import annotations
-
 import math
 
 import gmsh
@@ -24,14 +22,11 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
 
     Args:
         comm: MPI communicator; gmsh runs on its rank 0.
-        refine: Each level doubles ``divisions`` and ``layers``, a negative one halves them; 0 is the
-            paper's mesh.
+        refine: Each level doubles ``divisions`` and ``layers``, a negative one halves them; 0 is the paper's mesh.
         radius, height: Of the punch, length units.
-        divisions: Quadrilaterals along each side of each of the five blocks; even, so that the
-            axis of the punch is a line of nodes.
+        divisions: Quadrilaterals along each side of each of the five blocks; even: the axis is a line of nodes.
         layers: Hexahedra along the height.
-        lowest: Height of those on the plane, from where they grow layer by layer by the same factor; None
-            makes all equally high.
+        lowest: Height of those on the plane, from where they grow by the same factor; None: all are as high.
 
     Returns:
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
@@ -41,10 +36,8 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
     """
     divisions, layers = divisions * 2.0**refine, layers * 2.0**refine
     if divisions < 2 or divisions % 2 or layers < 1 or layers % 1:
-        raise ValueError(
-            "divisions must be even and >= 2, layers whole and >= 1; with refine "
-            f"{refine!r} they are {divisions:g} and {layers:g}."
-        )
+        raise ValueError("divisions must be even and >= 2, layers whole and >= 1; with refine "
+                         f"{refine!r} they are {divisions:g} and {layers:g}.")  # fmt: skip
     if not (0 < radius < math.inf and 0 < height < math.inf):
         raise ValueError(f"radius and height must be positive, got {radius!r} and {height!r}.")
     if lowest is not None and not 0 < lowest * layers < height:

@@ -11,8 +11,6 @@ Units: mm, N, MPa.
 anisotrope", 18e Congrès Français de Mécanique, 2007.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 
@@ -110,10 +108,8 @@ class Punch:
             return fem.dirichletbc(value, fem.locate_dofs_topological(V, dim, entities), V)
 
         def node_at(*point):
-            near = 1e-6 * R
-            return locate_entities(
-                self.mesh, 0, lambda x: np.linalg.norm(x.T - point, axis=1) < near
-            )
+            at, near = np.array(point)[:, None], 1e-6 * R
+            return locate_entities(self.mesh, 0, lambda x: np.abs(x - at).max(axis=0) < near)
 
         down = fix(2, 2, top, self.approach)
         if self.parameters.top == "bonded":
@@ -180,10 +176,8 @@ def programme(parameters: Parameters) -> list[float]:
             raise ValueError(f"{name} must be at least 1, got {getattr(parameters, name)}.")
     lows, high, cycles = np.ravel(parameters.unload_to), parameters.depth, parameters.cycles
     if len(lows) not in (1, cycles) or not ((0 <= lows) & (lows < high)).all():
-        raise ValueError(
-            f"unload_to must be one number in [0, depth), or one per cycle, got "
-            f"{parameters.unload_to} with depth {high} and {cycles} cycles."
-        )
+        raise ValueError(f"unload_to must be one number in [0, depth), or one per cycle, got "
+                         f"{parameters.unload_to} with depth {high} and {cycles} cycles.")  # fmt: skip
     start, steps = 0.0, []
     for low in np.broadcast_to(lows, cycles):
         steps += np.linspace(start, high, parameters.loading + 1)[1:].tolist()
@@ -192,15 +186,12 @@ def programme(parameters: Parameters) -> list[float]:
     return steps
 
 
-def add_options(parser, **defaults) -> None:
+def add_options(parser, cycles: int = Parameters.cycles) -> None:
     """What both programs, the demo and the study, let vary of the parameters, on the command line."""
-    for name, text in {
-        "cycles": "of loading and unloading",
-        "loading": "increments of a loading",
-        "unloading": "increments of an unloading",
-        "tol": "error at which a step ends",
-        "refine": "0 is the paper's mesh; 1 doubles it",
-    }.items():
-        default = defaults.get(name, getattr(Parameters, name))
-        parser.add_argument(f"--{name}", type=type(default), default=default, help=text)
-    parser.add_argument("--top", choices=("bonded", "free"), default="bonded", help="sideways")
+    add, default = parser.add_argument, Parameters()
+    add("--cycles", type=int, default=cycles, help="of loading and unloading")
+    add("--loading", type=int, default=default.loading, help="increments of a loading")
+    add("--unloading", type=int, default=default.unloading, help="increments of an unloading")
+    add("--top", choices=("bonded", "free"), default=default.top, help="top face, sideways")
+    add("--tol", type=float, default=default.tol, help="error at which a step ends")
+    add("--refine", type=int, default=default.refine, help="0 is the paper's mesh; 1 doubles it")

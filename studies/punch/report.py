@@ -1,7 +1,5 @@
 """The study's figures, tables and its page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from studies import page
@@ -39,11 +37,8 @@ DECIDED = (
 def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=()) -> None:
     """Draw all figures, write all tables and the page.
 
-    Args:
-        runs: By variant and case; ``base`` is the paper's programme.
-        output: Directory of the study.
-        wear: Worn volume per work of friction, mm^3/(N mm).
-        failures: The variants that did not converge.
+    ``runs`` by variant and case, the paper's programme is ``base``; ``wear`` is worn volume per work of friction,
+    mm^3/(N mm); ``failures`` are the variants that did not converge.
     """
     base = runs["base"]
     figures = Figures(base, output / "figures")
@@ -62,7 +57,7 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
     answers = ask({name: cases for name, cases in runs.items() if name != "mesh coarsened"})
     tables = dict(
         variants=variants, mesh=work.mesh_orders(runs), cycles=work.cycles(figures, wear), answers=answers,
-        statements=verdicts(answers), times=times(base),
+        statements=verdicts(answers),
     )  # fmt: skip
     for name, rows in tables.items():
         write_csv(figures.directory / f"{name}.csv", rows)
@@ -75,7 +70,6 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
         "<h2>Variants</h2>", page.table(variants),
         page.paragraph("Against the mesh: order of the last three meshes, and the limit if that order lasted."),
         page.table(tables["mesh"]),
-        "<h2>Times and errors</h2>", page.table(tables["times"]),
         "<h2>Parameters</h2>", page.table(settings(base)),
     ]  # fmt: skip
     title = f"Cyclic punch with anisotropic friction: cases {', '.join(base)}"
@@ -97,31 +91,19 @@ def verdicts(answers: list[dict]) -> list[dict]:
     rows = []
     for statement in STATEMENTS:
         mine = [row for row in answers if row["statement"] == statement.key]
-        if not mine:
-            continue
-        holds, by_case = [row["holds"] for row in mine], {}
+        holds = {row["case"]: [] for row in mine}
         for row in mine:
-            by_case.setdefault(row["case"], []).append(row["holds"])
+            holds[row["case"]].append(row["holds"])
         base = [f"{row['case']} {row['value']:.3g}" for row in mine if row["variant"] == "base"]
-        rows.append({
-            "where": statement.where, "statement": statement.text, "decided by": statement.measure,
-            "verdict": "holds in all" if all(holds) else "depends" if any(holds) else "holds in none",
-            "runs in which it holds": ", ".join(f"{case} {sum(of)}/{len(of)}" for case, of in by_case.items()),
-            "values of the base runs": ", ".join(base),
-        })  # fmt: skip
+        found = {row["holds"] for row in mine}
+        if mine:
+            rows.append({
+                "where": statement.where, "statement": statement.text, "decided by": statement.measure,
+                "verdict": "depends" if len(found) > 1 else "holds in all" if found == {1} else "holds in none",
+                "runs in which it holds": ", ".join(f"{case} {sum(of)}/{len(of)}" for case, of in holds.items()),
+                "values of the base runs": ", ".join(base),
+            })  # fmt: skip
     return rows
-
-
-def times(base: dict[str, Run]) -> list[dict]:
-    """Wall times and largest errors of the base runs."""
-    return [
-        dict(
-            case=case, steps=len(of), seconds=float(of["seconds"].sum()), slowest_step=float(of["seconds"].max()),
-            iterations=int(of["iterations"].sum()), largest_error=float(of["error"].max()),
-            largest_slip_error=float(of["slip_error"].max()), energy_left_open=float(work.relative_residual(run).max()),
-        )
-        for case, run in base.items() for of in [run.table]
-    ]  # fmt: skip
 
 
 def settings(base: dict[str, Run]) -> list[dict]:

@@ -5,8 +5,6 @@ nodes, one row a step), ``disc.npz`` (the contact disc), ``steps/0001.npz``, ...
 and one checkpoint.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import asdict
@@ -31,19 +29,16 @@ FIELDS = (*ContactMap._fields[2:], "displacement", "dissipation")  # kept after 
 class EnergyBalance:
     """The terms of the energy balance of each step, N mm.
 
-    Equilibrium at the end of a step, ``K u = R + r`` with the platen's forces R and the reactions r,
-    times the increment Delta u gives, because of ``r_n x_n = 0`` at the end of the step,
+    Equilibrium at the end of a step, ``K u = R + r`` with the platen's forces R and the reactions r, times the
+    increment Delta u gives, because of ``r_n x_n = 0`` at the end of the step,
 
         F Delta d = Delta W + D + half Delta u.K.Delta u + sum r_n x_n(before)
 
-    with F the force on the platen, d its displacement, W the elastic energy and ``D = - sum r_t.Delta u_t``
-    the dissipation with forces of the end of the step. The last two terms are what the scheme
-    adds; both are >= 0. With means of old and new forces (trapezoidal rule) the third term
-    vanishes and the last is ``half sum (r_n x_n(before) - r_n(before) x_n)``. Neither D is the work of friction,
-    ``work_of_friction``, which stands beside them: docs/dissipation.md says why.
-
-    F is taken from the contact law, W from the form that UFL integrates over the body, so that the
-    sums close only if equilibrium, complementarity and the bookkeeping of slip do.
+    with F the force on the platen (from the contact law), d its displacement, W the elastic energy (by UFL over the
+    body) and ``D = - sum r_t.Delta u_t`` with forces of the end of the step. The last two terms are what the scheme
+    adds; both are >= 0. With means of old and new forces the third term vanishes and the last is
+    ``half sum (r_n x_n(before) - r_n(before) x_n)``. Neither D is the work of friction, ``work_of_friction``, which
+    stands beside them: docs/dissipation.md says why.
     """
 
     def __init__(self, punch: Punch):

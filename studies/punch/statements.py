@@ -4,8 +4,6 @@ A statement is decided by a number and a bound; both are in the table, for every
 variant, so that whoever would draw the line elsewhere can.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -16,7 +14,7 @@ from studies.punch.run import Run
 
 SMALL = 0.05  # what "quasi-linear" and "no noticeable difference" may deviate, relative
 ROUNDING = 1e-9  # radii that differ by less, over R, are one
-CYCLES = "first", "last"  # a statement about the last one is not asked of runs of one cycle
+FIRST, LAST = ("first",), ("last",)  # cycle; one about the last is not asked of runs of one cycle
 
 
 class Statement(NamedTuple):
@@ -27,9 +25,9 @@ class Statement(NamedTuple):
     text: str
     measure: str
     cases: str  # which cases it is about; several at once if ``together``
-    values: Callable  # (Run, or dict of Runs by case; cycle) -> the number, and what else decides; nan: not asked
+    values: Callable  # of a Run or dict of Runs, and a cycle: the number and what else decides; nan: not asked
     holds: Callable  # of these values
-    cycle: str = "first"
+    cycles: tuple = FIRST
     together: bool = False
 
 
@@ -127,38 +125,42 @@ STATEMENTS = [
     Statement("peripheral", FIG3, "During the first unloading the periphery (r > 3/4 R) begins to stick.",
         "area fraction of the periphery gained; > 0.1", "ABC", peripheral, lambda gain: gain > 0.1),
     Statement("shrink", FIG3, "From cycle to cycle the stick zones after unloading shrink.",
-        "stuck area, last cycle over first; < 0.9", "ABC", stuck, lambda ratio: ratio < 0.9, "last"),
+        "stuck area, last cycle over first; < 0.9", "ABC", stuck, lambda ratio: ratio < 0.9, LAST),
     Statement("fragment", FIG3, "From cycle to cycle they break into more pieces.",
-        "pieces after the last unloading less those after the first; > 0", "ABC", pieces, lambda more: more > 0, "last"),
-    *(Statement(f"reverse_{cycle}", FIG3, f"Reverse slip begins at the rim and advances inwards ({cycle} unloading).",
+        "pieces after the last unloading less those after the first; > 0", "ABC", pieces, lambda n: n > 0, LAST),
+    Statement("reverse", FIG3, "Reverse slip begins at the rim and advances inwards ({} unloading).",
         "change of its innermost radius / R; begins beyond 3/4, < 0", "ABC", reverse,
-        lambda change, begin: begin > RIM and change < -ROUNDING, cycle) for cycle in CYCLES),
-    Statement("A_closed", FIG4, "Isotropic: loading and unloading show no noticeable difference in the force-slip curve "
-        "of P (last cycle).", "difference in slip / range; <= 0.05", "A", hysteresis, lambda width: width <= SMALL, "last"),
-    *(Statement(f"BC_{cycle}", FIG4, f"Anisotropic: loading is quasi-linear, unloading is not ({cycle} cycle).",
+        lambda change, begin: begin > RIM and change < -ROUNDING, FIRST + LAST),
+    Statement("A_closed", FIG4, "Isotropic: loading and unloading show no noticeable difference in the force-slip "
+        "curve of P ({} cycle).", "difference in slip / range; <= 0.05", "A", hysteresis, lambda d: d <= SMALL, LAST),
+    Statement("BC", FIG4, "Anisotropic: loading is quasi-linear, unloading is not ({} cycle).",
         "non-linearity of loading; <= 0.05 < that of unloading", "BC", curvature,
-        lambda up, down: up <= SMALL < down, cycle) for cycle in CYCLES),
+        lambda up, down: up <= SMALL < down, FIRST + LAST),
     Statement("plateau", FIG6, "From the second cycle on P is still at the end of loading, before the peak.",
-        "part of loading before the peak; > 0", "ABC", still(0), lambda part: part > 0, "last"),
-    Statement("plateau_elsewhere", FIG6, "There are other choices of P for which it is so (last cycle).",
+        "part of loading before the peak; > 0", "ABC", still(0), lambda part: part > 0, LAST),
+    Statement("plateau_elsewhere", FIG6, "There are other choices of P for which it is so ({} cycle).",
         "share of the area that slips in the cycle but is still before the peak; > 0.05",
-        "ABC", still_elsewhere, lambda share: share > SMALL, "last"),
-    Statement("A_linear", FIG7, "Isotropic: the force-slip curve is quasi-linear (loading of the last cycle).",
-        "non-linearity of loading; <= 0.05", "A", curvature, lambda up, down: up <= SMALL, "last"),
-    Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more than A by a fifth "
-        "or more.", "all work of B over that of A; > 1.2", "AB", second_over_first, lambda ratio: ratio > 1.2, together=True),
+        "ABC", still_elsewhere, lambda share: share > SMALL, LAST),
+    Statement("A_linear", FIG7, "Isotropic: the force-slip curve is quasi-linear (loading of the {} cycle).",
+        "non-linearity of loading; <= 0.05", "A", curvature, lambda up, down: up <= SMALL, LAST),
+    Statement("wear", "Sections 3, 4", "Anisotropy has a strong influence on wear: B dissipates more than A by a "
+        "fifth or more.", "all work of B over that of A; > 1.2", "AB", second_over_first,
+        lambda ratio: ratio > 1.2, together=True),
     Statement("nonassociated", "Section 4", "The slip rule alone has a strong influence: C dissipates more than B by a "
-        "fifth or more.", "all work of C over that of B; > 1.2", "BC", second_over_first, lambda ratio: ratio > 1.2,
-        together=True),
+        "fifth or more.", "all work of C over that of B; > 1.2", "BC", second_over_first,
+        lambda ratio: ratio > 1.2, together=True),
     Statement("within", "observed", "Stick zones break up within one unloading more than from cycle to cycle.",
-        "range of the pieces' number, within first less between; > 0", "ABC", breaking, lambda more: more > 0, "last"),
+        "range of the pieces' number, within first less between; > 0", "ABC", breaking, lambda more: more > 0, LAST),
     Statement("after", "observed", "From the second cycle on P is still after the peak.",
-        "part of unloading after the peak; > 0", "ABC", still(1), lambda part: part > 0, "last"),
-    *(Statement(f"spread_{cycle}", "observed", f"The cases dissipate alike within 30 % or so ({cycle} cycle).",
-        "largest over smallest work; <= 1.35", "ABC", spread, lambda ratio: ratio <= 1.35, cycle, True)
-        for cycle in CYCLES),
+        "part of unloading after the peak; > 0", "ABC", still(1), lambda part: part > 0, LAST),
+    Statement("spread", "observed", "The cases dissipate alike within 30 % or so ({} cycle).",
+        "largest over smallest work; <= 1.35", "ABC", spread, lambda ratio: ratio <= 1.35, FIRST + LAST, True),
     Statement("local", "observed", "Locally the cases differ tenfold.", "share of the area where the work differs "
         "tenfold; > 0.05", "ABC", tenfold_area, lambda share: share > SMALL, together=True),
+]  # fmt: skip
+STATEMENTS = [
+    statement._replace(key=f"{statement.key}_{cycle}", text=statement.text.format(cycle), cycles=(cycle,))
+    for statement in STATEMENTS for cycle in statement.cycles
 ]  # fmt: skip
 
 
@@ -168,13 +170,11 @@ def ask(runs: dict[str, dict[str, Run]]) -> list[dict]:
     for statement in STATEMENTS:
         for variant, cases in runs.items():
             asked = {case: cases[case] for case in statement.cases if case in cases}
-            cycles = min((run.parameters.cycles for run in asked.values()), default=0)
-            if not asked or statement.cycle == "last" and cycles < 2:
-                continue
+            last = min((run.parameters.cycles for run in asked.values()), default=0)
+            cycle = 1 if statement.cycles == FIRST else last
             if statement.together:
                 asked = {"+".join(asked): asked} if len(asked) == len(statement.cases) else {}
-            for case, subject in asked.items():
-                cycle = cycles if statement.cycle == "last" else 1
+            for case, subject in asked.items() if last > 1 or statement.cycles == FIRST else ():
                 values = np.atleast_1d(statement.values(subject, cycle)).tolist()
                 if not np.isnan(values[0]):
                     rows.append(dict(statement=statement.key, variant=variant, case=case,

@@ -1,7 +1,5 @@
 """Work of friction in the study: energy balance, cycles, wear, convergence; figures and tables."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.colors import LogNorm
 
@@ -29,21 +27,17 @@ def relative_residual(run: Run) -> np.ndarray:
 def energy(figures: Figures) -> None:
     """Terms of the balance, accumulated, and what it leaves open per step."""
     runs = figures.runs
-    with figures.drawn("energy", (4.8 * len(runs), 11)) as figure:
-        axes = figure.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
-        for (above, middle, below), (case, run) in zip(axes.T, runs.items()):
+    with figures.drawn("energy", (4.8 * len(runs), 9)) as figure:
+        axes = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
+        for (above, below), (case, run) in zip(axes.T, runs.items()):
             at = np.arange(len(run.table) + 1) / run.unloaded(1)
             platen = {"platen_work": ("work of the platen", "black", "-")}
             for key, (label, colour, style) in (platen | TERMS).items():
-                values = np.r_[0, np.cumsum(run.table[key])]
-                above.plot(at, values, style, color=colour, label=label)
-                if key not in ("platen_work", "elastic_change", "half_du_K_du"):
-                    middle.plot(at, values, style, color=colour)
+                above.semilogy(at[1:], np.cumsum(run.table[key]), style, color=colour, label=label)
             below.semilogy(at[1:], np.maximum(relative_residual(run), 1e-17), ".", color="black")
             below.axhline(run.parameters.tol, color="#d55e00", linewidth=1)
             below.text(0, 6 * run.parameters.tol, "tolerance of a step", color="#d55e00")
-            above.set(title=NAMES[case], ylabel="accumulated [N mm]")
-            middle.set(ylabel="the small terms [N mm]")
+            above.set(title=NAMES[case], ylabel="accumulated [N mm]", ylim=(1, None))
             below.set(xlabel="cycles", ylabel="|open balance| / largest term", ylim=(1e-17, 1e-7))
         for ax in axes.flat:
             ax.grid(alpha=0.3)
@@ -132,7 +126,8 @@ def comparison(runs: dict[str, dict[str, Run]], failures=()) -> list[dict]:
                 variant=name, case=case, first_cycle_Nmm=work, of_base=work / total(runs["base"][case], 1),
                 last_cycle=own.cycles, last_cycle_Nmm=total(run, own.cycles), increments=own.loading + own.unloading,
                 contact_nodes=len(run.x), iterations_per_step=float(run.table["iterations"].mean()),
-                seconds_per_step=float(run.table["seconds"].mean()), not_converged="",
+                seconds_per_step=float(run.table["seconds"].mean()), largest_error=float(run.table["error"].max()),
+                energy_left_open=float(relative_residual(run).max()), not_converged="",
             ))  # fmt: skip
     return rows + [dict.fromkeys(rows[0], np.nan) | failure for failure in failures]
 
