@@ -28,6 +28,10 @@
 # ## Weak form
 #
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v. $$
+#
+# ## Code
+#
+# A cycle is middle, right, left, middle. `dc.History` keeps a row for each step.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -43,13 +47,7 @@ APPROACH = 3.0 * A**2 / (2 * R)
 STROKE = 0.6 * A**2 / (2 * R)  # amplitude, mm
 QUARTER = 2  # steps from the middle to the end of a stroke
 
-# %% [markdown]
-# ## Code
-#
-# A cycle is middle, right, left, middle. `dc.History` keeps a row for each step.
 
-
-# %%
 def fret(cycles: int, wear: dc.Wear | None, quarter: int = QUARTER):
     """Press, then move the plane to and fro; the history, the load, and profiles before and after each cycle."""
     problem, held = cylinder(YOUNG, POISSON, wear)

@@ -54,6 +54,13 @@
 #
 # so that a nodal reaction is the force of a whole ring. On the axis $u_r = 0$: a support that fixes the tangential
 # displacement of a contact node.
+#
+# ## Code
+#
+# `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves on one mesh. The
+# pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$. The radius is
+# found twice: as the place of the last node that touches, which cannot be better than the mesh, and from the second
+# moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -73,16 +80,6 @@ FORCE = 4 / 3 * E_STAR * np.sqrt(R) * DELTA**1.5
 P0 = 2 * E_STAR * A / (np.pi * R)
 
 
-# %% [markdown]
-# ## Code
-#
-# `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves on one mesh. The
-# pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$. The radius is
-# found twice: as the place of the last node that touches, which cannot be better than the mesh, and from the second
-# moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
-
-
-# %%
 def far_field(x, point_force: float):
     """Rigid approach and the displacement of a point force at the origin, ``shape=(2, points)``."""
     r, z = x[0], x[1]

@@ -33,6 +33,12 @@
 # ## Weak form
 #
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v. $$
+#
+# ## Code
+#
+# The sticking part is measured twice. By the status of the nodes it is known to the width of a cell, here $a/11$ in
+# the middle and $a/7$ near the edge. By second moments it is known better: for the closed form
+# $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that has turned round is twice as much.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -50,15 +56,6 @@ R, A = 1000.0, 0.1  # radius; half width for which the mesh is made
 L = 16 * A
 
 
-# %% [markdown]
-# ## Code
-#
-# The sticking part is measured twice. By the status of the nodes it is known to the width of a cell, here $a/11$ in
-# the middle and $a/7$ near the edge. By second moments it is known better: for the closed form
-# $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that has turned round is twice as much.
-
-
-# %%
 def cylinder(E: float, nu: float, wear=None, cells: int = 32, size: float = L):
     """Body, plane and friction; the far boundary is held, its displacement is the second result."""
     domain, face, far = rounded_body(R, A, size, cells, crossed=True)

@@ -28,6 +28,8 @@
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v, $$
 #
 # hexahedra of first order, one load step after another.
+#
+# ## Code
 
 # %%
 import argparse
@@ -45,11 +47,7 @@ from studies.punch.contact_map import draw, gather
 from studies.punch.fields import FieldWriter
 from studies.punch.model import add_options
 
-# %% [markdown]
-# ## Code
 
-
-# %%
 SOLVERS = {
     "auto": lambda: None,
     "fixed-point": dc.FixedPoint,

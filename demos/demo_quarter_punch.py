@@ -25,6 +25,13 @@
 # ## Weak form
 #
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v . $$
+#
+# ## Code
+#
+# The cross section is a square of $n \times n$ quadrilaterals bent into a disc,
+# $(x, y) \mapsto (x \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole. A
+# node on one plane of symmetry has half the reaction, the node on both a quarter, because the other part is that of
+# the missing body; along the held direction the reaction of the whole is zero.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -41,16 +48,6 @@ MU, P = (0.30, 0.15), (0.05, 0.20)  # case C of [dSFMH07, Table 1]
 DEPTHS = (0.05, 0.1, 0.08, 0.05, 0.02)  # loading, then unloading, with reverse slip
 
 
-# %% [markdown]
-# ## Code
-#
-# The cross section is a square of $n \times n$ quadrilaterals bent into a disc,
-# $(x, y) \mapsto (x \sqrt{1 - y^2/2},\, y \sqrt{1 - x^2/2})$, so that the quarter has the same cells as the whole. A
-# node on one plane of symmetry has half the reaction, the node on both a quarter, because the other part is that of
-# the missing body; along the held direction the reaction of the whole is zero.
-
-
-# %%
 def punch(quarter: bool, cells: int = 8):
     """The punch or its quarter, ``cells`` across the diameter; the problem and a setter of the depth."""
     low, across = (0.0, cells // 2) if quarter else (-1.0, cells)

@@ -37,6 +37,11 @@
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v. $$
 #
 # DOLFINx assembles the left side, `dolfinx_contact` finds the reactions on the right.
+#
+# ## Code
+#
+# The block, the path, the closed form; `drag` moves the plane along the path. For each step it records the total
+# force, how far the total and the worst node are from the closed form, and the work of friction.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -52,14 +57,6 @@ MU, P = np.array([0.30, 0.15]), np.array([0.05, 0.20])  # case C of [dSFMH07, Ta
 STEP = 0.5  # |Delta s|, mm
 
 
-# %% [markdown]
-# ## Code
-#
-# The block, the path, the closed form; `drag` moves the plane along the path. For each step it records the total
-# force, how far the total and the worst node are from the closed form, and the work of friction.
-
-
-# %%
 def block(depth: float, friction: dc.Friction) -> dc.ContactProblem:
     """A pad of 10 x 10 x 4 mm; its top face is pressed down by ``depth``, against the plane z = 0."""
     size, bricks = np.array([10.0, 10.0, 4.0]), mesh.CellType.hexahedron

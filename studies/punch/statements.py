@@ -159,8 +159,8 @@ STATEMENTS = [
         "tenfold; > 0.05", "ABC", tenfold_area, lambda share: share > SMALL, together=True),
 ]  # fmt: skip
 STATEMENTS = [
-    statement._replace(key=f"{statement.key}_{cycle}", text=statement.text.format(cycle), cycles=(cycle,))
-    for statement in STATEMENTS for cycle in statement.cycles
+    s._replace(key=s.key if s.cycles == (cycle,) else f"{s.key}_{cycle}", text=s.text.format(cycle), cycles=(cycle,))
+    for s in STATEMENTS for cycle in s.cycles
 ]  # fmt: skip
 
 
