@@ -1,1 +1,1 @@
-"""Demos: text notebooks; ``python demos/demo_hertz.py`` runs one, ``python -m demos.demo_punch`` the punch."""
+"""Demos, text notebooks: ``python demos/demo_hertz.py [picture.png]``; the punch: ``python -m demos.demo_punch``."""

@@ -47,7 +47,6 @@ from studies.punch.contact_map import draw, gather
 from studies.punch.fields import FieldWriter
 from studies.punch.model import add_options
 
-
 SOLVERS = {
     "auto": lambda: None,
     "fixed-point": dc.FixedPoint,
@@ -86,11 +85,9 @@ def run(punch: Punch) -> Iterator[dict]:
 
 # %%
 def arguments(argv=None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description="The punch of [dSFMH07, Section 3]; the scene is in studies/punch. Runs on any "
-        "number of MPI ranks.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    defaults = argparse.ArgumentDefaultsHelpFormatter
+    says = "The punch of [dSFMH07, Section 3], on any number of MPI ranks; the scene is in studies/punch."
+    parser = argparse.ArgumentParser(description=says, formatter_class=defaults)
     add = parser.add_argument
     add("--case", choices=CASES, default="C", help="friction, Table 1 of the paper")
     add_options(parser)

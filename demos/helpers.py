@@ -20,11 +20,7 @@ def say(text: str) -> None:
 
 
 def picture(draw, *data) -> None:
-    """Call ``draw(figure, *data)`` where somebody wants to see it.
-
-    In a notebook the figure is shown. A script writes it to the file that is its only argument, on rank
-    0; without one nothing is drawn, and matplotlib is not needed.
-    """
+    """Call ``draw(figure, *data)`` and show the figure in a notebook; a script writes it to its argument, if any."""
     inside = "ipykernel" in sys.modules
     if COMM.rank != 0 or not inside and len(sys.argv) < 2:
         return
@@ -49,26 +45,23 @@ def hooke(strain, E: float, nu: float):
     return lame * ufl.tr(strain) * ufl.Identity(strain.ufl_shape[0]) + 2 * shear * strain
 
 
-def rounded_body(radius: float, contact: float, size: float, cells: int, half=False, crossed=False):
-    """A body with a rounded face on the line y = 0, in two dimensions; it lies on -size < x < size, y < size.
+def rounded_body(radius, contact, size, cells: int, half=False, crossed=False):
+    """A body with the face y = x^2 / (2 radius), as in the theory of Hertz, in two dimensions.
 
-    The face is the parabola y = x^2 / (2 R), as in the theory of Hertz. Widths of the quadrilaterals grow
-    like ``cosh(x / fine)``; ``fine`` is such that a quarter of them are within ``contact``, and a node is at
-    that place.
+    Widths of its quadrilaterals grow like ``cosh(x / fine)``; ``fine`` is such that a quarter of them are within
+    ``contact``, and a node is at that place.
 
     Args:
-        radius: R of the face, length units.
+        radius: Of the face, length units.
         contact: Expected half width of the contact.
         size: Half width and height of the body, more than four times ``contact``.
         cells: Cells from the middle to the side, and as many over the height; a multiple of four.
         half: Only the half x > 0, for symmetry.
-        crossed: Each quadrilateral is cut into four triangles by its diagonals; in first order these
-            do not lock when the material hardly changes its volume [B. Mercier, RAIRO Anal. Numer. 13
-            (1979) 117], provided that the diagonals are straight.
+        crossed: Each quadrilateral is cut into four triangles by its diagonals; in first order these do not lock
+            when the material hardly changes its volume [B. Mercier, RAIRO Anal. Numer. 13 (1979) 117].
 
     Returns:
-        The mesh; the indices of the facets of the rounded face within twice ``contact``, and of the
-        far boundary, which is all the rest but the face and the line x = 0 of a half.
+        The mesh; the facets of the face within twice ``contact``; those of the far boundary, the sides and the top.
     """
     # sinh(y) = contact / fine and sinh(4 y) = size / fine: a cubic for cosh(y)
     cosh = np.roots([8, 0, -4, -size / contact]).real.max()
@@ -79,13 +72,14 @@ def rounded_body(radius: float, contact: float, size: float, cells: int, half=Fa
     diagonal = mesh.DiagonalType.crossed
     domain = mesh.create_rectangle(COMM, corners, [across, cells], kind, diagonal=diagonal)
     width = np.arcsinh(2 * contact / fine) / np.arcsinh(size / fine)
-    face, far = (
-        mesh.locate_entities_boundary(domain, 1, where)
-        for where in (
-            lambda x: np.isclose(x[1], 0.0) & (np.abs(x[0]) < width),
-            lambda x: np.isclose(x[1], 1.0) | np.isclose(np.abs(x[0]), 1.0),
-        )
-    )
+
+    def on_face(x):
+        return np.isclose(x[1], 0.0) & (np.abs(x[0]) < width)
+
+    def is_far(x):
+        return np.isclose(x[1], 1.0) | np.isclose(np.abs(x[0]), 1.0)
+
+    face, far = (mesh.locate_entities_boundary(domain, 1, where) for where in (on_face, is_far))
     x = domain.geometry.x
     lines = np.linspace(-1.0, 1.0, 2 * cells + 1)
     x[:, :2] = np.interp(x[:, :2], lines, fine * np.sinh(np.arcsinh(size / fine) * lines))

@@ -30,10 +30,8 @@ def variants(base: Parameters, options) -> dict[str, Parameters]:
     runs["deeper every cycle"] = replace(few, unload_to=deeper)
     runs["top free"] = replace(few, top="free")
     for factor in (2, 4):
-        loading, unloading = factor * base.loading, factor * base.unloading
-        runs[f"{loading}+{unloading} increments"] = replace(
-            few, loading=loading, unloading=unloading
-        )
+        more = dict(loading=factor * base.loading, unloading=factor * base.unloading)
+        runs["{loading}+{unloading} increments".format(**more)] = replace(few, **more)
     if options.divisions * 2**base.refine % 4 == options.layers * 2**base.refine % 2 == 0:
         runs["mesh coarsened"] = replace(base, cycles=1, refine=base.refine - 1)
     for level in range(1, options.explore_refine + 1):
@@ -49,19 +47,13 @@ def plan(options) -> dict[str, dict[str, Parameters]]:
         point=tuple(options.point[0]) if options.point else None,
         **{name: getattr(options, name) for name in names},
     )
-    runs = {"base": base, **(variants(base, options) if options.explore else {})}
-    return {
-        name: {case: replace(parameters, case=case) for case in options.cases}
-        for name, parameters in runs.items()
-    }
+    runs = {"base": base} | (variants(base, options) if options.explore else {})
+    cases = options.cases
+    return {name: {case: replace(of, case=case) for case in cases} for name, of in runs.items()}
 
 
 def compute_all(runs, output: Path, points, mesh_options):
-    """Compute what is missing, with one progress bar for everything.
-
-    Returns:
-        Complete runs by variant and case, read by rank 0; and those that did not converge.
-    """
+    """Compute what is missing; complete runs by variant and case, on rank 0, and those that did not converge."""
     complete, failures = {}, []
     total = sum(len(programme(p)) for cases in runs.values() for p in cases.values())
     hidden = True if COMM.rank != 0 else None  # None: where there is no terminal
@@ -79,9 +71,8 @@ def compute_all(runs, output: Path, points, mesh_options):
 
 
 def arguments(argv=None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+    defaults = argparse.ArgumentDefaultsHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=defaults)
     add = parser.add_argument
     add("--cases", nargs="+", choices=CASES, default=list(CASES), help="Table 1 of the paper")
     add_options(parser, cycles=6)

@@ -104,17 +104,11 @@ def gather(punch) -> ContactMap | None:
 
 
 def draw(maps, title, file, point) -> None:
-    """Draw contact maps side by side and write a picture.
+    """Draw ``maps``, pairs of a title and a ContactMap, side by side into a file; ``point`` is where P is, mm.
 
-    Above, the load function f with stick, slip and open zones and the slip of the last increment;
-    below, pressure and tangential traction. Forces are divided by the area of their node; f and
-    pressure also by the mean pressure, so that one scale serves loaded and unloaded punches.
-
-    Args:
-        maps: Pairs of a title and a ContactMap, one column each.
-        title: Of the whole picture.
-        file: Path of the picture; its suffix is the format.
-        point: Position of P, to be marked, mm.
+    Above, the load function f with stick, slip and open zones and the slip of the last increment; below, pressure
+    and tangential traction. Forces are divided by the area of their node; f and pressure also by the mean pressure,
+    so that one scale serves loaded and unloaded punches.
     """
     with rc_context({"font.size": 14, "hatch.linewidth": 0.6}):
         figure = Figure(figsize=(4.6 * len(maps) + 1.2, 10.0), layout="constrained")

@@ -30,9 +30,6 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
 
     Returns:
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
-
-    Raises:
-        ValueError: with ``refine`` an odd number of divisions or no whole number of layers; a size <= 0.
     """
     divisions, layers = divisions * 2.0**refine, layers * 2.0**refine
     if divisions < 2 or divisions % 2 or layers < 1 or layers % 1:

@@ -1,11 +1,8 @@
-"""An elastic cylinder pressed cyclically on a rigid plane with orthotropic friction.
+"""An elastic cylinder pressed cyclically on a rigid plane with orthotropic friction; units: mm, N, MPa.
 
-A steel punch of radius and height 10 mm stands on a plane; its top face goes 0.1 mm down in five
-increments and up again in ten. Poisson's effect drives the contact nodes outwards against
-friction, which is isotropic (case A), orthotropic with the associated slip rule (B), or orthotropic
-with a slip rule of its own (C) [dSFMH07, Section 3].
-
-Units: mm, N, MPa.
+A steel punch of radius and height 10 mm stands on a plane; its top face goes 0.1 mm down in five increments and up
+again in ten. Poisson's effect drives the contact nodes outwards against friction, which is isotropic (case A),
+orthotropic with the associated slip rule (B), or orthotropic with one of its own (C) [dSFMH07, Section 3].
 
 [dSFMH07]: G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, "Comportement hystérétique du frottement
 anisotrope", 18e Congrès Français de Mécanique, 2007.
@@ -120,11 +117,7 @@ class Punch:
         raise ValueError(f'top must be "bonded" or "free", got {self.parameters.top!r}.')
 
     def press(self, displacement: float) -> dict:
-        """Move the top face to ``displacement`` mm below its first position; one load step.
-
-        Returns:
-            What the JSON file says about the step; forces in N, the same on all ranks.
-        """
+        """Move the top face to ``displacement`` mm below its first position: one load step; what is said of it."""
         self.approach.value = -displacement
         step = self.problem.solve()
         contact = self.contact
@@ -165,12 +158,7 @@ class Punch:
 
 
 def programme(parameters: Parameters) -> list[float]:
-    """Displacements of the top face at the end of every load step [dSFMH07, Fig. 2].
-
-    Raises:
-        ValueError: an unloading that is none, fewer than one cycle or increment, or a list
-            ``unload_to`` with another number of entries than cycles.
-    """
+    """Displacements of the top face at the end of every load step [dSFMH07, Fig. 2]."""
     for name in ("cycles", "loading", "unloading"):
         if getattr(parameters, name) < 1:
             raise ValueError(f"{name} must be at least 1, got {getattr(parameters, name)}.")

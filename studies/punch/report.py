@@ -108,8 +108,9 @@ def verdicts(answers: list[dict]) -> list[dict]:
 
 def settings(base: dict[str, Run]) -> list[dict]:
     """What was computed and by what, one column a case."""
-    heads = {}
+    rows = {}
     for case, run in base.items():
-        groups = [of if isinstance(of, dict) else {key: of} for key, of in run.head.items()]
-        heads[case] = {key: value for group in groups for key, value in group.items()}
-    return [{"": key, **{case: heads[case][key] for case in base}} for key in next(iter(heads.values()))]  # fmt: skip
+        for key, of in run.head.items():
+            for name, value in (of if isinstance(of, dict) else {key: of}).items():
+                rows.setdefault(name, {"": name})[case] = value
+    return list(rows.values())

@@ -94,16 +94,9 @@ class EnergyBalance:
 def compute(parameters, directory, points=(), bar=None, **mesh_options) -> str:
     """Compute a run, or what is missing of it, on the number of ranks that it was begun on.  Collective.
 
-    Args:
-        parameters: Of the punch.
-        directory: Of the run. What is there with other settings is removed.
-        points: Nodes to track beside P, pairs (x, y), mm: the contact nodes nearest to them.
-        bar: A tqdm bar that is moved on by one per step; None for none.
-        mesh_options: Further arguments of ``punch_mesh``.
-
-    Returns:
-        The step that did not converge and why; empty if all did. Such a run is not tried again, as
-        long as its directory is there.
+    What is in ``directory`` with other settings is removed; ``points`` are nodes to track beside P, pairs (x, y), mm;
+    ``bar``, of tqdm, is moved on by one per step. Returns the step that did not converge and why; empty if all did.
+    Such a run is not tried again, as long as its directory is there.
     """
     directory, bar = Path(directory), tqdm(disable=True) if bar is None else bar
     settings = dict(parameters=asdict(parameters), points=list(points), mesh=mesh_options)
@@ -176,12 +169,8 @@ def _found(directory: Path, settings: dict) -> tuple[int, str]:
 class Run:
     """What ``compute`` left in a directory, read by one rank.
 
-    Attributes:
-        parameters: Of the punch.
-        head: What was computed, and by what.
-        points: Tracked nodes beside P are those nearest to these, mm.
-        table: Columns of the history, arrays over the steps.
-        x, faces, area: Nodes of the contact disc, its quadrilaterals, and nodal areas, mm^2.
+    ``table`` has the columns of the history; ``x``, ``faces``, ``area`` are the contact disc's nodes, quadrilaterals
+    and nodal areas, mm^2.
     """
 
     def __init__(self, directory):
