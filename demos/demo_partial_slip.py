@@ -70,18 +70,13 @@ def cylinder(E: float, nu: float, wear=None, cells: int = 32, size: float = L):
 
 
 def observe(contact: dc.Contact) -> dict:
-    """Forces, second moments, and the node positions by status."""
+    """Forces, second moments, tractions, and the positions of the nodes that stick."""
     x, r, status, area = along_face(contact, contact.reaction, contact.status, contact.area)
-    return {
-        "x": x,
-        "P": r[:, 1].sum(),
-        "Q": r[:, 0].sum(),
-        "moment_p": r[:, 1] @ x**2,
-        "moment_q": r[:, 0] @ x**2,
-        "spread_q": np.abs(r[:, 0]).sum(),
-        "stick": x[status == dc.Status.STICK],
-        "q": r[:, 0] / area,
-    }
+    return dict(
+        x=x, q=r[:, 0] / area, stick=x[status == dc.Status.STICK],
+        Q=r[:, 0].sum(), moment_q=r[:, 0] @ x**2, spread_q=np.abs(r[:, 0]).sum(),
+        P=r[:, 1].sum(), moment_p=r[:, 1] @ x**2,
+    )  # fmt: skip
 
 
 def sticking_part(now: dict, before: dict, times: int) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from matplotlib import rc_context
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from scipy.spatial import ConvexHull
 
 OPEN, STICK, SLIP, REVERSE = 0, 1, 2, 3
 ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
@@ -60,12 +61,8 @@ class ContactMap(NamedTuple):
         return self.quarters()[differs][:, 1:3]
 
     def rim(self) -> np.ndarray:
-        """Edges of one face only, ``shape=(k, 2, 2)``: the edge of the disc."""
-        edges = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        _, edge, count = np.unique(
-            np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        return self.x[edges[count[edge.ravel()] == 1]]
+        """The edge of the disc, which is convex, ``shape=(k, 2, 2)``."""
+        return self.x[ConvexHull(self.x).simplices]
 
     def mean_pressure(self) -> float:
         """Normal reaction over the area of the disc, MPa; 1 where nothing touches."""
