@@ -1,8 +1,7 @@
 """Runs of the punch for the study: kept on disk step by step, continued where they stopped.
 
-A run has a directory with ``run.json`` (what it is), ``history.csv`` (totals, energies and tracked
-nodes, one row a step), ``disc.npz`` (the contact disc), ``steps/0001.npz``, ... (the fields on it)
-and one checkpoint.
+A run has a directory with ``run.json`` (what it is), ``history.csv`` (totals, energies and tracked nodes, one row a
+step), ``disc.npz`` (the contact disc), ``steps/0001.npz``, ... (the fields on it) and one checkpoint.
 """
 
 import json
@@ -42,53 +41,48 @@ class EnergyBalance:
     """
 
     def __init__(self, punch: Punch):
-        self.punch = punch
-        self.increment = fem.Function(punch.V)
+        self.punch, self.w = punch, fem.Function(punch.V)
         dx = ufl.dx(domain=punch.mesh, metadata={"quadrature_degree": 3})
+        strain = ufl.sym(ufl.grad(self.w))
+        self.form = fem.form(0.5 * ufl.inner(punch.stress(self.w), strain) * dx)
 
-        def energy(u):
-            return fem.form(0.5 * ufl.inner(punch.stress(u), ufl.sym(ufl.grad(u))) * dx)
-
-        self.forms = energy(punch.u), energy(self.increment)
-
-    def _state(self):
-        contact, punch = self.punch.contact, self.punch
-        displacement, depth = punch.u.x.array.copy(), float(punch.approach.value)
-        totals = self._integral(0), contact.force()[2], depth, contact.dissipation.sum()
-        return contact.reaction.copy(), contact.gap.copy(), displacement, *totals
+    def _energy(self, values) -> float:
+        """Elastic energy of a displacement."""
+        self.w.x.array[:] = values
+        return self.punch.comm.allreduce(fem.assemble_scalar(self.form).real)
 
     def open(self) -> None:
         """Remember the state before a step.  Collective."""
-        self.before = self._state()
+        contact, u = self.punch.contact, self.punch.u.x.array.copy()
+        nodal = contact.reaction.copy(), contact.gap.copy(), contact.dissipation.copy()
+        totals = self._energy(u), contact.force()[2], -float(self.punch.approach.value)
+        self.state = u, *nodal, *totals
 
     def close(self) -> dict[str, float]:
         """The terms of the step that was solved since ``open``.  Collective."""
-        r0, gap0, u0, energy0, force0, depth0, friction0 = self.before
-        r1, gap1, u1, energy1, force1, depth1, friction1 = self._state()
-        self.increment.x.array[:] = u1 - u0
-        moved, slip = depth0 - depth1, self.punch.contact.slip_increment
-        sums = [
-            -(r1[:, :2] * slip).sum(),
-            -0.5 * ((r0 + r1)[:, :2] * slip).sum(),
-            (r1[:, 2] * gap0).sum(),
-            (r0[:, 2] * gap1).sum(),
-            friction1 - friction0,
-        ]
-        end, mean, closing, opening, friction = self.punch.comm.allreduce(np.array(sums))
+        u0, r0, gap0, work0, W0, force0, depth0 = self.state
+        self.open()
+        u1, r1, gap1, work1, W1, force1, depth1 = self.state
+        moved, slip = depth1 - depth0, self.punch.contact.slip_increment
+        nodal = (
+            -r1[:, :2] * slip,
+            -0.5 * (r0 + r1)[:, :2] * slip,
+            r1[:, 2] * gap0,
+            r0[:, 2] * gap1,
+            work1 - work0,
+        )
+        sums = self.punch.comm.allreduce(np.array([values.sum() for values in nodal]))
+        end, mean, closing, opening, friction = sums
         terms = {
-            "elastic_change": energy1 - energy0,
+            "elastic_change": W1 - W0,
             "dissipation_end": end,
-            "half_du_K_du": self._integral(1),
+            "half_du_K_du": self._energy(u1 - u0),
             "closing": closing,
         }
-        work, work_mean = force1 * moved, 0.5 * (force0 + force1) * moved
-        left = work_mean - terms["elastic_change"] - mean - 0.5 * (closing - opening)
+        work, left = force1 * moved, 0.5 * (force0 + force1) * moved - (W1 - W0) - mean
         row = {"platen_work": work, **terms, "residual": work - sum(terms.values())}
-        row |= {"work_of_friction": friction, "residual_mean": left}
+        row |= {"work_of_friction": friction, "residual_mean": left - 0.5 * (closing - opening)}
         return {name: float(value) for name, value in row.items()}
-
-    def _integral(self, which: int) -> float:
-        return self.punch.comm.allreduce(fem.assemble_scalar(self.forms[which]).real)
 
 
 def compute(parameters, directory, points=(), bar=None, **mesh_options) -> str:

@@ -54,13 +54,12 @@ def cycles(figures: Figures, wear: float) -> list[dict]:
     rows = []
     for case, run in figures.runs.items():
         for c in range(1, run.parameters.cycles + 1):
-            table = run.table[run.unloaded(c - 1) : run.unloaded(c)]
             work, before = total(run, c), total(run, c - 1) if c > 1 else np.nan
             ends = [run.fields(run.unloaded(k))["displacement"] for k in (c - 1, c) if k]
             drift = np.linalg.norm((ends[-1] - ends[0])[:, :2], axis=1).max() if c > 1 else np.nan
             rows.append(dict(
                 case=case, cycle=c, dissipation_Nmm=work, of_previous_cycle=work / before,
-                worn_volume_mm3=wear * work, largest_drift_um=1e3 * float(drift), seconds=float(table["seconds"].sum()),
+                worn_volume_mm3=wear * work, largest_drift_um=1e3 * float(drift),
             ))  # fmt: skip
     with figures.drawn("cycles", (14, 4.4)) as figure:
         work, settled, drift = figure.subplots(1, 3)
@@ -88,13 +87,14 @@ def _style(case: str) -> dict:
 def maps(figures: Figures, wear: float) -> None:
     """Density of the work of friction in the first and last cycle and in all; worn depth."""
     last = figures.cycles
-    works = {"cycle 1": lambda run: run.dissipation(1) / run.area}
+
+    def density(first, last):
+        return lambda run: (run.dissipation(last) - run.dissipation(first - 1)) / run.area
+
+    works = {"cycle 1": density(1, 1)}
     if last > 1:
-        works[f"cycle {last}"] = lambda run: (
-            (run.dissipation(last) - run.dissipation(last - 1)) / run.area
-        )
-        works["all cycles"] = lambda run: run.dissipation(last) / run.area
-    depth = {"depth_nm": lambda run: 1e6 * wear * run.dissipation(last) / run.area}
+        works |= {f"cycle {last}": density(last, last), "all cycles": density(1, last)}
+    depth = {"depth_nm": lambda run: 1e6 * wear * density(1, last)(run)}
     worn = f"Worn depth after {last} cycles, coefficient {wear:g} mm³/(N mm)"
     _densities(figures, "dissipation", "Work of friction per area", works, "N mm / mm²")
     _densities(figures, "wear", worn, depth, "nm")
