@@ -92,4 +92,4 @@ if not TYPE_CHECKING:  # which would take any name for one of ours
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME, "__version__"})
+    return sorted({*_HOME, *(name for name in globals() if name.startswith("__")), "__version__"})

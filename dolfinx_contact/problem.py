@@ -69,7 +69,11 @@ class ContactProblem(ProblemOptions):
             in the step, largest error and ``Counts``.  Of the condensed problem's iterates (steps of Newton's method,
             sweeps) the error is the residual over the largest reaction; then come the body's own errors.
 
-    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0.
+    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0; ``logging.basicConfig(level=20)``
+    prints them.
+
+    On several ranks constants, in ``F`` and ``bcs``, have to be the same on all; of Functions the values of the ranks that
+    own them count.
 
     ``close``, or ``with dc.ContactProblem(...) as problem``, frees what PETSc holds.  On one rank a problem that is no
     longer used is freed by itself.  On several ranks PETSc frees on all of them at once only: there the next problem on

@@ -57,6 +57,7 @@ assert np.abs(dc.bipotential_gap(found.reaction, w[:, 2], w[:, :2], friction)).m
 assert np.abs(dc.project_cone(found.reaction, friction.mu) - found.reaction).max() < 1e-9
 assert dc.load_function(found.reaction, friction.mu).max() < 1e-9
 assert set(dc.__all__) | {"__version__"} <= set(dir(dc)) and dc.__version__
+assert {name for name in dir(dc) if not name.startswith("_")} == set(dc.__all__)
 try:
     dc.ContactProblem
 except ImportError as error:

@@ -51,6 +51,15 @@ def imports(tree) -> set[str]:
     return found
 
 
+def test_demos_import_public_names_only():
+    """What a demo imports of the package users may import: its own names, and what differs between DOLFINx releases."""
+    package = "dolfinx_contact"
+    for file in (ROOT / "demos").glob("*.py"):
+        ours = {n for n in imports(TREES[file]) if n.split(".")[0] == package} - {package}
+        assert all(n.startswith(f"{package}.compat") for n in ours), file
+        assert not [n for n in ours if "._" in n], file
+
+
 def test_there_is_no_import_circle():
     """Modules can be put into an order in which each one imports only those before it."""
     graph = {name(file): imports(tree) for file, tree in TREES.items()}
