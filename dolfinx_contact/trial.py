@@ -51,7 +51,7 @@ def refined(body, step, x: np.ndarray) -> np.ndarray:
     errors = step.measure_open(x)
     if errors.largest <= step.tol:
         return x
-    finer = x + body.solve(step.b - body.multiply(x))
+    finer = x + body.solve(step.forces(x))
     if step.measure_open(finer).largest < errors.largest:
         return finer
     step.measure_open(x)
