@@ -1,1 +1,3 @@
 """Measurements; each program runs from the root of the clone: ``python -m benchmarks.NAME --help``."""
+
+import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs

@@ -10,15 +10,21 @@ import importlib
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
+from petsc4py import PETSc
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import version as dolfinx
 
 ROOT = Path(__file__).resolve().parent.parent
 OWN = [ROOT / name for name in ("dolfinx_contact", "benchmarks", "studies", "mechanics")]
@@ -27,28 +33,27 @@ LIMIT = 1800  # seconds of wall time after which a measurement counts as failed
 
 @dataclass(frozen=True)
 class Measurement:
-    """A function ``module:name``, called with ``settings`` in a fresh process."""
+    """A function ``module:name``, called with ``settings``, which JSON knows, in a fresh process."""
 
     name: str
     function: str
     settings: dict
     late: bool = False  # takes long: after all that does not
 
+    def file(self, directory: Path) -> Path:
+        return directory / f"{self.name.replace(' ', '_')}.json"
+
 
 def stored(measurement: Measurement, directory: Path) -> dict | None:
     """The record that is on disk, if it was made with these settings and did not fail."""
-    file = directory / f"{measurement.name}.json"
+    file = measurement.file(directory)
     record = json.loads(file.read_text()) if file.exists() else {}
-    return record if "result" in record and record["settings"] == _plain(measurement.settings) else None  # fmt: skip
+    return record if "result" in record and record["settings"] == measurement.settings else None
 
 
 def current(record: dict) -> bool:
     """Whether all that a record was made with, our modules and the compiled kernel, is still the same."""
     return all(digest(ROOT / file) == was for file, was in record["made_with"].items())
-
-
-def _plain(settings: dict) -> dict:
-    return json.loads(json.dumps(settings))
 
 
 def compute(measurement: Measurement, directory: Path) -> dict:
@@ -57,26 +62,23 @@ def compute(measurement: Measurement, directory: Path) -> dict:
     A process that fails or is killed leaves a record with what it said under ``failed``; it is tried again
     in the next run.
     """
-    file = directory.resolve() / f"{measurement.name}.json"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_suffix(".unfinished")
-    unfinished.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "benchmarks.measurement", measurement.function]
-    command += [json.dumps(measurement.settings), unfinished]
-    record = dict(settings=_plain(measurement.settings), commit=commit(), date=now(), load=[os.getloadavg()[0]])  # fmt: skip
+    settings, load = measurement.settings, [os.getloadavg()[0]]
+    record = dict(settings=settings, commit=commit(), date=now(), load=load)
     start = perf_counter()
-    try:
-        done = subprocess.run(command, cwd=ROOT, env=alone(), capture_output=True, text=True, timeout=LIMIT)  # fmt: skip
-        said = done.stderr[-600:] or f"exit status {done.returncode}"
-    except subprocess.TimeoutExpired:
-        said = f"stopped after {LIMIT} s"
-    record.update(seconds=perf_counter() - start)
-    record["load"].append(os.getloadavg()[0])
-    if unfinished.exists():
-        record |= json.loads(unfinished.read_text())
-        unfinished.unlink()
-    else:
-        record["failed"] = said
+    with tempfile.NamedTemporaryFile("r") as answer:
+        command = [sys.executable, "-m", "benchmarks.measurement", measurement.function]
+        command += [json.dumps(settings), answer.name]
+        try:
+            done = run_alone(command, timeout=LIMIT)
+            said = done.stderr[-600:] or f"exit status {done.returncode}"
+        except subprocess.TimeoutExpired:
+            said = f"stopped after {LIMIT} s"
+        found = answer.read()
+    record["seconds"] = perf_counter() - start
+    load.append(os.getloadavg()[0])
+    record |= json.loads(found) if found else dict(failed=said)
+    file = measurement.file(directory)
+    file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(record, indent=1) + "\n")
     return record
 
@@ -106,26 +108,27 @@ def digest(file: Path) -> str:
     return hashlib.sha256(content.split(b"\ndef evaluate(")[0]).hexdigest()[:16]
 
 
-def alone() -> dict[str, str]:
-    """Environment of a process of its own: one thread, and nothing of an MPI launcher."""
+def run_alone(command: list, cwd: Path = ROOT, **options) -> subprocess.CompletedProcess:
+    """A process with one thread and nothing of an MPI launcher in its environment; what it says is text."""
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
-    return kept | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    env = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
+    env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, **options)
 
 
 # -- what a measurement ran on -----------------------------------------------------------------------
 
 
+def says(*command) -> str:
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
+
+
 @functools.cache
 def commit() -> str:
     """The last commit that changed the library, which is what is measured; a + marks changes beyond it."""
-    library = ["--", "dolfinx_contact", "cpp"]
-
-    def git(*asked):
-        return subprocess.run(["git", *asked, *library], cwd=ROOT, capture_output=True, text=True).stdout  # fmt: skip
-
-    found = git("log", "-1", "--format=%h").strip()
-    return found + "+" * bool(git("status", "--porcelain").strip()) if found else "unknown"
+    library = "--", "dolfinx_contact", "cpp"
+    found = says("git", "log", "-1", "--format=%h", *library)
+    return found + "+" * bool(says("git", "status", "--porcelain", *library)) or "unknown"
 
 
 def now() -> str:
@@ -134,25 +137,42 @@ def now() -> str:
 
 def machine() -> dict:
     """Processor, memory, compiler and versions."""
-    cpu = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
-    compiler = subprocess.run(
-        [os.environ.get("CXX", "c++"), "--version"], capture_output=True, text=True
-    )
-    from petsc4py import PETSc
-
-    from dolfinx_contact.compat import version as dolfinx
-
+    processor = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
     return dict(
-        processor=cpu[0].split(":")[1].strip() if cpu else platform.processor(),
+        processor=processor[1] if processor else platform.processor(),
         cores=os.cpu_count(),
         memory_gb=round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
-        system=platform.platform(), compiler=compiler.stdout.splitlines()[0] if compiler.stdout else "",
-        python=platform.python_version(), numpy=np.__version__, dolfinx=dolfinx,
-        petsc=".".join(map(str, PETSc.Sys.getVersion())), dolfinx_contact=version("dolfinx_contact"), commit=commit(),
-    )  # fmt: skip
+        system=platform.platform(),
+        compiler=says(os.environ.get("CXX", "c++"), "--version").partition("\n")[0],
+        python=platform.python_version(),
+        numpy=np.__version__,
+        dolfinx=dolfinx,
+        petsc=".".join(map(str, PETSc.Sys.getVersion())),
+        dolfinx_contact=version("dolfinx_contact"),
+        commit=commit(),
+    )
 
 
 # -- what measurements measure with --------------------------------------------------------------------
+
+
+SOLVERS = {
+    "condensed Newton": dc.CondensedNewton,
+    "fixed point, return": dc.FixedPoint,
+    "fixed point, bipotential": functools.partial(dc.FixedPoint, map="bipotential"),
+}
+
+
+def mesh_of(size: str) -> dict:
+    """What the mesh of the punch is made with: the coarsest of all for the tests."""
+    return dict(divisions=2, layers=2) if size == "smallest" else {}
+
+
+def timed(work, *arguments) -> tuple:
+    """Processor seconds of a call, and what it returns."""
+    start = process_time()
+    found = work(*arguments)
+    return process_time() - start, found
 
 
 class Memory:
@@ -168,10 +188,7 @@ class Memory:
 
     @staticmethod
     def _status(name: str) -> int:
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith(name):
-                return 1024 * int(line.split()[1])
-        raise RuntimeError(f"/proc/self/status has no {name}")
+        return 1024 * int(re.search(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text())[1])
 
 
 EVENTS = dict(
@@ -182,8 +199,6 @@ EVENTS = dict(
 
 def counts() -> dict[str, int]:
     """How often PETSc did what in all stages, since its log was begun (``PETSc.Log.begin``)."""
-    from petsc4py import PETSc
-
     found = dict.fromkeys(EVENTS, 0)
     for stage in range(100):
         try:
@@ -196,11 +211,8 @@ def counts() -> dict[str, int]:
 
 def spread(values) -> dict:
     """Median, least and largest of repeated measurements, and how many there were."""
-    values = np.asarray(values, dtype=float)
-    return dict(
-        median=float(np.median(values)), least=float(values.min()), largest=float(values.max()),
-        repetitions=int(values.size),
-    )  # fmt: skip
+    least, median, largest = np.quantile(values, [0, 0.5, 1]).tolist()
+    return dict(median=median, least=least, largest=largest, repetitions=len(values))
 
 
 def ladder(first: int, last: int) -> list[float]:

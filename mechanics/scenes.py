@@ -77,6 +77,14 @@ def on_plane(
     )  # fmt: skip
 
 
+def problem_of(scene, solver=None, tol=1e-8, **options):
+    """The contact problem of a scene, which may have no contact."""
+    contacts = [] if scene.contact is None else [scene.contact]
+    return dc.ContactProblem(
+        scene.F, scene.u, contacts, bcs=scene.bcs, solver=solver, tol=tol, **options
+    )
+
+
 def rotation(seed: int = 0) -> np.ndarray:
     """A seeded rotation matrix, ``shape=(3, 3)``."""
     q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
@@ -115,9 +123,7 @@ def block(
     )
     modulus = fem.Constant(domain, float(E))
     scene = on_plane(domain, bottom, top, modulus, nu, mu, p, length, turn, wear=wear)
-    scene.problem = dc.ContactProblem(
-        scene.F, scene.u, [scene.contact], bcs=scene.bcs, tol=tol, **options
-    )
+    scene.problem = problem_of(scene, tol=tol, **options)
 
     def move_top(*displacement):
         """Displacement of the top in the scene's own axes, in units of ``length``."""

@@ -18,9 +18,6 @@ from collections import Counter
 from pathlib import Path
 from time import monotonic
 
-import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
-
-# isort: split
 from matplotlib import rc_context
 from tqdm import tqdm
 
@@ -30,24 +27,16 @@ from benchmarks.report import algebraic, ladder, meshes, stability
 from benchmarks.scaling import growth
 from studies import page
 
-# Each has TITLE, plan(size), evaluate(results), figures(data) with captions, and tables(data).
+# Each has TITLE, plan(size), evaluate(results), figure(data) with its CAPTION, and tables(data).
 SECTIONS = dict(
     algebraic=algebraic, meshes=meshes, peers=peers, growth=growth, ladder=ladder, stability=stability
 )  # fmt: skip
 DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
-
-
-def arguments(argv=None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
-    add = parser.add_argument
-    sizes = ("full", "quick", "smallest")
-    add("--size", choices=sizes, default="full", help="smallest: minutes less, for the tests")
-    add("--sections", nargs="+", choices=SECTIONS, default=list(SECTIONS))
-    add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
-    add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
-    add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
-    add("--redraw", action="store_true", help="measure nothing, draw what report.json of the output has")  # fmt: skip
-    return parser.parse_args(argv)
+INTRODUCTION = (
+    "Times are processor seconds of one thread. Repeated runs are interleaved and shown by their median; a step of peers "
+    "and growth is the mean of a programme that ran once. All numbers: report/report.json."
+)
+NAMED = dict(not_run="Not run, there was no time", older="Made with code that has changed since")
 
 
 def run(plans: dict, directory: Path, minutes: float) -> dict:
@@ -66,22 +55,20 @@ def run(plans: dict, directory: Path, minutes: float) -> dict:
     return records
 
 
-def evaluated(records: dict) -> dict:
-    """What the page shows of each section, with what failed and what was not run."""
-    data = {}
-    for section, of in records.items():
-        results = {name: r["result"] for name, r in of.items() if r and "result" in r}
-        data[section] = dict(
-            title=SECTIONS[section].TITLE,
-            data=SECTIONS[section].evaluate(results) if results else None,
-            failed={name: r["failed"] for name, r in of.items() if r and "failed" in r},
-            not_run=[name for name, r in of.items() if r is None],
-            measured=dict(Counter(when for r in of.values() if r for when in dates(r))),
-            older=[name for name, r in of.items() if r and "made_with" in r and not current(r)],
-            seconds=sum(r["seconds"] for r in of.values() if r),
-            load=[max((max(r["load"]) for r in of.values() if r), default=None)],
-        )
-    return data
+def evaluated(section: str, records: dict) -> dict:
+    """What the page shows of a section, with what failed and what was not run."""
+    made = {name: record for name, record in records.items() if record}
+    results = {name: record["result"] for name, record in made.items() if "result" in record}
+    return dict(
+        title=SECTIONS[section].TITLE,
+        data=SECTIONS[section].evaluate(results) if results else None,
+        failed={name: record["failed"] for name, record in made.items() if "failed" in record},
+        not_run=[name for name in records if name not in made],
+        measured=Counter(when for record in made.values() for when in dates(record)),
+        older=[name for name in results if not current(made[name])],
+        seconds=sum(record["seconds"] for record in made.values()),
+        load=[max((max(record["load"]) for record in made.values()), default=None)],
+    )
 
 
 def dates(record: dict) -> list[str]:
@@ -95,21 +82,19 @@ def write(report: dict, file: Path, directory: Path) -> dict[str, str]:
     """Draw all sections and write the page; the captions of the figures by their names."""
     for old in directory.glob("*.svg"):
         old.unlink()
-    captions, short = {}, f"This is the {report['size']} report: less is measured."
-    parts = [
-        page.paragraph(short if report["size"] != "full" else "", "bad"),
-        page.paragraph(f"{report['date']}. Times are processor seconds of one thread. Repeated runs are interleaved and shown by "
-            "their median; a step of peers and growth is the mean of a programme that ran once. All numbers: report/report.json."),
-    ]  # fmt: skip
+    captions, parts = {}, []
+    if report["size"] != "full":
+        parts.append(page.paragraph(f"This is the {report['size']} report: less is measured.", "bad"))  # fmt: skip
+    parts.append(page.paragraph(f"{report['date']}. {INTRODUCTION}"))
     for name, section in report["sections"].items():
+        of, data, drawing = SECTIONS[name], section["data"], directory / f"{name}.svg"
         parts.append(f"<h2>{section['title']}</h2>")
-        if section["data"]:
+        if data:
             with rc_context(DRAWING):
-                for figure, drawing, caption in SECTIONS[name].figures(section["data"]):
-                    drawing.savefig(directory / f"{figure}.svg", metadata={"Date": None})
-                    captions[figure] = caption
-                    parts.append(page.picture(directory / f"{figure}.svg", caption))
-            parts += map(page.table, SECTIONS[name].tables(section["data"]))
+                of.figure(data).savefig(drawing, metadata={"Date": None})
+            captions[name] = of.CAPTION
+            parts.append(page.picture(drawing, of.CAPTION))
+            parts += map(page.table, of.tables(data))
         parts += remarks(section)
     parts += ["<h2>Machine</h2>", page.table([{"": k, " ": v} for k, v in report["machine"].items()])]  # fmt: skip
     page.write(file, "dolfinx_contact: error against run time", parts)
@@ -118,30 +103,40 @@ def write(report: dict, file: Path, directory: Path) -> dict[str, str]:
 
 def remarks(section: dict) -> list[str]:
     """What failed, what was not run, when it was measured."""
-    said = [f"Failed: {name}: {text[-300:]}" for name, text in section["failed"].items()]
-    if section["not_run"]:
-        said.append(f"Not run, there was no time: {', '.join(section['not_run'])}.")
-    if section["older"]:
-        said.append(f"Made with code that has changed since: {', '.join(section['older'])}.")
+    bad = [f"Failed: {name}: {text[-300:]}" for name, text in section["failed"].items()]
+    for key, said in NAMED.items():
+        if section[key]:
+            bad.append(f"{said}: {', '.join(section[key])}.")
     when = "; ".join(f"{day} ({count})" for day, count in section["measured"].items())
-    return [page.paragraph(text, "bad") for text in said] + [
-        page.paragraph(f"Measured {when}, in {section['seconds']:.0f} s, at a load average of up to {section['load'][0] or 0:.1f}.")
-    ]  # fmt: skip
+    load = f"at a load average of up to {section['load'][0] or 0:.1f}"
+    measured = page.paragraph(f"Measured {when}, in {section['seconds']:.0f} s, {load}.")
+    return [*(page.paragraph(text, "bad") for text in bad), measured]
 
 
 def main(argv=None) -> Path:
-    options = arguments(argv)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
+    add = parser.add_argument
+    sizes = ("full", "quick", "smallest")
+    add("--size", choices=sizes, default="full", help="smallest: minutes less, for the tests")
+    add("--sections", nargs="+", choices=SECTIONS, default=list(SECTIONS))
+    add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
+    add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
+    add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
+    add("--redraw", action="store_true", help="measure nothing, draw what report.json of the output has")  # fmt: skip
+    options = parser.parse_args(argv)
     quick = ROOT / "results" / "report-quick"
-    kept = ROOT / "results" / "report" if options.size == "full" else quick / "measurements"
-    output = options.output or (ROOT / "docs" if options.size == "full" else quick)
+    kept, output = quick / "measurements", quick
+    if options.size == "full":
+        kept, output = ROOT / "results" / "report", ROOT / "docs"
+    kept, output = options.measurements or kept, options.output or output
     figures = output / "report"
     file = figures / "report.json"
     if options.redraw:
         report = json.loads(file.read_text())
     else:
-        plans = {name: SECTIONS[name].plan(options.size) for name in options.sections}
-        records = run(plans, options.measurements or kept, options.minutes)
-        report = dict(date=now(), size=options.size, machine=machine(), sections=evaluated(records))
+        records = run({name: SECTIONS[name].plan(options.size) for name in options.sections}, kept, options.minutes)  # fmt: skip
+        sections = {name: evaluated(name, of) for name, of in records.items()}
+        report = dict(date=now(), size=options.size, machine=machine(), sections=sections)
     figures.mkdir(parents=True, exist_ok=True)
     report["figures"] = write(report, output / "report.html", figures)
     file.write_text(json.dumps(report, indent=1) + "\n")

@@ -4,28 +4,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 from pathlib import Path
 from time import process_time
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 from matplotlib.ticker import LogLocator
 
-from benchmarks.measurement import Measurement, ladder
+import dolfinx_contact as dc
+from benchmarks.measurement import SOLVERS, Measurement, ladder, mesh_of
 from benchmarks.report.drawing import legend, panels, style
 from benchmarks.stress.scenes import PROGRAMMES, C
-from mechanics.scenes import build
+from mechanics.scenes import build, problem_of
 from studies.punch import CASES, Parameters, Punch, programme
 
 TITLE = "Work and precision, algebraic"
-SOLVERS = {
-    "condensed Newton": dc.CondensedNewton,
-    "fixed point, return": dc.FixedPoint,
-    "fixed point, bipotential": lambda: dc.FixedPoint(map="bipotential"),
-}
+CAPTION = "Error against the time of one step, set-up left out; the line is the tolerance."
 # Scenes of the stress matrix that are far from the punch: what they are, and which step is looked at.
 EXTREMES = {
     "p ratio 1000 crossed": (dict(mu=(1.0, 0.1), p=(1e-3, 1.0)), "reversals", 3),
@@ -37,22 +32,18 @@ DEEP = 1e-12  # where the curves end
 
 
 def plan(size: str) -> list[Measurement]:
-    mesh = dict(full={}, quick={}, smallest=dict(divisions=2, layers=2))[size]
-    repeat = dict(full=3, quick=2, smallest=2)[size]
-    scenes = ["A", "B", "C", *EXTREMES] if size != "smallest" else ["C"]
-    settings = dict(repeat=repeat, mesh=mesh)
+    settings = dict(repeat=3 if size == "full" else 2, mesh=mesh_of(size))
+    names = ["A", "B", "C", *EXTREMES] if size != "smallest" else ["C"]
     return [
-        Measurement(f"algebraic/{name}".replace(" ", "_"), "benchmarks.report.algebraic:scene", dict(name=name, **settings))
-        for name in scenes
+        Measurement(f"algebraic/{name}", "benchmarks.report.algebraic:scene", dict(name=name, **settings))
+        for name in names
     ]  # fmt: skip
 
 
 def opened(name: str, solver, tol: float, mesh: dict):
-    """A problem and its load steps: functions that move what is prescribed."""
+    """A problem, a function that moves what is prescribed, and its load steps."""
     if name in CASES:
-        punch = Punch(Parameters(case=name, tol=tol), **mesh)
-        if solver is not None:
-            punch.problem.solver = solver
+        punch = Punch(Parameters(case=name, tol=tol), solver=solver, **mesh)
 
         def move(displacement):
             punch.approach.value = -displacement
@@ -60,10 +51,7 @@ def opened(name: str, solver, tol: float, mesh: dict):
         return punch.problem, move, programme(punch.parameters)
     body, of, _ = EXTREMES[name]
     built = build(**body)
-    problem = dc.ContactProblem(
-        built.F, built.u, [built.contact], bcs=built.bcs, solver=solver, tol=tol
-    )
-    return problem, built.move_top, PROGRAMMES[of]
+    return problem_of(built, solver, tol), built.move_top, PROGRAMMES[of]
 
 
 class Sampled:
@@ -80,14 +68,14 @@ class Sampled:
         self._bound.destroy()
 
     def solve(self, step):
-        residual, samples, start = step.residual, [], process_time()
+        residual, self.samples, start = step.residual, [], process_time()
 
         def noted(x, maps):
             found = residual(x, maps)
-            samples.append((process_time() - start, found[1].largest))
+            self.samples.append((process_time() - start, found[1].largest))
             return found
 
-        step.residual, self.samples = noted, samples
+        step.residual = noted
         try:
             return self._bound.solve(step)
         finally:
@@ -98,8 +86,7 @@ class Sampled:
 def scene(name: str, repeat: int, mesh: dict) -> dict:
     """One step of a programme with every solver, again and again, interleaved."""
     watched = 6 if name in CASES else EXTREMES[name][2]  # the punch's first reversal
-    curves = {label: [] for label in SOLVERS}
-    problems = {}
+    problems, curves = {}, {solver: [] for solver in SOLVERS}
     with tempfile.TemporaryDirectory() as directory:
         before = Path(directory) / "before.npz"
         problem, move, steps = opened(name, None, 1e-11, mesh)
@@ -107,26 +94,20 @@ def scene(name: str, repeat: int, mesh: dict) -> dict:
             move(step)
             problem.solve()
         problem.save(before)
-        for label, make in SOLVERS.items():
-            problems[label] = opened(name, Sampled(make()), DEEP, mesh)[:2]
-            problems[label][0].load(before)
-            problems[label][1](steps[watched - 1])
-            attempt(problems[label][0])  # set-up, which is not measured here
+        for solver, make in SOLVERS.items():
+            problem, move, _ = opened(name, Sampled(make()), DEEP, mesh)
+            problem.load(before)
+            move(steps[watched - 1])
+            with contextlib.suppress(dc.NotConverged):
+                problem.solve()  # set-up, which is not measured here
+            problems[solver] = problem
         for _ in range(repeat):
-            for label, (problem, _) in problems.items():
-                curves[label].append(curve(problem, before))
+            for solver, problem in problems.items():
+                curves[solver].append(curve(problem, before))
     return dict(
         watched=watched, unknowns=problem.body.size, nodes=len(problem.contacts[0].nodes),
-        curves={label: merged(found) for label, found in curves.items()},
+        curves={solver: merged(found) for solver, found in curves.items()},
     )  # fmt: skip
-
-
-def attempt(problem):
-    """The record of a step, and what was said if it was refused."""
-    try:
-        return problem.solve(), ""
-    except dc.NotConverged as failure:
-        return failure.step, str(failure)[:200]
 
 
 def curve(problem, before) -> list[tuple[float, float]]:
@@ -134,57 +115,46 @@ def curve(problem, before) -> list[tuple[float, float]]:
 
     The condensed solver does its iterations in the kernel, where no error of the whole body is known.
     """
-    tolerances = ladder(1, 12) if isinstance(problem.solver.solver, dc.CondensedNewton) else [DEEP]
-    samples = []
-    for tol in tolerances:
+    condensed, answers = isinstance(problem.solver.solver, dc.CondensedNewton), []
+    for tol in ladder(1, 12) if condensed else [DEEP]:
         problem.load(before)
         problem.tol = tol
-        found, said = attempt(problem)
-        if len(tolerances) == 1:
-            samples = problem.solver.samples
-        elif not said:
-            samples.append((problem.solver.seconds, max(found.error, found.slip_error)))
-    return samples
+        with contextlib.suppress(dc.NotConverged):
+            step = problem.solve()
+            answers.append((problem.solver.seconds, max(step.error, step.slip_error)))
+    return answers if condensed else problem.solver.samples
 
 
 def merged(curves: list) -> dict:
     """Smallest error so far, with the median and the spread of the seconds to it."""
-    length = min(len(c) for c in curves)
-    seconds = np.array([[s for s, _ in c[:length]] for c in curves])
-    error = np.array([e for _, e in curves[0][:length]])
-    seconds = np.maximum.accumulate(seconds, axis=1)
-    kept = np.flatnonzero(error <= np.minimum.accumulate(error))
-    median, least, largest = np.median(seconds, 0), seconds.min(0), seconds.max(0)
-    return dict(
-        seconds=median[kept].tolist(), least=least[kept].tolist(), largest=largest[kept].tolist(),
-        error=error[kept].tolist(), iterations=length, repetitions=len(curves),
-    )  # fmt: skip
+    length = min(map(len, curves))
+    seconds = np.array([[seconds for seconds, _ in curve[:length]] for curve in curves])
+    error = np.array([error for _, error in curves[0][:length]])
+    kept = error <= np.minimum.accumulate(error)
+    quantiles = np.quantile(np.maximum.accumulate(seconds, axis=1)[:, kept], [0, 0.5, 1], axis=0)
+    spread = zip(("least", "seconds", "largest"), quantiles.tolist())
+    return dict(spread, error=error[kept].tolist(), iterations=length, repetitions=len(curves))
 
 
 def evaluate(results: dict) -> dict:
-    return dict(rows=[dict(r, scene=name.split("/")[1].replace("_", " ")) for name, r in results.items()])  # fmt: skip
+    return dict(rows=[dict(result, scene=name.split("/")[1]) for name, result in results.items()])
 
 
-def figures(data):
+def figure(data):
     rows = data["rows"]
     figure, axes = panels(len(rows))
     for ax, row in zip(axes, rows):
         for solver, curve in row["curves"].items():
-            seconds = np.array(curve["seconds"])
-            lower, upper = seconds - curve["least"], np.array(curve["largest"]) - seconds
-            ax.errorbar(1e3 * seconds, np.maximum(curve["error"], 1e-16), xerr=1e3 * np.abs([lower, upper]),
-                elinewidth=0.4, errorevery=max(1, len(seconds) // 12), markevery=max(1, len(seconds) // 25),
-                **style(solver))  # fmt: skip
+            least, seconds, largest = (1e3 * np.array(curve[key]) for key in ("least", "seconds", "largest"))  # fmt: skip
+            error, bars = np.maximum(curve["error"], 1e-16), np.abs([seconds - least, largest - seconds])  # fmt: skip
+            some = dict(errorevery=max(1, len(error) // 12), markevery=max(1, len(error) // 25))
+            ax.errorbar(seconds, error, xerr=bars, elinewidth=0.4, **some, **style(solver))
         ax.axhline(TOL, color="0.6", lw=1)
         ax.set(xscale="log", yscale="log", xlabel="processor time of the step [ms]", ylabel="error")
         ax.yaxis.set_major_locator(LogLocator(numticks=8))
         ax.set_title(f"{row['scene']}: step {row['watched']}, {row['unknowns']} unknowns", fontsize=11)  # fmt: skip
     legend(figure, axes[0])
-    yield (
-        "precision",
-        figure,
-        "Error against the time of one step, set-up left out; the line is the tolerance.",
-    )
+    return figure
 
 
 def tables(data):

@@ -33,9 +33,9 @@ def panels(count: int, columns: int = 3, size=(4.4, 3.7)):
     return figure, axes[:count]
 
 
-def legend(figure, ax, columns: int | None = None) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", frameon=False, ncols=columns or len(labels))  # fmt: skip
+def legend(figure, ax, columns: int = 3) -> None:
+    handles = ax.get_legend_handles_labels()
+    figure.legend(*handles, loc="outside upper center", frameon=False, ncols=columns)
 
 
 def logarithmic(ax) -> None:

@@ -16,15 +16,12 @@ import json
 import os
 import resource
 from pathlib import Path
-from time import process_time
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.measurement import commit, now
+import dolfinx_contact as dc
+from benchmarks.measurement import commit, now, timed
 from benchmarks.tables import table
 from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
 from studies.punch import CASES, Parameters, Punch, programme
@@ -35,20 +32,26 @@ TITLES = [
     "seconds: first step, with set-up", "first unloading", "worst other", "mean, with set-up", "bytes per unknown",
 ]  # fmt: skip
 UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycle
+KEPT = ("open", "stick", "slip", "error", "iterations", "tangential_reaction_sum")  # of a step
 
 
-def elastic_solve(body, b, repeat: int) -> dict:
+def elastic_solve(punch, displacement: float, repeat: int) -> dict:
     """Iterations and seconds of K u = b by conjugate gradients with multigrid, to 1e-10 from zero."""
+    body, seconds = punch.problem.body, []
+    punch.approach.value = -displacement
+    body.refresh()
+    b, _ = body.load()
     solver = LinearSolver(body.K, MULTIGRID | {"ksp_rtol": 1e-10}, "yardstick_", body.rigid_modes)
-    seconds = []
     for _ in range(repeat):
         body.comm.Barrier()
-        start = process_time()
-        solver.solve(b)
-        seconds.append(body.comm.allreduce(process_time() - start, op=MPI.MAX))
+        seconds.append(slowest(timed(solver.solve, b)[0]))
     iterations = solver.ksp.getIterationNumber()
     solver.destroy()
     return dict(iterations=iterations, seconds=seconds)
+
+
+def slowest(seconds: float) -> float:
+    return COMM.allreduce(seconds, op=MPI.MAX)
 
 
 def peak_memory() -> int:
@@ -56,37 +59,37 @@ def peak_memory() -> int:
     return COMM.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
+def step_to(punch, displacement: float) -> dict:
+    """What is kept of a step; of one that did not converge, what it said."""
+    try:
+        step = punch.press(displacement)
+    except dc.NotConverged as failure:
+        return dict(failed=str(failure), iterations=failure.step.iterations)
+    return {key: step[key] for key in KEPT}
+
+
 def measure(case: str, refine: int, options, kept) -> dict:
     """Ratios of one run; ``kept(record)`` is called after every step, so that a run that is killed leaves them."""
     before, mesh = peak_memory(), dict(divisions=options.divisions, layers=options.divisions // 2)
     parameters = Parameters(case=case, refine=refine, lowest=options.lowest)
     punch = Punch(parameters, solver=dc.FixedPoint(), **mesh)
-    body = punch.problem.body
-    body.options = MULTIGRID
+    punch.problem.body.options = MULTIGRID
     displacements = (into_the_air() if options.air else programme(parameters))[: options.steps]
-    punch.approach.value = -displacements[0]
-    body.refresh()
-    b, _ = body.load()
+    elastic = [elastic_solve(punch, displacements[0], options.repeat)]
     record = dict(
         case=case, unknowns=punch.head()["unknowns"], ranks=COMM.size, commit=commit(), date=now(), load=os.getloadavg()[0],
-        elastic=[elastic_solve(body, b, options.repeat)], steps=[], lowest=options.lowest,
+        elastic=elastic, steps=[], lowest=options.lowest,
     )  # fmt: skip
     for displacement in displacements:
-        start = process_time()
-        try:
-            of = punch.press(displacement)
-            of = {key: of[key] for key in ("open", "stick", "slip", "error", "iterations", "tangential_reaction_sum")}  # fmt: skip
-        except dc.NotConverged as failure:
-            of = dict(failed=str(failure), iterations=failure.step.iterations)
-        of["seconds"] = COMM.allreduce(process_time() - start, op=MPI.MAX)
-        record["steps"].append(of)
+        seconds, step = timed(step_to, punch, displacement)
+        record["steps"].append(step | dict(seconds=slowest(seconds)))
         record["bytes_per_unknown"] = (peak_memory() - before) / record["unknowns"]
         kept(record)
         if COMM.rank == 0:
-            print(f"case {case}, {record['unknowns']} unknowns, {displacement:.4f} mm: {of}", flush=True)  # fmt: skip
-        if "failed" in of:
+            print(f"case {case}, {record['unknowns']} unknowns, {displacement:.4f} mm: {record['steps'][-1]}", flush=True)  # fmt: skip
+        if "failed" in step:
             break
-    record["elastic"].append(elastic_solve(body, b, options.repeat))
+    elastic.append(elastic_solve(punch, displacements[0], options.repeat))
     kept(record)
     return record
 
@@ -139,14 +142,20 @@ def main(argv=None) -> None:
     add("--lowest", type=float, help="height of the elements on the plane, mm; else all are equal")
     options = parser.parse_args(argv)
     CASES["frictionless"] = dict(mu=0.0)
-    writes = options.json and COMM.rank == 0
+
+    def kept(record):
+        if options.json and COMM.rank == 0:
+            keep(options.json, record)
+
     results = [
-        measure(case, refine, options, lambda record: writes and keep(options.json, record))
+        measure(case, refine, options, kept)
         for refine in options.refine
         for case in options.cases.split(",")
     ]
+    if options.json:
+        results = json.loads(options.json.read_text())
     if COMM.rank == 0:
-        print(table(TITLES, map(row, json.loads(options.json.read_text()) if options.json else results)))  # fmt: skip
+        print(table(TITLES, map(row, results)))
 
 
 if __name__ == "__main__":
