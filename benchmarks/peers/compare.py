@@ -8,98 +8,95 @@ as if our solver had found them; nothing of their own history is lost in that.
 
 from __future__ import annotations
 
-import resource
 import shutil
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
-from time import process_time
 
-import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 
-from benchmarks.measurement import ROOT, Measurement, alone
+import dolfinx_contact as dc
+from benchmarks.measurement import Measurement, mesh_of, run_alone, timed
 from benchmarks.peers import by_calculix, by_getfem, by_siconos
 from benchmarks.report.drawing import OURS, THEIRS, bars
+from benchmarks.tables import chosen
+from dolfinx_contact import _kernel
 from dolfinx_contact.solvers.base import SolverResult
 from mechanics import judge
-from studies.punch import Parameters, Punch, programme
+from studies.punch import CASES, Parameters, Punch, programme
 
 TITLE = "Peers, side by side on the same mesh and programme"
+CAPTION = (
+    "Peers beside us: unknowns and steps done. Set-ups are included, but for Siconos, which is given W. GetFEM and CalculiX "
+    "know isotropic friction alone, so only case A can be compared with them."
+)
 PYTHON = "/usr/bin/python3"  # Debian's, for which GetFEM and Siconos are packaged
-CALCULIX = {"node to surface": 50.0, "mortar": 50.0}  # penalty over Young's modulus, 1/mm
+GETFEM = "GetFEM, basic contact brick"
+SETTINGS = {
+    "CalculiX, node to surface": f"C3D8, penalty {by_calculix.STIFF:g} E/mm, increments of its own",
+    "CalculiX, mortar": f"C3D8, hard, stick slope {by_calculix.STIFF:g} E/mm, increments of its own",
+    GETFEM: "nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, residual 1e-9",
+}
+COLUMNS = ("reaction", "seconds", "own", "converged")  # of answers to condensed problems
 CAP = 600  # processor seconds of a peer for one programme
 
 
 def plan(size: str) -> list[Measurement]:
-    meshes = dict(full=[0, 1], quick=[0], smallest=[0])[size]
-    more = dict(divisions=2, layers=2) if size == "smallest" else {}
     plans = []
-    for refine in meshes:
-        # The fine mesh: pressed in one step and raised in two, every one of them with slip of its own; mortar takes
-        # minutes for the first one alone.
+    for refine in [0, 1] if size == "full" else [0]:
+        # The fine mesh: pressed in one step and raised in two, every one of them with slip of its own.
         increments = [5, 10] if size == "full" and not refine else [1, 2]
-        settings = dict(refine=refine, increments=increments, mesh=more)
-        for kind, stiff in CALCULIX.items():
-            name = f"peers/calculix_{kind.replace(' ', '_')}_{refine}"
-            steps = 1 if refine and kind == "mortar" else sum(increments)
-            plans.append(Measurement(name, "benchmarks.peers.compare:calculix", dict(kind=kind, stiff=stiff, steps=steps, **settings), late=refine > 0))  # fmt: skip
-        if refine == 0:  # on the fine mesh three steps had not ended after six minutes
-            plans.append(Measurement("peers/getfem_0", "benchmarks.peers.compare:getfem", settings))
+        for peer in SETTINGS:
+            if refine and peer == GETFEM:
+                continue  # three steps had not ended after six minutes
+            settings = dict(
+                peer=peer, refine=refine, increments=increments, mesh=mesh_of(size),
+                steps=1 if refine and "mortar" in peer else sum(increments),  # minutes for the first one alone
+            )  # fmt: skip
+            plans.append(Measurement(f"peers/{peer} {refine}", "benchmarks.peers.compare:body", settings, late=refine > 0))  # fmt: skip
     if size == "smallest":
         return plans[1:2]
     return [*plans, Measurement("peers/siconos", "benchmarks.peers.compare:siconos", {})]
 
 
-def calculix(kind: str, stiff: float, steps: int, refine: int, increments: list, mesh: dict) -> dict:  # fmt: skip
-    if shutil.which("ccx") is None:
-        return dict(absent="CalculiX is not installed (apt install calculix-ccx)")
+def body(peer: str, refine: int, increments: list, mesh: dict, steps: int) -> dict:
+    """The first steps of case A by a peer, judged, and by us."""
+    if peer == GETFEM and missing("getfem") or peer != GETFEM and shutil.which("ccx") is None:
+        return dict(absent=f"{peer.split(',')[0]} is not installed (apt install python3-getfem calculix-ccx)")  # fmt: skip
     punch = case_a(refine, increments, mesh)
     given = told(punch)
     given["programme"] = given["programme"][:steps]
-    with tempfile.TemporaryDirectory() as directory:
-        before = children()
-        u, own, said = by_calculix.solve(Path(directory), given, kind, stiff, alone(), CAP)
-        seconds = children() - before
+    if peer == GETFEM:
+        found = by_system(by_getfem.__file__, dict(given, cap=CAP))
+        u, own, said = found["u"], found["own"].tolist(), str(found["said"])
+        seconds = float(found["seconds"].sum())
+    else:
+        with tempfile.TemporaryDirectory() as directory:
+            u, own, said, seconds = by_calculix.solve(Path(directory), given, peer.split(", ")[1], CAP)  # fmt: skip
     result = compared(punch, given, u, seconds, refine, increments, mesh)
-    setting = f"C3D8, penalty {stiff:g} E/mm, increments of its own" if kind != "mortar" else (
-        f"C3D8, hard, stick slope {stiff:g} E/mm, increments of its own")  # fmt: skip
-    return result | dict(peer=f"CalculiX, {kind}", setting=setting, said=said, own=own)
+    return result | dict(peer=peer, setting=SETTINGS[peer], said=said, own=own)
 
 
-def getfem(refine: int, increments: list, mesh: dict) -> dict:
-    if subprocess.run([PYTHON, "-c", "import getfem"], capture_output=True).returncode:
-        return dict(absent="GetFEM is not installed (apt install python3-getfem)")
-    punch = case_a(refine, increments, mesh)
-    given = told(punch)
+def missing(module: str) -> bool:
+    return run_alone([PYTHON, "-c", f"import {module}"]).returncode != 0
+
+
+def by_system(program: str, given: dict) -> dict:
+    """Arrays that a program for the system's Python makes of other arrays."""
     with tempfile.TemporaryDirectory() as directory:
-        files = [Path(directory) / name for name in ("mesh.npz", "found.npz")]
-        np.savez(files[0], cap=CAP, **given)
-        command = [PYTHON, by_getfem.__file__, *files]
-        done = subprocess.run(command, env=alone(), capture_output=True, text=True)
+        files = [f"{directory}/{name}.npz" for name in ("given", "found")]
+        np.savez(files[0], **given)
+        done = run_alone([PYTHON, program, *files])
         if done.returncode:
             raise RuntimeError(done.stderr[-500:])
         with np.load(files[1]) as found:
-            u, said, own = found["u"], str(found["said"]), found["own"].tolist()
-            seconds = float(found["seconds"].sum())
-    result = compared(punch, given, u, seconds, refine, increments, mesh)
-    return result | dict(peer="GetFEM, basic contact brick", said=said, own=own,
-        setting="nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, residual 1e-9")  # fmt: skip
-
-
-def children() -> float:
-    """Processor seconds of the processes that ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+            return dict(found)
 
 
 def case_a(refine: int, increments: list, mesh: dict, tol=1e-10) -> Punch:
     """Our punch."""
     loading, unloading = increments
-    return Punch(Parameters(case="A", refine=refine, loading=loading, unloading=unloading, tol=tol), **mesh)  # fmt: skip
+    parameters = dict(refine=refine, loading=loading, unloading=unloading, tol=tol)
+    return Punch(Parameters(case="A", **parameters), **mesh)
 
 
 def told(punch: Punch) -> dict:
@@ -142,19 +139,12 @@ def compared(punch, given, u, seconds, refine, increments, mesh) -> dict:
         forces.append((r[:, 2].sum(), np.linalg.norm(r[:, :2], axis=1).sum()))
     equal = float(np.clip(max(errors, default=1e-8), 1e-12, 0.1))
     ours, exact = {}, []
-    for name, tol in (
-        ("at equal error", equal),
-        ("at 1e-8", 1e-8),
-        ("at equal error, again", equal),
-    ):
-        start = process_time()
-        mine = case_a(refine, increments, mesh, tol)
-        made = process_time() - start
-        for displacement in given["programme"]:
-            step = mine.press(displacement)
-            if tol == 1e-8:
-                exact.append((step["normal_reaction"], step["tangential_reaction_sum"]))
-        ours[name] = dict(seconds=process_time() - start, mesh=made)
+    for name, tol in (("at equal error", equal), ("at 1e-8", 1e-8), ("at equal error, again", equal)):  # fmt: skip
+        made, mine = timed(case_a, refine, increments, mesh, tol)
+        seconds_of, steps = timed(lambda mine=mine: [mine.press(top) for top in given["programme"]])
+        ours[name] = dict(seconds=made + seconds_of, mesh=made)
+        if tol == 1e-8:
+            exact = [(s["normal_reaction"], s["tangential_reaction_sum"]) for s in steps]
     difference = [np.abs(np.divide(a, b) - 1).tolist() for a, b in zip(forces, exact)]
     return dict(
         refine=refine, unknowns=problem.body.size, steps=len(given["programme"]), done=len(u), seconds=seconds,
@@ -167,48 +157,71 @@ def siconos() -> dict:
 
     All answers are judged by mechanics/judge.py from ``W``, ``q`` and the reactions alone.
     """
-    if subprocess.run([PYTHON, "-c", "import siconos.numerics"], capture_output=True).returncode:
+    if missing("siconos.numerics"):
         return dict(absent="Siconos is not installed (apt install python3-siconos)")
-    rows, name = [], "NSN_AC"
-    with tempfile.TemporaryDirectory() as directory:
-        file = str(Path(directory) / "problems.npz")
-        for python, what in ((sys.executable, "make"), (sys.executable, "ours"), (PYTHON, name), (sys.executable, "ours again")):  # fmt: skip
-            done = subprocess.run([python, "-m", by_siconos.__name__, file, what], cwd=ROOT, env=alone(), capture_output=True, text=True)  # fmt: skip
-            if done.returncode:
-                raise RuntimeError(done.stderr[-500:])
-        problems = np.load(file)
-        for case, (mu, p) in by_siconos.LAWS.items():
-            row = dict(case=case, peer=f"Siconos {name}")
-            for solver in ("ours", name, "ours again"):
-                found = np.load(f"{file.removesuffix('npz')}{solver}.npz")
-                judged = [
-                    judge.condensed(problems["W"], q, np.array(mu), np.array(p), r, 1e-8).error
-                    for q, r in zip(problems[f"{case}q"], found[f"{case}reaction"])
-                ]
-                row[solver] = dict(seconds=found[f"{case}seconds"].tolist(), errors=judged,
-                    own=found[f"{case}own"].tolist(), converged=int(found[f"{case}converged"].sum()))  # fmt: skip
-                exact = problems[f"{case}r"]
-                row[solver]["difference"] = float(np.abs(found[f"{case}reaction"] - exact).max() / np.abs(exact).max())  # fmt: skip
-            rows.append(row | dict(theirs=row.pop(name)))
+    rows, problems = [], condensed_problems()
+    answers = {"ours": by_newton(problems)}
+    answers["theirs"] = by_system(by_siconos.__file__, problems)
+    answers["ours again"] = by_newton(problems)
+    for case in CASES:
+        row, exact = dict(case=case, peer="Siconos NSN_AC"), problems[f"{case}r"]
+        for solver, of in answers.items():
+            reaction, seconds, own, converged = (of[case + name] for name in COLUMNS)
+            judged = [
+                judge.condensed(problems["W"], q, *problems[f"{case}law"], r, 1e-8).error
+                for q, r in zip(problems[f"{case}q"], reaction)
+            ]
+            row[solver] = dict(
+                seconds=seconds.tolist(), errors=judged, own=own.tolist(), converged=int(converged.sum()),
+                difference=float(np.abs(reaction - exact).max() / np.abs(exact).max()),
+            )  # fmt: skip
+        rows.append(row)
     return dict(rows=rows)
+
+
+def condensed_problems() -> dict:
+    """One cycle of each case: ``W``, and of every step ``q`` and the solution ``r``, ``shape=(steps, nodes, 3)``."""
+    problems = dict(tol=1e-10)
+    for case, law in CASES.items():
+        punch = Punch(Parameters(case=case), solver=dc.CondensedNewton())
+        for displacement in programme(punch.parameters):
+            punch.press(displacement)
+        bound = punch.problem.bound()
+        q, r, _ = zip(*bound.past)
+        q, r = (np.reshape(part, (len(part), -1, 3)) for part in (q, r))
+        problems |= {f"{case}q": q, f"{case}r": r, f"{case}law": np.array([law["mu"], law["p"]])}
+        problems.setdefault("W", bound.compliance())
+    return problems
+
+
+def by_newton(problems: dict) -> dict:
+    """All problems by CondensedNewton, each from the solution of the step before."""
+    operator = _kernel.CondensedOperator(problems["W"], 3)
+    operator.prepare()
+    solver, answers = dc.CondensedNewton(), {}
+    for case in CASES:
+        q, r, friction = problems[f"{case}q"], problems[f"{case}r"], dc.Friction(*problems[f"{case}law"])  # fmt: skip
+        found = []
+        for k in range(len(q)):
+            seconds, answer = timed(solver.solve_condensed, operator, friction, q[k], problems["tol"], r[k - 1 : k])  # fmt: skip
+            found.append((answer.reaction, seconds, max(answer.error, answer.slip_error), True))
+        answers |= {case + name: np.array(column) for name, column in zip(COLUMNS, zip(*found))}
+    return answers
 
 
 def evaluate(results: dict) -> dict:
     """One row a peer: seconds a step, ratio to ours at equal error, errors by our measure; who is absent."""
-    rows, absent = [], [result["absent"] for result in results.values() if "absent" in result]
-    for name, result in results.items():
-        if "absent" in result:
-            continue
-        rows += (
-            map(_condensed_row, result["rows"]) if name.endswith("siconos") else [_body_row(result)]
-        )
+    made = [result for result in results.values() if "absent" not in result]
+    rows = [row for result in made for row in map(_condensed_row, result.get("rows", []))]
+    rows += [_body_row(result) for result in made if "rows" not in result]
     rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["peer"], row["case"]))
+    absent = [result["absent"] for result in results.values() if "absent" in result]
     return dict(rows=rows, absent=absent)
 
 
 def _body_row(result: dict) -> dict:
     def ours(*names):
-        return float(np.mean([run["seconds"] - run["mesh"] for run in map(result["ours"].get, names)])) / result["steps"]  # fmt: skip
+        return float(np.mean([result["ours"][name]["seconds"] - result["ours"][name]["mesh"] for name in names])) / result["steps"]  # fmt: skip
 
     per, mine = result["seconds"] / max(result["done"], 1), ours("at equal error", "at equal error, again")  # fmt: skip
     return dict(
@@ -229,40 +242,27 @@ def _condensed_row(row: dict) -> dict:
     )  # fmt: skip
 
 
-def figures(data):
+def figure(data):
     rows = data["rows"]
-    if not rows:
-        return
     names = [f"{row['peer']}, {row['case']}, {row['unknowns'] or 'condensed'}, {row['done']}" for row in rows]  # fmt: skip
     figure, (left, right) = bars(names, 2)
-    places = np.arange(len(rows))
     for ax, shift, key, colour, label in (
         (left, -0.2, "seconds", THEIRS, "the peer, its error by our measure"), (left, 0.2, "ours", OURS, "we, at equal error"),
         (right, -0.2, "error", THEIRS, "_"), (right, 0.2, "own", "#999999", "as the peer reports its error"),
     ):  # fmt: skip
         values = [max(row[key] or np.nan, 1e-16) for row in rows]
-        ax.barh(places + shift, values, height=0.38, color=colour, label=label)
+        ax.barh(np.arange(len(rows)) + shift, values, height=0.38, color=colour, label=label)
     left.set(xlabel="processor seconds a step")
     right.set(xlabel="largest error of the peer", xlim=(1e-16, 10))
     figure.legend(loc="outside upper center", frameon=False, ncols=3)
-    yield (
-        "peers",
-        figure,
-        (
-            "Peers beside us: unknowns and steps done. Set-ups are included, but for Siconos, which is given W. GetFEM and CalculiX "
-            "know isotropic friction alone, so only case A can be compared with them."
-        ),
-    )
+    return figure
 
 
 def tables(data):
+    titles = dict(
+        peer="peer", case="case", unknowns="unknowns", setting="configuration", seconds="s a step",
+        ours="ours at equal error", ours_tight="ours at 1e-8", ratio="ratio", done="steps done",
+        error="error by our measure", own="its own", force_error="reactions differ by", said="said",
+    )  # fmt: skip
     yield [{"not compared": text} for text in data["absent"]]
-    yield [
-        {
-            "peer": row["peer"], "case": row["case"], "unknowns": row["unknowns"], "configuration": row["setting"],
-            "s a step": row["seconds"], "ours at equal error": row["ours"], "ours at 1e-8": row["ours_tight"],
-            "ratio": row["ratio"], "steps done": row["done"], "error by our measure": row["error"], "its own": row["own"],
-            "reactions differ by": row["force_error"], "said": row["said"],
-        }
-        for row in data["rows"]
-    ]  # fmt: skip
+    yield chosen(data["rows"], titles)

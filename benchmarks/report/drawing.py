@@ -22,7 +22,7 @@ def style(solver: str) -> dict:
     return dict(color=COLOURS[solver], marker=MARKERS[solver], ms=4, lw=1.4, label=solver)
 
 
-def panels(count: int, columns: int = 3, size=(4.4, 3.7)):
+def panels(count: int, size=(4.4, 3.7), columns: int = 3):
     """A figure with ``count`` panels and room for one legend above."""
     columns = min(columns, count)
     rows = -(-count // columns)

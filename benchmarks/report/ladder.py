@@ -7,19 +7,19 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
-from time import process_time
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
+from dolfinx import fem
 from petsc4py import PETSc
 
-from benchmarks.measurement import Measurement, Memory, counts, spread
+import dolfinx_contact as dc
+from benchmarks.measurement import Measurement, Memory, counts, mesh_of, spread, timed
 from benchmarks.report.drawing import OURS, bars
+from benchmarks.tables import chosen
 from studies.punch import CASES, Parameters, Punch, programme
 
 TITLE = "The economy ladder"
+CAPTION = "What a step, its set-up and its memory cost as ingredients are removed one at a time."
 # What every rung is made of, and the rung it is compared with: what is there once more than here.
 RUNGS = {
     "non-associated": (dict(case="C"), None),
@@ -37,86 +37,68 @@ RUNGS = {
 
 
 def plan(size: str) -> list[Measurement]:
-    repeat = dict(full=3, quick=1, smallest=1)[size]
-    settings = dict(mesh={} if size != "smallest" else dict(divisions=2, layers=2))
-    settings["steps"] = 8 if size != "smallest" else 2
-    distinct = {json.dumps(kind): name for name, (kind, _) in reversed(RUNGS.items())}
-    names = [name for name in RUNGS if name in distinct.values()]
-    if size == "smallest":
-        names = ["non-associated", "associated"]
+    kinds = {}
+    for name, (kind, _) in RUNGS.items():  # each kind once, by its first name
+        kinds.setdefault(json.dumps(kind), (name, kind))
+    rungs = list(kinds.values())
+    settings = dict(mesh=mesh_of(size), steps=2 if size == "smallest" else 8)
     return [
-        Measurement(f"ladder/{name}_{k}".replace(" ", "_"), "benchmarks.report.ladder:rung",
-            dict(kind=RUNGS[name][0], repetition=k, **settings))
-        for k in range(repeat) for name in names
+        Measurement(f"ladder/{name} {k}", "benchmarks.report.ladder:rung", dict(kind=kind, repetition=k, **settings))
+        for k in range(3 if size == "full" else 1)
+        for name, kind in (rungs[:2] if size == "smallest" else rungs)
     ]  # fmt: skip
 
 
 def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     """One programme of the punch: operations, peak memory, processor seconds of set-up and steps."""
-    if "friction" in kind:
-        CASES["of the ladder"] = kind["friction"]
+    CASES["of the ladder"] = kind.get("friction")
     punch = Punch(Parameters(case=kind.get("case", "of the ladder"), tol=1e-8), **mesh)
-    displacements = programme(punch.parameters)[:steps]
-    problem, contact = punch.problem, punch.contact
-    history, scale = None, None
-    if kind.get("moving"):
-        problem, scale = moving(punch)
+    problem, contact, history = punch.problem, punch.contact, None
+    scale = fem.Constant(punch.mesh, 1.0)
+    if kind.get("moving"):  # the stiffness times a constant that changes from step to step
+        problem = dc.ContactProblem(scale * punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
     if kind.get("recorded"):
         contact = dc.Contact(punch.V, punch.facet_tags.find(1), contact.plane, contact.friction, dc.Wear(3e-8))  # fmt: skip
         problem = dc.ContactProblem(punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
-        file = Path(tempfile.mkdtemp()) / "history.csv"
-        history = dc.History(problem, file, [(7.5, 0, 0), (0, 7.5, 0)])
+        history = dc.History(problem, Path(tempfile.mkdtemp()) / "history.csv", [(7.5, 0, 0), (0, 7.5, 0)])  # fmt: skip
     if kind.get("away"):
         contact.plane.displacement = np.array([0.0, 0.0, -1e3])
-    seconds, iterations, solver = [], [], "none"
-    memory = Memory()
-    PETSc.Log.begin()
-    for k, displacement in enumerate(displacements):
-        punch.approach.value = -displacement
-        if scale is not None:
-            scale.value = 1.0 + 1e-3 * k
-        start = process_time()
+
+    def solved() -> tuple[int, str]:
         if kind.get("bare"):
             problem.body.refresh()
             problem.body.free_state(problem.body.load()[0])
-            iterations.append(0)
-        else:
-            step = problem.solve()
-            iterations.append(step.iterations)
-            solver = step.solver
-            if history is not None:
-                history.record(step)
-        seconds.append(process_time() - start)
+            return 0, "none"
+        step = problem.solve()
+        if history is not None:
+            history.record(step)
+        return step.iterations, step.solver
+
+    seconds, iterations, memory = [], [], Memory()
+    PETSc.Log.begin()
+    for k, displacement in enumerate(programme(punch.parameters)[:steps]):
+        punch.approach.value, scale.value = -displacement, 1.0 + 1e-3 * k
+        spent, (count, solver) = timed(solved)
+        seconds.append(spent)
+        iterations.append(count)
         if k == 0:
             first = counts()
-    nodes, dim = len(contact.nodes), contact.frame.shape[0]
-    condensed = nodes * (1 if contact.friction.frictionless else dim)
+    rows = len(contact.nodes) * (1 if contact.friction.frictionless else 3)
     return dict(
-        kind=kind, unknowns=problem.body.size, condensed=condensed if solver.startswith("Condensed") else 0,
+        kind=kind, unknowns=problem.body.size, condensed=rows if solver.startswith("Condensed") else 0,
         counts={key: value - first[key] for key, value in counts().items()}, bytes=memory.added(),
         seconds=seconds, iterations=iterations, solver=solver,
     )  # fmt: skip
 
 
-def moving(punch):
-    """The same body, its stiffness times a constant that changes from step to step."""
-    from dolfinx import fem
-
-    scale = fem.Constant(punch.mesh, 1.0)
-    return dc.ContactProblem(scale * punch.F, punch.u, [punch.contact], bcs=punch.bcs, tol=1e-8), scale  # fmt: skip
-
-
 def evaluate(results: dict) -> dict:
     """One row a rung: medians over the repetitions, and ratios to the rung that it is compared with."""
-    by_kind = {}
-    for result in results.values():
-        by_kind.setdefault(json.dumps(result["kind"]), []).append(result)
     rows = {}
     for name, (kind, above) in RUNGS.items():
-        runs = by_kind.get(json.dumps(kind))
+        runs = [result for result in results.values() if result["kind"] == kind]
         if not runs:
             continue
-        last = runs[0]
+        last, other = runs[0], rows.get(above)
         steps = max(len(last["seconds"]) - 1, 1)
         row = rows[name] = dict(
             rung=name, compared_with=above, unknowns=last["unknowns"], condensed=last["condensed"],
@@ -126,41 +108,33 @@ def evaluate(results: dict) -> dict:
             iterations=float(np.mean(last["iterations"])),
             counts={key: value / steps for key, value in last["counts"].items()},
         )  # fmt: skip
-        if above in rows:
-            other = rows[above]
+        if other:
             row["step_ratio"] = row["step"]["median"] / other["step"]["median"]
             row["set_up_ratio"] = row["set_up"]["median"] / other["set_up"]["median"]
             row["bytes_ratio"] = row["bytes"] / other["bytes"] if other["bytes"] else None
     return dict(rows=list(rows.values()))
 
 
-def figures(data):
+def figure(data):
     rows = data["rows"]
     figure, axes = bars([row["rung"] for row in rows], 3)
-    for ax, key, title, scale in zip(
-        axes, ("step", "set_up", "bytes"),
-        ("one step [ms]", "first step with set-up [ms]", "memory beyond mesh and forms [MB]"), (1e3, 1e3, 1e-6),
+    for ax, title, values in zip(
+        axes, ("one step [ms]", "first step with set-up [ms]", "memory beyond mesh and forms [MB]"),
+        zip(*((1e3 * row["step"]["median"], 1e3 * row["set_up"]["median"], 1e-6 * row["bytes"]) for row in rows)),
     ):  # fmt: skip
-        values = [max(scale * (row[key] if key == "bytes" else row[key]["median"]), 1e-3) for row in rows]  # fmt: skip
+        values = np.maximum(values, 1e-3)
         ax.bar_label(ax.barh(range(len(rows)), values, color=OURS, height=0.65), fmt="%.3g", padding=3)  # fmt: skip
         ax.set(xlabel=title, xlim=(0.4 * min(values), 4 * max(values)))
         for k, row in enumerate(rows):  # a line above each scene that begins anew
             if k and row["compared_with"] is None:
                 ax.axhline(k - 0.5, color="0.5", lw=0.8)
-    yield (
-        "ladder",
-        figure,
-        "What a step, its set-up and its memory cost as ingredients are removed one at a time.",
-    )
+    return figure
 
 
 def tables(data):
-    yield [
-        {
-            "rung": row["rung"], "compared with": row["compared_with"], "step, ratio": row.get("step_ratio"),
-            "set-up, ratio": row.get("set_up_ratio"), "memory, ratio": row.get("bytes_ratio"),
-            "unknowns": row["unknowns"], "condensed": row["condensed"], "iterations a step": row["iterations"],
-            **{f"{key} a step": value for key, value in row["counts"].items()},
-        }
-        for row in data["rows"]
-    ]  # fmt: skip
+    titles = dict(
+        rung="rung", compared_with="compared with", step_ratio="step, ratio", set_up_ratio="set-up, ratio",
+        bytes_ratio="memory, ratio", unknowns="unknowns", condensed="condensed", iterations="iterations a step",
+    )  # fmt: skip
+    yield chosen(data["rows"], titles)
+    yield [{"a step of": row["rung"], **row["counts"]} for row in data["rows"]]

@@ -4,44 +4,41 @@
 
 from __future__ import annotations
 
-from time import process_time
-
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 
-from benchmarks.measurement import Measurement, spread
+import dolfinx_contact as dc
+from benchmarks.measurement import Measurement, spread, timed
 from benchmarks.report.drawing import logarithmic, panels
+from benchmarks.tables import chosen
 from mechanics.convergence import richardson
 from studies.punch import Parameters, Punch, programme
 
 TITLE = "Work and precision, discretisation"
+CAPTION = (
+    "Punch, case C, one cycle: error of mesh, increments and tolerance against Richardson's limits."
+)
 PAPER = 0  # level of the paper's mesh; each level halves the cells
-MESHES = [-1, 0, 1, 2]
-TIMES = [1, 2, 4, 8]  # the paper's increments, 5 + 10
-TOLERANCES = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8]
 TIGHT = 1e-10
-CASE = "C"
-QUANTITIES = ("normal", "dissipation", "stick")
+TOLERANCES = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8]
+# Level of the mesh, times the paper's increments, 5 + 10, and tolerance; the last ones of meshes and increments take
+# long.  Twice the increments on other meshes: do the two errors depend on each other?
+RUNS = [
+    *[(refine, 1, TIGHT) for refine in (-1, 0, 1)], *[(PAPER, times, TIGHT) for times in (2, 4)], (-1, 2, TIGHT),
+    *[(PAPER, 1, tol) for tol in TOLERANCES],
+]  # fmt: skip
+LONG_RUNS = [(2, 1, TIGHT), (PAPER, 8, TIGHT), (1, 2, TIGHT)]
+FEW_RUNS = [(-2, 1, 1e-8), (-1, 1, 1e-8)]
+QUANTITIES = dict(normal="total reaction", dissipation="work of friction", stick="edge of the stick zone")  # fmt: skip
+FAMILIES = dict(meshes="width of a cell [mm]", increments="increments of a cycle", tolerances="tolerance")  # fmt: skip
 NOISE = 1e-9  # relative; ten times the tolerance of the runs
 AGAIN = 20.0  # seconds: what takes less is repeated, three times at most
 
 
 def plan(size: str) -> list[Measurement]:
-    full = size == "full"
-    if size == "smallest":
-        kinds = [(-2, 1, 1e-8), (-1, 1, 1e-8)]
-    else:
-        kinds = [(refine, 1, TIGHT) for refine in (MESHES if full else MESHES[:3])]
-        kinds += [(PAPER, times, TIGHT) for times in (TIMES if full else TIMES[:3])[1:]]
-        # The same increments on other meshes: do the two errors depend on each other?
-        kinds += [(refine, 2, TIGHT) for refine in ((-1, 1) if full else (-1,))]
-        kinds += [(PAPER, 1, tol) for tol in TOLERANCES]
     return [
         Measurement(f"meshes/punch_{refine}_{times}_{tol:g}", "benchmarks.report.meshes:punch",
             dict(refine=refine, times=times, tol=tol), late=refine > 1)
-        for refine, times, tol in kinds
+        for refine, times, tol in dict(full=RUNS + LONG_RUNS, quick=RUNS, smallest=FEW_RUNS)[size]
     ]  # fmt: skip
 
 
@@ -50,102 +47,100 @@ def punch(refine: int, times: int, tol: float) -> dict:
 
     Seconds are those of all steps with assembly, factorisation and condensed operator, without the mesh.
     """
-    parameters = Parameters(case=CASE, loading=5 * times, unloading=10 * times, tol=tol, refine=refine)  # fmt: skip
+    parameters = Parameters(case="C", loading=5 * times, unloading=10 * times, tol=tol, refine=refine)  # fmt: skip
     seconds = []
     while not seconds or len(seconds) < 3 and sum(seconds) < AGAIN:
         body = Punch(parameters)
-        start, iterations = process_time(), 0
-        for k, displacement in enumerate(programme(parameters), start=1):
-            iterations += body.press(displacement)["iterations"]
-            if k == parameters.loading:
-                contact, area = body.contact, body.contact.area
-                normal = float(contact.reaction[:, 2].sum())
-                stick = area[contact.status == dc.Status.STICK].sum() / area.sum()
-        seconds.append(process_time() - start)
-    return dict(
-        normal=normal, stick=float(parameters.radius * np.sqrt(stick)), iterations=iterations,
-        dissipation=float(body.contact.dissipation.sum()), seconds=spread(seconds), refine=refine,
-        unknowns=body.problem.body.size, nodes=len(contact.nodes), h=2.5 / 2**refine, increments=15 * times, tol=tol,
+        spent, found = timed(cycle, body)
+        seconds.append(spent)
+    return found | dict(
+        seconds=spread(seconds), refine=refine, unknowns=body.problem.body.size, nodes=len(body.contact.nodes),
+        h=2.5 / 2**refine, increments=15 * times, tol=tol,
     )  # fmt: skip
+
+
+def cycle(body: Punch) -> dict:
+    contact, iterations = body.contact, 0
+    for k, displacement in enumerate(programme(body.parameters), start=1):
+        iterations += body.press(displacement)["iterations"]
+        if k == body.parameters.loading:
+            normal = float(contact.reaction[:, 2].sum())
+            stick = contact.area[contact.status == dc.Status.STICK].sum() / contact.area.sum()
+    radius = float(body.parameters.radius * np.sqrt(stick))
+    work = float(contact.dissipation.sum())
+    return dict(normal=normal, dissipation=work, stick=radius, iterations=iterations)
 
 
 def evaluate(results: dict) -> dict:
     """Rows and errors of each family, and orders."""
-    runs = list(results.values())
+    runs = sorted(results.values(), key=lambda run: run["unknowns"])
     tight = min((run["tol"] for run in runs), default=None)
 
     def rows(step, **fixed):
-        of = [r for r in runs if all(r[key] == value for key, value in fixed.items())]
-        of = [dict(r, x=r[step]) for r in of]
-        return sorted(of, key=lambda r: r["increments"] if step == "increments" else -r["x"])
+        of = [dict(r, x=r[step]) for r in runs if fixed.items() <= r.items()]
+        return sorted(of, key=lambda r: r["x"] if step == "increments" else -r["x"])
 
     families = dict(
         meshes=rows("h", increments=15, tol=tight),
         increments=rows("increments", refine=PAPER, tol=tight),
         tolerances=rows("tol", refine=PAPER, increments=15),
     )
-    orders = {}
+    orders = {family: {} for family in families}
     for family, of in families.items():
-        orders[family] = {}
         for key in QUANTITIES:
+            values = [r[key] for r in of]
             if family == "tolerances":
-                limit = of[-1][key] if of else None
+                limit = values[-1] if of else None
             else:
                 widths = [r["x"] if family == "meshes" else 1 / r["x"] for r in of]
-                limit, orders[family][key] = richardson(widths, [r[key] for r in of])
+                limit, orders[family][key] = richardson(widths, values)
             for row in of:
-                row[f"{key}_error"] = (
-                    abs(row[key] / limit - 1) if limit and row[key] != limit else None
-                )
+                known = limit and row[key] != limit
+                row[f"{key}_error"] = abs(row[key] / limit - 1) if known else None
     twice = [
         dict(unknowns=r["unknowns"], change=r["dissipation"] / once["dissipation"] - 1)
-        for r in sorted(runs, key=lambda r: r["unknowns"])
-        for once in families["meshes"]
-        if r["increments"] == 30 and r["tol"] == tight and once["refine"] == r["refine"]
-    ]
-    return dict(**families, orders=orders, case=CASE, twice=twice)
+        for r in runs if r["increments"] == 30 and r["tol"] == tight
+        for once in families["meshes"] if once["refine"] == r["refine"]
+    ]  # fmt: skip
+    return dict(**families, orders=orders, case="C", twice=twice)
 
 
-def figures(data):
-    names = dict(normal="total reaction", dissipation="work of friction", stick="edge of the stick zone")  # fmt: skip
-    families = dict(meshes="width of a cell [mm]", increments="increments of a cycle", tolerances="tolerance")  # fmt: skip
-    figure, axes = panels(4, 2, (5.6, 4.0))
-    for ax, (family, label), marker in zip(axes, families.items(), "os^"):
-        rows = data[family]
-        for key, name in names.items():
+def figure(data):
+    figure, axes = panels(4, (5.6, 4.0), columns=2)
+    for ax, (family, label), marker in zip(axes, FAMILIES.items(), "os^"):
+        # What the tolerance leaves is no error of mesh or increments.
+        errors = {
+            key: [error if (error := row[f"{key}_error"] or 0) > NOISE else np.nan for row in data[family]]
+            for key in QUANTITIES
+        }  # fmt: skip
+        for key, name in QUANTITIES.items():
             order = data["orders"][family].get(key)
-            errors = [above_noise(row, key) for row in rows]
-            ax.plot([row["x"] for row in rows], errors, marker=marker, label=name + (f", order {order:.1f}" if order else ""))  # fmt: skip
+            ax.plot(
+                [row["x"] for row in data[family]],
+                errors[key],
+                marker=marker,
+                label=name + (f", order {order:.1f}" if order else ""),
+            )
         ax.set(xlabel=label, ylabel="relative error")
-        seconds = [row["seconds"]["median"] for row in rows]
-        axes[3].plot(seconds, [above_noise(row, "dissipation") for row in rows], marker=marker, label=f"{family} refined")  # fmt: skip
+        seconds = [row["seconds"]["median"] for row in data[family]]
+        axes[3].plot(seconds, errors["dissipation"], marker=marker, label=f"{family} refined")
     axes[3].set(xlabel="processor seconds of a cycle", ylabel="error of the work of friction")
     for ax in axes:
         logarithmic(ax)
         ax.legend(fontsize=9)
-    yield (
-        "discretisation",
-        figure,
-        (
-            f"Punch, case {data['case']}, one cycle: error of mesh, increments and tolerance against Richardson's limits."
-        ),
-    )
-
-
-def above_noise(row: dict, key: str) -> float:
-    """What the tolerance leaves is no error of mesh or increments."""
-    error = row[f"{key}_error"]
-    return error if error is not None and error > NOISE else np.nan
+    return figure
 
 
 def tables(data):
-    for family in ("meshes", "increments", "tolerances"):
-        yield [
-            {
-                family: f"{row['unknowns']:,} unknowns" if family == "meshes" else row["x"], "total reaction [N]": row["normal"],
-                "work of friction [N mm]": row["dissipation"], "stick edge [mm]": row["stick"], "s": row["seconds"]["median"],
-                **{f"error of {key}": row[f"{key}_error"] for key in QUANTITIES},
-            }
-            for row in data[family]
-        ]  # fmt: skip
-    yield [{"unknowns": row["unknowns"], "twice the increments change the work by": row["change"]} for row in data["twice"]]  # fmt: skip
+    shown = dict(
+        normal="total reaction [N]", dissipation="work of friction [N mm]", stick="stick edge [mm]"
+    )
+    errors = {f"{key}_error": f"error of {key}" for key in QUANTITIES}
+    for family in FAMILIES:
+        rows = [dict(row, seconds=row["seconds"]["median"]) for row in data[family]]
+        step = "unknowns" if family == "meshes" else "x"
+        yield chosen(rows, {step: family, **shown, "seconds": "s", **errors})
+    yield [
+        {"unknowns": row["unknowns"], "twice the increments change the work by": row["change"]}
+        for row in data["twice"]
+    ]

@@ -9,22 +9,17 @@ from collections import Counter
 from time import perf_counter
 from types import SimpleNamespace
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 
+import dolfinx_contact as dc
 from benchmarks.stress.scenes import Scene
 from mechanics import judge
 from mechanics.condensed import random_problem
 from mechanics.judge import Verdict
 from mechanics.judge_scene import SceneJudge
-from mechanics.scenes import build
+from mechanics.scenes import build, problem_of
 
-TOL = 1e-8  # of all scenes that do not name another
-WRONG = judge.DEFECT * TOL
 REFUSALS = (dc.NotConverged, dc.CondensedNotConverged, dc.LinearSolverError, ValueError)
-ROUNDING = getattr(dc, "RoundingWarning", UserWarning)
 SOLVERS = {
     "default": lambda: None,
     "condensed": lambda: dc.CondensedNewton(max_seconds=30),
@@ -39,19 +34,22 @@ def run(scene: Scene, solver) -> dict:
     precision allows no more, and is judged by that error; ``WRONG``; or ``refused``.
     """
     start = perf_counter()
-    record = dict(outcome="solved", error=0.0, slip_error=0.0, reactions=0.0, rounding=0.0, steps=0, scratch=0, iterations=0, slowest=0.0)  # fmt: skip
+    sums = dict.fromkeys(("steps", "scratch", "iterations"), 0)
+    worst = dict.fromkeys(("error", "slip_error", "reactions", "rounding", "slowest"), 0.0)
+    record = dict(group=scene.group, name=scene.name, outcome="solved", **worst, **sums)
     used = Counter()
     steps = condensed_steps if scene.condensed else body_steps
-    for verdict, step, method in steps(scene, solver, record):
-        at = level(step, scene.tol)
-        note(record, verdict, at, at > scene.tol)
-        record["steps"] += 1
-        record["scratch"] += verdict.from_scratch is not None
-        record["iterations"] += step.iterations
-        record["slowest"] = max(record["slowest"], step.seconds)
-        used[method] += 1
-    record.update(seconds=perf_counter() - start, methods=dict(used))
-    return record
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dc.RoundingWarning)
+        for verdict, step, method in steps(scene, solver, record):
+            at = level(step, scene.tol)
+            note(record, verdict, at, at > scene.tol)
+            record["steps"] += 1
+            record["scratch"] += verdict.from_scratch is not None
+            record["iterations"] += step.iterations
+            record["slowest"] = max(record["slowest"], step.seconds)
+            used[method] += 1
+    return record | dict(seconds=perf_counter() - start, methods=dict(used))
 
 
 def level(step, tol: float) -> float:
@@ -67,8 +65,7 @@ def note(record: dict, verdict: Verdict, at: float, rounded: bool) -> None:
         record[name] = max(record[name], value)
     if not verdict.accepts(at):
         record["outcome"] = "WRONG"
-        first = f"step {record['steps'] + 1}: {verdict}"
-        record.setdefault("said", first)
+        record.setdefault("said", f"step {record['steps'] + 1}: {verdict}")
     elif rounded and record["outcome"] == "solved":
         record["outcome"] = "rounding"
 
@@ -84,19 +81,12 @@ def refuse(record: dict, said: Exception) -> None:
 def condensed_steps(scene: Scene, solver, record):
     """The one answer of a condensed problem: (verdict, result, method); none if it is refused."""
     problem = sliding_problem(scene) if scene.seed is None else random_problem(scene.seed)
-    friction = dc.Friction(problem.mu, problem.p)
+    W, q, mu, p = problem.W, problem.q, np.broadcast_to(problem.mu, 2), np.broadcast_to(problem.p, 2)  # fmt: skip
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ROUNDING)
-            found = dc.solve_condensed(problem.W, problem.q, friction, solver, scene.tol, max_seconds=30)  # fmt: skip
+        found = dc.solve_condensed(W, q, dc.Friction(mu, p), solver, scene.tol, max_seconds=30)
     except REFUSALS as said:
         return refuse(record, said)
-    mu, p = np.broadcast_to(problem.mu, 2), np.broadcast_to(problem.p, 2)
-    yield (
-        judge.condensed(problem.W, problem.q, mu, p, found.reaction, scene.tol),
-        found,
-        found.branch,
-    )
+    yield judge.condensed(W, q, mu, p, found.reaction, scene.tol), found, found.branch
 
 
 def sliding_problem(scene: Scene):
@@ -109,34 +99,24 @@ def sliding_problem(scene: Scene):
 def body_steps(scene: Scene, solver, record):
     """Load step after load step that is not refused: (verdict, step, method)."""
     built = build(**scene.body)
-    body = scene.body
-    of = SceneJudge(built, body.get("mu", 0.2), body.get("p"))
-    contacts = [built.contact] if built.contact is not None else []
-    problem = dc.ContactProblem(
-        built.F, built.u, contacts, bcs=built.bcs, solver=solver, tol=scene.tol
-    )
+    of = SceneJudge(built, scene.body.get("mu", 0.2), scene.body.get("p"))
+    problem = problem_of(built, solver, scene.tol)
     for move in scene.tops:
         if getattr(move, "fresh", False):
             problem.reset()
             of.restart()
         built.move_top(move)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ROUNDING)
-                step = problem.solve()
+            step = problem.solve()
         except REFUSALS as said:
             refuse(record, said)
             if not scene.goes_on:
                 return
             continue
-        yield of.verdict(scene.tol), step, step.tried[-1].branch if step.tried else step.solver.split()[0]  # fmt: skip
+        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+        yield of.verdict(scene.tol), step, method
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:
     """Scenes and the solvers that they are given to: on plain arrays there is one."""
-    return [
-        (scene, solver)
-        for scene in chosen
-        for solver in solvers
-        if not scene.condensed or solver == "default"
-    ]
+    return [(scene, s) for scene in chosen for s in solvers if not scene.condensed or s == "default"]  # fmt: skip
