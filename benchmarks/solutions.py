@@ -12,22 +12,17 @@ does the step from the same history, which is Newton's; solution 0 is the one th
 from __future__ import annotations
 
 import tempfile
-from types import SimpleNamespace
 
-import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-
-# isort: split
 import numpy as np
 
+import dolfinx_contact as dc
+from benchmarks.measurement import SOLVERS
+from benchmarks.tables import table
 from mechanics import judge, scenes
 from studies.punch import CASES, Parameters, Punch, programme
 
 TOL, APART = 1e-10, 1e-6  # solutions differ by more than APART of the largest reaction
 CROSSED = dict(mu=(1.0, 0.1), p=(0.01, 1.0))
-SOLVERS = {
-    "fixed point": dc.FixedPoint,
-    "fixed point, paper's map": lambda: dc.FixedPoint(map="bipotential"),
-}
 
 
 def random_start(rng, r: np.ndarray, mu: np.ndarray) -> np.ndarray:
@@ -71,85 +66,90 @@ def number(found, r, W, q, friction) -> int:
     return len(found) - 1
 
 
-def described(found, W, q, friction) -> list[dict]:
-    """What a reader wants to know of each solution; ``apart`` is the largest nodal difference to another one."""
+def described(found, W, q, friction) -> str:
+    """What a reader wants to know of each solution; what is ``apart`` is the largest nodal difference to another one."""
     reactions = np.array([r for r, *_ in found])
-    slips = np.array([(q + np.tensordot(W.reshape(*q.shape, *q.shape), r, 2))[:, :2] for r in reactions])  # fmt: skip
-    rows = []
+    slips = np.array([(q + (W @ r.ravel()).reshape(q.shape))[:, :2] for r in reactions])
+    lines = []
     for (r, hits, errors), slip in zip(found, slips):
         inside = np.linalg.norm(r[:, :2] / friction.mu, axis=1) < (1 - 1e-9) * r[:, 2]
-        rows.append(dict(
-            hits=hits, error=float(max(errors)), open=int((r[:, 2] == 0).sum()), stick=int(inside.sum()),
-            normal=float(r[:, 2].sum()), tangential=float(np.linalg.norm(r[:, :2], axis=1).sum()),
-            work=float(-(r[:, :2] * slip).sum()), apart=float(np.abs(reactions - r).max() / np.abs(reactions).max()),
-            slips_apart=float(np.abs(slips - slip).max() / np.abs(slips).max()),
-        ))  # fmt: skip
-    return rows
+        apart = (
+            np.abs(of - own).max() / np.abs(of).max() for of, own in ((reactions, r), (slips, slip))
+        )
+        sums = r[:, 2].sum(), np.linalg.norm(r[:, :2], axis=1).sum(), -(r[:, :2] * slip).sum()
+        numbers = (f"{value:.6g}" for value in (max(errors), *sums, *apart))
+        lines.append([hits, (r[:, 2] == 0).sum(), inside.sum(), *numbers])
+    titles = (
+        "hits",
+        "open",
+        "stick",
+        "error",
+        "normal",
+        "tangential",
+        "work",
+        "reactions apart",
+        "slips apart",
+    )
+    return table(titles, lines)
 
 
-def examine(make, programme: list, starts: list[int], report=print) -> list[dict]:
-    """One record per step; ``by`` has the number of the solution that each map of the fixed point finds.
+def examine(make, programme: list, starts: list[int]) -> None:
+    """Print for every step its solutions, and the number of the one that each map of the fixed point finds.
 
     Args:
-        make: Gives for a solver a scene: ``problem``, ``contact``, and ``move``, which takes an entry of ``programme``.
+        make: Gives for a solver a problem, and what moves its top to an entry of ``programme``.
         programme: Where the top is at the end of each step.
         starts: Random starts in each step.
     """
-    others = {name: make(solver()) for name, solver in SOLVERS.items()}
-    leader, records, W = make(dc.CondensedNewton()), [], None
-    friction = leader.contact.friction
+    leader, move = make(dc.CondensedNewton())
+    others = {name: make(solver()) for name, solver in SOLVERS.items() if "fixed point" in name}
+    contact, W = leader.contacts[0], None
     for k, (top, count) in enumerate(zip(programme, starts, strict=True)):
         with tempfile.NamedTemporaryFile(suffix=".npz") as checkpoint:
-            leader.problem.save(checkpoint.name)
-            leader.move(top)
-            leader.problem.solve()
-            contact, by = leader.contact, {}
-            W = leader.problem.bound().compliance() if W is None else W
+            leader.save(checkpoint.name)
+            move(top)
+            leader.solve()
+            W = leader.bound().compliance() if W is None else W
             w = np.column_stack((contact.slip_increment, contact.gap))
             q = w - (W @ contact.reaction.ravel()).reshape(w.shape)
-            found = solutions(W, q, friction, contact.reaction.copy(), count, seed=k)
+            condensed = W, q, contact.friction
+            found, by = solutions(*condensed, contact.reaction.copy(), count, seed=k), {}
             by_newton = len(found)
-            for name, scene in others.items():
-                scene.problem.load(checkpoint.name)
-                scene.move(top)
+            for name, (problem, move_other) in others.items():
+                problem.load(checkpoint.name)
+                move_other(top)
                 try:
-                    step = scene.problem.solve()
-                    by[name] = dict(number=number(found, scene.contact.reaction, W, q, friction), iterations=step.iterations)  # fmt: skip
+                    step = problem.solve()
+                    by[name] = (
+                        f"{number(found, problem.contacts[0].reaction, *condensed)} in {step.iterations}"
+                    )
                 except dc.NotConverged as failure:
-                    by[name] = dict(number=None, iterations=failure.step.iterations, error=failure.step.error)  # fmt: skip
-        record = dict(
-            step=k + 1, top=top, nodes=len(contact.nodes), starts=count, by_newton=by_newton,
-            solutions=described(found, W, q, friction), by=by,
-        )  # fmt: skip
-        records.append(record)
-        report(f"{k + 1:3} {top}: {len(found)} solution(s), {by_newton} of them from {count} starts; {by}", flush=True)  # fmt: skip
-    return records
+                    by[name] = str(failure)
+        print(
+            f"{k + 1:3} {top}: {len(found)} solution(s), {by_newton} of them from {count} starts; {by}"
+        )
+        print(described(found, *condensed), flush=True)
 
 
-def punch(case: str, refine: int):
-    """The punch, and its programme."""
-    CASES["crossed"] = CROSSED
-    parameters = Parameters(case=case, refine=refine, tol=TOL)
+def punch(solver):
+    """The coarse punch."""
+    made = Punch(Parameters(case="crossed", refine=-1, tol=TOL), solver=solver)
 
-    def make(solver):
-        made = Punch(parameters, solver=solver)
-        return SimpleNamespace(problem=made.problem, contact=made.contact, move=lambda top: setattr(made.approach, "value", -top))  # fmt: skip
+    def move(top):
+        made.approach.value = -top
 
-    return make, programme(parameters)
+    return made.problem, move
 
 
-def block():
-    """A block of 32 bricks, pressed and dragged, then dragged back; a step of tests/test_solutions.py."""
-
-    def make(solver):
-        made = scenes.block(**CROSSED, solver=solver, tol=TOL)
-        return SimpleNamespace(problem=made.problem, contact=made.contact, move=lambda top: made.move_top(*top))  # fmt: skip
-
-    return make, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)]
+def block(solver):
+    """A block of 32 bricks."""
+    made = scenes.block(**CROSSED, solver=solver, tol=TOL)
+    return made.problem, lambda top: made.move_top(*top)
 
 
 if __name__ == "__main__":
-    make, steps = block()
-    examine(make, steps, [0, 200])
-    make, steps = punch("crossed", refine=-1)
-    examine(make, steps, [20] * len(steps))
+    # Pressed and dragged, then dragged back: a step of tests/test_solutions.py.
+    examine(block, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)], [0, 200])
+    CASES["crossed"] = CROSSED
+    steps = programme(Parameters())
+    examine(punch, steps, [20] * len(steps))

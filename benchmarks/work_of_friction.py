@@ -11,6 +11,7 @@ chord; `mean`, mean force times slip (trapezoidal); `end`, force of the end of t
 from __future__ import annotations
 
 import sys
+from itertools import product
 
 import numpy as np
 from scipy.optimize import brentq
@@ -32,8 +33,7 @@ def works(friction, before, slipped, reaction, slip) -> np.ndarray:
 
 def punch(case: str, increments: int):
     """First cycle of the paper's punch: works, work of the platen with mean forces, last state."""
-    factor = increments // 15
-    parameters = Parameters(case=case, loading=5 * factor, unloading=10 * factor)
+    parameters = Parameters(case=case, loading=increments // 3, unloading=2 * increments // 3)
     body = Punch(parameters)
     contact, total, platen, depth, force = body.contact, np.zeros(4), 0.0, 0.0, 0.0
     for displacement in programme(parameters):
@@ -66,9 +66,8 @@ def node_on_a_spring(case: str, steps: int, lag: float) -> np.ndarray:
 
         slip = brentq(beyond, 0, 1e6, xtol=1e-300, rtol=1e-15) if beyond(0) > 0 else 0.0
         force = trial / (1 + slip * q)
-        r = (np.array([[*-f, 1.0]]) for f in (before, force))
-        states = next(r), np.array([slipped]), next(r)
-        total += works(friction, *states, (trial - force)[None] / stiffness)
+        old, new = (np.array([[*-f, 1.0]]) for f in (before, force))
+        total += works(friction, old, np.array([slipped]), new, (trial - force)[None] / stiffness)
         slipped = slip > 0
     return total
 
@@ -80,23 +79,16 @@ def main(increments) -> None:
         for n in increments:
             total, platen, r = punch(case, n)
             change = np.nan if last is None else np.linalg.norm(r - last) / np.linalg.norm(r)
-            print(
-                case,
-                n,
-                "|",
-                *(f"{w:.2f}" for w in total),
-                f"| {platen:.2f} | {change:.1e}",
-                flush=True,
-            )
+            sums = " ".join(f"{work:.2f}" for work in total)
+            print(f"{case} {n} | {sums} | {platen:.2f} | {change:.1e}", flush=True)
             last = r
     print("case lag steps | error in % by", *RULES)
-    for case in CASES:
-        for lag in (0.01, 0.1, 0.5):
-            half, whole = (node_on_a_spring(case, n, lag)[0] for n in (5000, 10000))
-            limit = 2 * whole - half  # the error is of first order
-            for steps in (48, 96, 192, 384):
-                errors = 100 * (node_on_a_spring(case, steps, lag) / limit - 1)
-                print(case, lag, steps, "|", *(f"{e:+.2f}" for e in errors), flush=True)
+    for case, lag in product(CASES, (0.01, 0.1, 0.5)):
+        half, whole = (node_on_a_spring(case, n, lag)[0] for n in (5000, 10000))
+        limit = 2 * whole - half  # the error is of first order
+        for steps in (48, 96, 192, 384):
+            errors = 100 * (node_on_a_spring(case, steps, lag) / limit - 1)
+            print(case, lag, steps, "|", *(f"{e:+.2f}" for e in errors), flush=True)
 
 
 if __name__ == "__main__":
