@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 import resource
 import signal
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -88,31 +89,34 @@ def own_errors(said: str) -> list[float]:
     """
     value, errors = {}, []
     for line in said.splitlines():
-        if match := re.match(r" (time avg. forc|largest residual force|largest increment of disp|largest correction to disp)=\s*(\S+)", line):  # fmt: skip
-            value[match[1].split()[1]] = float(match[2])
+        if match := re.match(
+            r" (?:time |largest )(avg|residual|increment|correction).*=\s*(\S+)", line
+        ):
+            value[match[1]] = float(match[2])
         elif line.strip() == "convergence" and len(value) == 4:
-            errors.append(max(value["residual"] / value["avg."], value["correction"] / value["increment"]))  # fmt: skip
+            force = value["residual"] / value["avg"]
+            errors.append(max(force, value["correction"] / value["increment"]))
     return errors
 
 
-def solve(directory: Path, given: dict, kind: str, cap: int) -> tuple[np.ndarray, list, str, float]:
+def solve(given: dict, kind: str, cap: int) -> dict:
     """Run CalculiX for at most ``cap`` processor seconds.
 
     Returns:
-        Displacements, its own errors, what it said if it stopped early, and processor seconds.
+        Displacements ``u``, its ``own`` errors, what it ``said`` if it stopped early, and processor ``seconds``.
     """
-    write(directory / "punch.inp", given, kind)
-    before = ended()
-    done = run_alone(["ccx", "punch"], directory,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cap, cap)))  # fmt: skip
-    seconds = ended() - before
-    u, said = read(directory / "punch.dat", len(given["x"])), ""
-    if len(u) < len(given["programme"]):
+    with tempfile.TemporaryDirectory() as name:
+        directory, before, said = Path(name), ended(), ""
+        write(directory / "punch.inp", given, kind)
+        done = run_alone(["ccx", "punch"], directory,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cap, cap)))  # fmt: skip
+        seconds, u = ended() - before, read(directory / "punch.dat", len(given["x"]))
+    if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):
+        said = f"stopped after {cap} s"
+    elif len(u) < len(given["programme"]):
         errors = [line for line in (done.stdout + done.stderr).splitlines() if "*ERROR" in line]
         said = " ".join(errors[-2:]) or f"ended with {done.returncode}"
-        if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):
-            said = f"stopped after {cap} s"
-    return u, own_errors(done.stdout), said, seconds
+    return dict(u=u, own=own_errors(done.stdout), said=said, seconds=seconds)
 
 
 def ended() -> float:

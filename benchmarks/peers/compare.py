@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from pathlib import Path
 
 import numpy as np
 
@@ -32,48 +31,47 @@ CAPTION = (
 PYTHON = "/usr/bin/python3"  # Debian's, for which GetFEM and Siconos are packaged
 GETFEM = "GetFEM, basic contact brick"
 SETTINGS = {
-    "CalculiX, node to surface": f"C3D8, penalty {by_calculix.STIFF:g} E/mm, increments of its own",
-    "CalculiX, mortar": f"C3D8, hard, stick slope {by_calculix.STIFF:g} E/mm, increments of its own",
+    "CalculiX, node to surface": "C3D8, penalty 50 E/mm, increments of its own",
+    "CalculiX, mortar": "C3D8, hard, stick slope 50 E/mm, increments of its own",
     GETFEM: "nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, residual 1e-9",
 }
-COLUMNS = ("reaction", "seconds", "own", "converged")  # of answers to condensed problems
+# Peer, level of the mesh, increments, and how many of their steps.  The fine mesh: every one of three steps slips anew;
+# mortar takes minutes for the first one, GetFEM had not ended all after six.
+RUNS = dict(
+    full=[*((peer, 0, [5, 10], 15) for peer in SETTINGS),
+        ("CalculiX, node to surface", 1, [1, 2], 3), ("CalculiX, mortar", 1, [1, 2], 1)],
+    quick=[(peer, 0, [1, 2], 3) for peer in SETTINGS],
+    smallest=[("CalculiX, mortar", 0, [1, 2], 3)],
+)  # fmt: skip
 CAP = 600  # processor seconds of a peer for one programme
 
 
 def plan(size: str) -> list[Measurement]:
-    plans = []
-    for refine in [0, 1] if size == "full" else [0]:
-        # The fine mesh: pressed in one step and raised in two, every one of them with slip of its own.
-        increments = [5, 10] if size == "full" and not refine else [1, 2]
-        for peer in SETTINGS:
-            if refine and peer == GETFEM:
-                continue  # three steps had not ended after six minutes
-            settings = dict(
-                peer=peer, refine=refine, increments=increments, mesh=mesh_of(size),
-                steps=1 if refine and "mortar" in peer else sum(increments),  # minutes for the first one alone
-            )  # fmt: skip
-            plans.append(Measurement(f"peers/{peer} {refine}", "benchmarks.peers.compare:body", settings, late=refine > 0))  # fmt: skip
-    if size == "smallest":
-        return plans[1:2]
-    return [*plans, Measurement("peers/siconos", "benchmarks.peers.compare:siconos", {})]
+    home = "benchmarks.peers.compare"
+    plans = [
+        Measurement(
+            f"peers/{peer} {refine}", f"{home}:body", late=refine > 0,
+            settings=dict(peer=peer, refine=refine, increments=increments, mesh=mesh_of(size), steps=steps),
+        )
+        for peer, refine, increments, steps in RUNS[size]
+    ]  # fmt: skip
+    return plans + [Measurement("peers/siconos", f"{home}:siconos", {})] * (size != "smallest")
 
 
 def body(peer: str, refine: int, increments: list, mesh: dict, steps: int) -> dict:
     """The first steps of case A by a peer, judged, and by us."""
-    if peer == GETFEM and missing("getfem") or peer != GETFEM and shutil.which("ccx") is None:
-        return dict(absent=f"{peer.split(',')[0]} is not installed (apt install python3-getfem calculix-ccx)")  # fmt: skip
+    if missing("getfem") if peer == GETFEM else shutil.which("ccx") is None:
+        return dict(absent=f"{peer} is not installed (apt install python3-getfem calculix-ccx)")
     punch = case_a(refine, increments, mesh)
     given = told(punch)
     given["programme"] = given["programme"][:steps]
     if peer == GETFEM:
         found = by_system(by_getfem.__file__, dict(given, cap=CAP))
-        u, own, said = found["u"], found["own"].tolist(), str(found["said"])
-        seconds = float(found["seconds"].sum())
     else:
-        with tempfile.TemporaryDirectory() as directory:
-            u, own, said, seconds = by_calculix.solve(Path(directory), given, peer.split(", ")[1], CAP)  # fmt: skip
-    result = compared(punch, given, u, seconds, refine, increments, mesh)
-    return result | dict(peer=peer, setting=SETTINGS[peer], said=said, own=own)
+        found = by_calculix.solve(given, peer.split(", ")[1], CAP)
+    seconds, own = float(np.sum(found["seconds"])), np.array(found["own"]).tolist()
+    result = compared(punch, given, found["u"], seconds, refine, increments, mesh)
+    return result | dict(peer=peer, setting=SETTINGS[peer], said=str(found["said"]), own=own)
 
 
 def missing(module: str) -> bool:
@@ -94,9 +92,8 @@ def by_system(program: str, given: dict) -> dict:
 
 def case_a(refine: int, increments: list, mesh: dict, tol=1e-10) -> Punch:
     """Our punch."""
-    loading, unloading = increments
-    parameters = dict(refine=refine, loading=loading, unloading=unloading, tol=tol)
-    return Punch(Parameters(case="A", **parameters), **mesh)
+    given = dict(refine=refine, loading=increments[0], unloading=increments[1], tol=tol)
+    return Punch(Parameters(case="A", **given), **mesh)
 
 
 def told(punch: Punch) -> dict:
@@ -138,17 +135,18 @@ def compared(punch, given, u, seconds, refine, increments, mesh) -> dict:
         r = problem.body.internal_force(judge.answer)[punch.contact.points.dofs]
         forces.append((r[:, 2].sum(), np.linalg.norm(r[:, :2], axis=1).sum()))
     equal = float(np.clip(max(errors, default=1e-8), 1e-12, 0.1))
-    ours, exact = {}, []
-    for name, tol in (("at equal error", equal), ("at 1e-8", 1e-8), ("at equal error, again", equal)):  # fmt: skip
-        made, mine = timed(case_a, refine, increments, mesh, tol)
-        seconds_of, steps = timed(lambda mine=mine: [mine.press(top) for top in given["programme"]])
-        ours[name] = dict(seconds=made + seconds_of, mesh=made)
-        if tol == 1e-8:
-            exact = [(s["normal_reaction"], s["tangential_reaction_sum"]) for s in steps]
+
+    def ours(tol):
+        mine = case_a(refine, increments, mesh, tol)
+        seconds, steps = timed(lambda: [mine.press(top) for top in given["programme"]])
+        return seconds / len(steps), steps
+
+    first, (tight, steps), again = ours(equal), ours(1e-8), ours(equal)
+    exact = [(step["normal_reaction"], step["tangential_reaction_sum"]) for step in steps]
     difference = [np.abs(np.divide(a, b) - 1).tolist() for a, b in zip(forces, exact)]
     return dict(
-        refine=refine, unknowns=problem.body.size, steps=len(given["programme"]), done=len(u), seconds=seconds,
-        increments=increments, ours=ours, errors=errors, equal=equal, force_error=difference,
+        unknowns=problem.body.size, steps=len(steps), done=len(u), seconds=seconds, ours=(first[0] + again[0]) / 2,
+        ours_tight=tight, errors=errors, force_error=difference,
     )  # fmt: skip
 
 
@@ -160,22 +158,23 @@ def siconos() -> dict:
     if missing("siconos.numerics"):
         return dict(absent="Siconos is not installed (apt install python3-siconos)")
     rows, problems = [], condensed_problems()
-    answers = {"ours": by_newton(problems)}
-    answers["theirs"] = by_system(by_siconos.__file__, problems)
-    answers["ours again"] = by_newton(problems)
+    before, found = by_newton(problems), by_system(by_siconos.__file__, problems)
+    after = by_newton(problems)
     for case in CASES:
-        row, exact = dict(case=case, peer="Siconos NSN_AC"), problems[f"{case}r"]
-        for solver, of in answers.items():
-            reaction, seconds, own, converged = (of[case + name] for name in COLUMNS)
-            judged = [
-                judge.condensed(problems["W"], q, *problems[f"{case}law"], r, 1e-8).error
-                for q, r in zip(problems[f"{case}q"], reaction)
-            ]
-            row[solver] = dict(
-                seconds=seconds.tolist(), errors=judged, own=own.tolist(), converged=int(converged.sum()),
-                difference=float(np.abs(reaction - exact).max() / np.abs(exact).max()),
-            )  # fmt: skip
-        rows.append(row)
+        theirs, exact = found[f"{case}reaction"], problems[f"{case}r"]
+        done = found[f"{case}converged"]
+        seconds = float(np.median(found[f"{case}seconds"]))
+        mine = float(np.median(before[case] + after[case]))
+        judged = [
+            judge.condensed(problems["W"], q, *problems[f"{case}law"], r, 1e-8).error
+            for q, r in zip(problems[f"{case}q"], theirs)
+        ]
+        rows.append(dict(
+            peer="Siconos NSN_AC", case=case, setting="scaled W, q; start: the step before; tol 1e-10", unknowns=None,
+            seconds=seconds, ours=mine, ours_tight=mine, ratio=seconds / mine, done=f"{done.sum()} of {len(done)}",
+            said="", own=float(found[f"{case}own"].max()), error=max(judged),
+            force_error=float(np.abs(theirs - exact).max() / np.abs(exact).max()),
+        ))  # fmt: skip
     return dict(rows=rows)
 
 
@@ -195,50 +194,38 @@ def condensed_problems() -> dict:
 
 
 def by_newton(problems: dict) -> dict:
-    """All problems by CondensedNewton, each from the solution of the step before."""
+    """Seconds of all problems by CondensedNewton, each from the solution of the step before."""
     operator = _kernel.CondensedOperator(problems["W"], 3)
     operator.prepare()
-    solver, answers = dc.CondensedNewton(), {}
+    solver, seconds = dc.CondensedNewton(), {}
     for case in CASES:
-        q, r, friction = problems[f"{case}q"], problems[f"{case}r"], dc.Friction(*problems[f"{case}law"])  # fmt: skip
-        found = []
-        for k in range(len(q)):
-            seconds, answer = timed(solver.solve_condensed, operator, friction, q[k], problems["tol"], r[k - 1 : k])  # fmt: skip
-            found.append((answer.reaction, seconds, max(answer.error, answer.slip_error), True))
-        answers |= {case + name: np.array(column) for name, column in zip(COLUMNS, zip(*found))}
-    return answers
+        q, r = problems[f"{case}q"], problems[f"{case}r"]
+        law = dc.Friction(*problems[f"{case}law"])
+        seconds[case] = [
+            timed(solver.solve_condensed, operator, law, q[k], problems["tol"], r[k - 1 : k])[0]
+            for k in range(len(q))
+        ]
+    return seconds
 
 
 def evaluate(results: dict) -> dict:
     """One row a peer: seconds a step, ratio to ours at equal error, errors by our measure; who is absent."""
-    made = [result for result in results.values() if "absent" not in result]
-    rows = [row for result in made for row in map(_condensed_row, result.get("rows", []))]
-    rows += [_body_row(result) for result in made if "rows" not in result]
-    rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["peer"], row["case"]))
     absent = [result["absent"] for result in results.values() if "absent" in result]
+    rows = [row for result in results.values() for row in result.get("rows", [])]
+    rows += [_body_row(result) for result in results.values() if "errors" in result]
+    rows.sort(key=lambda row: (row["unknowns"] is None, row["unknowns"], row["peer"], row["case"]))
     return dict(rows=rows, absent=absent)
 
 
 def _body_row(result: dict) -> dict:
-    def ours(*names):
-        return float(np.mean([result["ours"][name]["seconds"] - result["ours"][name]["mesh"] for name in names])) / result["steps"]  # fmt: skip
-
-    per, mine = result["seconds"] / max(result["done"], 1), ours("at equal error", "at equal error, again")  # fmt: skip
-    return dict(
-        peer=result["peer"], case="A", setting=result["setting"], unknowns=result["unknowns"], seconds=per, ours=mine,
-        ours_tight=ours("at 1e-8"), ratio=per / mine if result["done"] == result["steps"] else None,
-        done=f"{result['done']} of {result['steps']}", said=result["said"], own=max(result["own"], default=None),
+    seconds, whole = result["seconds"] / max(result["done"], 1), result["done"] == result["steps"]
+    kept = {
+        key: result[key] for key in ("peer", "setting", "unknowns", "ours", "ours_tight", "said")
+    }
+    return kept | dict(
+        case="A", seconds=seconds, ratio=seconds / result["ours"] if whole else None,
+        done=f"{result['done']} of {result['steps']}", own=max(result["own"], default=None),
         error=max(result["errors"], default=None), force_error=max(map(max, result["force_error"]), default=None),
-    )  # fmt: skip
-
-
-def _condensed_row(row: dict) -> dict:
-    theirs = row["theirs"]
-    per, mine = (float(np.median(of)) for of in (theirs["seconds"], row["ours"]["seconds"] + row["ours again"]["seconds"]))  # fmt: skip
-    return dict(
-        peer=row["peer"], case=row["case"], setting="scaled W, q; start: the step before; tol 1e-10", unknowns=None,
-        seconds=per, ours=mine, ours_tight=mine, ratio=per / mine, done=f"{theirs['converged']} of {len(theirs['seconds'])}",
-        said="", own=max(theirs["own"]), error=max(theirs["errors"]), force_error=theirs["difference"],
     )  # fmt: skip
 
 
