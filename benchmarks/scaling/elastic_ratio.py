@@ -14,14 +14,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from benchmarks.measurement import commit, now, timed
+from benchmarks.measurement import Memory, commit, now, timed
 from benchmarks.tables import table
 from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
 from studies.punch import CASES, Parameters, Punch, programme
@@ -32,7 +32,6 @@ TITLES = [
     "seconds: first step, with set-up", "first unloading", "worst other", "mean, with set-up", "bytes per unknown",
 ]  # fmt: skip
 UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycle
-KEPT = ("open", "stick", "slip", "error", "iterations", "tangential_reaction_sum")  # of a step
 
 
 def elastic_solve(punch, displacement: float, repeat: int) -> dict:
@@ -54,43 +53,42 @@ def slowest(seconds: float) -> float:
     return COMM.allreduce(seconds, op=MPI.MAX)
 
 
-def peak_memory() -> int:
-    """Bytes, all ranks."""
-    return COMM.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-
-
 def step_to(punch, displacement: float) -> dict:
-    """What is kept of a step; of one that did not converge, what it said."""
+    """What a record has of a step; of one that was refused, what it said."""
+    punch.approach.value = -displacement
     try:
-        step = punch.press(displacement)
-    except dc.NotConverged as failure:
-        return dict(failed=str(failure), iterations=failure.step.iterations)
-    return {key: step[key] for key in KEPT}
+        step = punch.problem.solve()
+    except (dc.NotConverged, MemoryError) as failure:
+        iterations = failure.step.iterations if isinstance(failure, dc.NotConverged) else 0
+        return dict(failed=f"{type(failure).__name__}: {failure}", iterations=iterations)
+    counts = {key: int(count) for key, count in step.counts._asdict().items()}
+    return counts | dict(error=step.error, iterations=step.iterations, solver=step.solver)
 
 
-def measure(case: str, refine: int, options, kept) -> dict:
-    """Ratios of one run; ``kept(record)`` is called after every step, so that a run that is killed leaves them."""
-    before, mesh = peak_memory(), dict(divisions=options.divisions, layers=options.divisions // 2)
-    parameters = Parameters(case=case, refine=refine, lowest=options.lowest)
-    punch = Punch(parameters, solver=dc.FixedPoint(), **mesh)
-    punch.problem.body.options = MULTIGRID
-    displacements = (into_the_air() if options.air else programme(parameters))[: options.steps]
-    elastic = [elastic_solve(punch, displacements[0], options.repeat)]
+def measured(punch, displacements, repeat=1, memory=None, kept=lambda record: None) -> dict:
+    """Steps of the punch, and elastic solves before and after them.
+
+    Args:
+        repeat: How many elastic solves, each time.
+        memory: Since when it counts; None: since the elastic solves, after which the first step assembles anew.
+        kept: Called after every step with the record, so that a run that is killed leaves it.
+    """
+    elastic = [elastic_solve(punch, displacements[0], repeat)]
     record = dict(
-        case=case, unknowns=punch.head()["unknowns"], ranks=COMM.size, commit=commit(), date=now(), load=os.getloadavg()[0],
-        elastic=elastic, steps=[], lowest=options.lowest,
+        case=punch.parameters.case, unknowns=punch.head()["unknowns"], ranks=COMM.size, commit=commit(), date=now(),
+        load=os.getloadavg()[0], elastic=elastic, steps=[], lowest=punch.parameters.lowest,
     )  # fmt: skip
+    if memory is None:
+        punch.problem.body.forget()
+        memory = Memory()
     for displacement in displacements:
         seconds, step = timed(step_to, punch, displacement)
         record["steps"].append(step | dict(seconds=slowest(seconds)))
-        record["bytes_per_unknown"] = (peak_memory() - before) / record["unknowns"]
+        record["bytes_per_unknown"] = COMM.allreduce(memory.added()) / record["unknowns"]
         kept(record)
-        if COMM.rank == 0:
-            print(f"case {case}, {record['unknowns']} unknowns, {displacement:.4f} mm: {record['steps'][-1]}", flush=True)  # fmt: skip
         if "failed" in step:
             break
-    elastic.append(elastic_solve(punch, displacements[0], options.repeat))
-    kept(record)
+    elastic.append(elastic_solve(punch, displacements[0], repeat))
     return record
 
 
@@ -144,18 +142,29 @@ def main(argv=None) -> None:
     CASES["frictionless"] = dict(mu=0.0)
 
     def kept(record):
-        if options.json and COMM.rank == 0:
-            keep(options.json, record)
+        if COMM.rank == 0:
+            print(
+                f"case {record['case']}, {record['unknowns']} unknowns: {record['steps'][-1]}",
+                flush=True,
+            )
+            if options.json:
+                keep(options.json, record)
 
-    results = [
-        measure(case, refine, options, kept)
-        for refine in options.refine
-        for case in options.cases.split(",")
-    ]
-    if options.json:
-        results = json.loads(options.json.read_text())
+    results, mesh = [], dict(divisions=options.divisions, layers=options.divisions // 2)
+    for refine, case in product(options.refine, options.cases.split(",")):
+        memory, parameters = Memory(), Parameters(case=case, refine=refine, lowest=options.lowest)
+        punch = Punch(parameters, solver=dc.FixedPoint(), **mesh)
+        punch.problem.body.options = MULTIGRID
+        displacements = (into_the_air() if options.air else programme(parameters))[: options.steps]
+        results.append(measured(punch, displacements, options.repeat, memory, kept))
+        if options.json and COMM.rank == 0:
+            keep(options.json, results[-1])
     if COMM.rank == 0:
-        print(table(TITLES, map(row, results)))
+        print(
+            table(
+                TITLES, map(row, json.loads(options.json.read_text()) if options.json else results)
+            )
+        )
 
 
 if __name__ == "__main__":

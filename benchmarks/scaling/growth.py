@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-import dolfinx_contact as dc
-from benchmarks.measurement import SOLVERS, Measurement, Memory, timed
+from benchmarks.measurement import SOLVERS, Measurement, timed
 from benchmarks.report.drawing import legend, logarithmic, panels, style
-from benchmarks.scaling.elastic_ratio import elastic_solve
+from benchmarks.scaling.elastic_ratio import measured, step_to
 from benchmarks.tables import chosen
 from mechanics.convergence import exponent
 from studies.punch import Parameters, Punch, programme
@@ -42,31 +41,16 @@ def steps(name: str, divisions: int, layers: int) -> dict:
     """
     parameters = Parameters(case="C", loading=1, tol=1e-8)
     punch = Punch(parameters, solver=ALL[name](), divisions=divisions, layers=layers)
-    problem, body, displacements = punch.problem, punch.problem.body, programme(parameters)[:3]
-    elastic = elastic_solve(punch, parameters.depth, 1)["seconds"]
-    body.forget()  # the first step assembles for itself
-    memory = Memory()
-    seconds, iterations, said, taken = [], [], "", ""
-    for displacement in displacements:
-        punch.approach.value = -displacement
-        try:
-            spent, step = timed(problem.solve)
-        except (dc.NotConverged, MemoryError) as failure:
-            said = f"{type(failure).__name__}: {str(failure)[:150]}"
-            break
-        seconds.append(spent)
-        iterations.append(step.iterations)
-        taken = step.solver
-    added = memory.added()
-    elastic += elastic_solve(punch, parameters.depth, 1)["seconds"]
-    again = float("nan")
+    displacements = programme(parameters)[:3]
+    record = measured(punch, displacements)
+    steps, said, again = record["steps"], record["steps"][-1].get("failed", ""), float("nan")
     if not said:  # the first step once more, to know its set-up
-        problem.reset()
-        punch.approach.value = -displacements[0]
-        again, _ = timed(problem.solve)
+        punch.problem.reset()
+        again, _ = timed(step_to, punch, displacements[0])
     return dict(
-        unknowns=body.size, nodes=len(punch.contact.nodes), seconds=seconds, first_again=again,
-        iterations=iterations, bytes=added, elastic=elastic, said=said, chosen=taken,
+        unknowns=record["unknowns"], nodes=len(punch.contact.nodes), seconds=[step["seconds"] for step in steps],
+        iterations=[step["iterations"] for step in steps], first_again=again, said=said, chosen=steps[0].get("solver"),
+        elastic=[of["seconds"][0] for of in record["elastic"]], bytes=record["bytes_per_unknown"] * record["unknowns"],
     )  # fmt: skip
 
 
