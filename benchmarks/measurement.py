@@ -62,9 +62,8 @@ def compute(measurement: Measurement, directory: Path) -> dict:
     A process that fails or is killed leaves a record with what it said under ``failed``; it is tried again
     in the next run.
     """
-    settings, load = measurement.settings, [os.getloadavg()[0]]
+    settings, load, start = measurement.settings, [os.getloadavg()[0]], perf_counter()
     record = dict(settings=settings, commit=commit(), date=now(), load=load)
-    start = perf_counter()
     with tempfile.NamedTemporaryFile("r") as answer:
         command = [sys.executable, "-m", "benchmarks.measurement", measurement.function]
         command += [json.dumps(settings), answer.name]
@@ -119,16 +118,13 @@ def run_alone(command: list, cwd: Path = ROOT, **options) -> subprocess.Complete
 # -- what a measurement ran on -----------------------------------------------------------------------
 
 
-def says(*command) -> str:
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
-
-
 @functools.cache
 def commit() -> str:
     """The last commit that changed the library, which is what is measured; a + marks changes beyond it."""
+    asked = ["log", "-1", "--format=%h"], ["status", "--porcelain"]
     library = "--", "dolfinx_contact", "cpp"
-    found = says("git", "log", "-1", "--format=%h", *library)
-    return found + "+" * bool(says("git", "status", "--porcelain", *library)) or "unknown"
+    found, changed = (run_alone(["git", *what, *library]).stdout.strip() for what in asked)
+    return found + "+" * bool(changed) or "unknown"
 
 
 def now() -> str:
@@ -143,7 +139,7 @@ def machine() -> dict:
         cores=os.cpu_count(),
         memory_gb=round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
         system=platform.platform(),
-        compiler=says(os.environ.get("CXX", "c++"), "--version").partition("\n")[0],
+        compiler=run_alone([os.environ.get("CXX", "c++"), "--version"]).stdout.partition("\n")[0],
         python=platform.python_version(),
         numpy=np.__version__,
         dolfinx=dolfinx,
@@ -175,20 +171,12 @@ def timed(work, *arguments) -> tuple:
     return process_time() - start, found
 
 
-class Memory:
-    """Peak of resident memory of this process since the object was made, beyond what it had then."""
-
-    def __init__(self):
-        Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
-        self.before = self._status("VmRSS")
-
-    def added(self) -> int:
-        """Bytes."""
-        return self._status("VmHWM") - self.before
-
-    @staticmethod
-    def _status(name: str) -> int:
-        return 1024 * int(re.search(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text())[1])
+def peak_memory(anew: bool = False) -> int:
+    """Bytes of resident memory at most, since the last call with ``anew``."""
+    if anew:
+        Path("/proc/self/clear_refs").write_text("5")
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(re.search(r"VmHWM:\s+(\d+)", status)[1])
 
 
 EVENTS = dict(

@@ -11,6 +11,7 @@ does the step from the same history, which is Newton's; solution 0 is the one th
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 
 import numpy as np
@@ -40,30 +41,26 @@ def random_start(rng, r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 
 def solutions(W, q, friction, first, starts: int, seed: int) -> list[list]:
     """``[reactions, how many starts led to them, judged errors]`` of each solution, the first one first."""
-    rng, newton = np.random.default_rng(seed), dc.CondensedNewton(fallbacks=False)
-    found = [[first, 0, errors(W, q, friction, first)]]
+    rng, newton, found = np.random.default_rng(seed), dc.CondensedNewton(fallbacks=False), []
+    number(found, first, W, q, friction)
     for _ in range(starts):
         start = random_start(rng, first, friction.mu)
-        try:
+        with contextlib.suppress(dc.CondensedNotConverged):
             r = dc.solve_condensed(W, q, friction, newton, TOL, r0=start).reaction
-        except dc.CondensedNotConverged:
-            continue
-        found[number(found, r, W, q, friction)][1] += 1
+            found[number(found, r, W, q, friction)][1] += 1
     return found
 
 
-def errors(W, q, friction, r) -> tuple[float, float]:
-    """Of the law and of slips, over the reactions, by the judge of the tests."""
-    return judge.condensed(W, q, friction.mu, friction.p, r, TOL).errors
-
-
 def number(found, r, W, q, friction) -> int:
-    """Which of the solutions found ``r`` is; a new one is judged and added."""
+    """Which of the solutions found ``r`` is; a new one is judged, of law and slips over the reactions, and added."""
     apart = [np.abs(r - known).max() / np.abs(r).max() for known, *_ in found]
-    if min(apart) <= APART:
+    if min(apart, default=np.inf) <= APART:
         return int(np.argmin(apart))
-    found.append([r.copy(), 0, errors(W, q, friction, r)])
+    found.append([r.copy(), 0, judge.condensed(W, q, friction.mu, friction.p, r, TOL).errors])
     return len(found) - 1
+
+
+TITLES = "hits open stick error normal tangential work reactions_apart slips_apart".split()
 
 
 def described(found, W, q, friction) -> str:
@@ -73,24 +70,12 @@ def described(found, W, q, friction) -> str:
     lines = []
     for (r, hits, errors), slip in zip(found, slips):
         inside = np.linalg.norm(r[:, :2] / friction.mu, axis=1) < (1 - 1e-9) * r[:, 2]
-        apart = (
-            np.abs(of - own).max() / np.abs(of).max() for of, own in ((reactions, r), (slips, slip))
-        )
         sums = r[:, 2].sum(), np.linalg.norm(r[:, :2], axis=1).sum(), -(r[:, :2] * slip).sum()
+        pairs = (reactions, r), (slips, slip)
+        apart = (np.abs(every - own).max() / np.abs(every).max() for every, own in pairs)
         numbers = (f"{value:.6g}" for value in (max(errors), *sums, *apart))
         lines.append([hits, (r[:, 2] == 0).sum(), inside.sum(), *numbers])
-    titles = (
-        "hits",
-        "open",
-        "stick",
-        "error",
-        "normal",
-        "tangential",
-        "work",
-        "reactions apart",
-        "slips apart",
-    )
-    return table(titles, lines)
+    return table(TITLES, lines)
 
 
 def examine(make, programme: list, starts: list[int]) -> None:
@@ -113,22 +98,19 @@ def examine(make, programme: list, starts: list[int]) -> None:
             w = np.column_stack((contact.slip_increment, contact.gap))
             q = w - (W @ contact.reaction.ravel()).reshape(w.shape)
             condensed = W, q, contact.friction
-            found, by = solutions(*condensed, contact.reaction.copy(), count, seed=k), {}
+            found, by = solutions(*condensed, contact.reaction, count, seed=k), {}
             by_newton = len(found)
             for name, (problem, move_other) in others.items():
                 problem.load(checkpoint.name)
                 move_other(top)
                 try:
                     step = problem.solve()
-                    by[name] = (
-                        f"{number(found, problem.contacts[0].reaction, *condensed)} in {step.iterations}"
-                    )
+                    which = number(found, problem.contacts[0].reaction, *condensed)
+                    by[name] = f"{which} in {step.iterations}"
                 except dc.NotConverged as failure:
                     by[name] = str(failure)
-        print(
-            f"{k + 1:3} {top}: {len(found)} solution(s), {by_newton} of them from {count} starts; {by}"
-        )
-        print(described(found, *condensed), flush=True)
+        said = f"{len(found)} solution(s), {by_newton} of them from {count} starts; {by}"
+        print(f"{k + 1:3} {top}: {said}\n{described(found, *condensed)}", flush=True)
 
 
 def punch(solver):

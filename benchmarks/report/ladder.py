@@ -13,7 +13,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
-from benchmarks.measurement import Measurement, Memory, counts, mesh_of, spread, timed
+from benchmarks.measurement import Measurement, counts, mesh_of, peak_memory, spread, timed
 from benchmarks.report.drawing import OURS, bars
 from benchmarks.tables import chosen
 from studies.punch import CASES, Parameters, Punch, programme
@@ -74,7 +74,7 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
             history.record(step)
         return step.iterations, step.solver
 
-    seconds, iterations, memory = [], [], Memory()
+    seconds, iterations, before = [], [], peak_memory(anew=True)
     PETSc.Log.begin()
     for k, displacement in enumerate(programme(punch.parameters)[:steps]):
         punch.approach.value, scale.value = -displacement, 1.0 + 1e-3 * k
@@ -86,7 +86,7 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     rows = len(contact.nodes) * (1 if contact.friction.frictionless else 3)
     return dict(
         kind=kind, unknowns=problem.body.size, condensed=rows if solver.startswith("Condensed") else 0,
-        counts={key: value - first[key] for key, value in counts().items()}, bytes=memory.added(),
+        counts={key: value - first[key] for key, value in counts().items()}, bytes=peak_memory() - before,
         seconds=seconds, iterations=iterations, solver=solver,
     )  # fmt: skip
 

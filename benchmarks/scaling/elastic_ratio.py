@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 
 import dolfinx_contact as dc
-from benchmarks.measurement import Memory, commit, now, timed
+from benchmarks.measurement import commit, now, peak_memory, timed
 from benchmarks.tables import table
 from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
 from studies.punch import CASES, Parameters, Punch, programme
@@ -65,12 +65,12 @@ def step_to(punch, displacement: float) -> dict:
     return counts | dict(error=step.error, iterations=step.iterations, solver=step.solver)
 
 
-def measured(punch, displacements, repeat=1, memory=None, kept=lambda record: None) -> dict:
+def measured(punch, displacements, repeat=1, before=None, kept=lambda record: None) -> dict:
     """Steps of the punch, and elastic solves before and after them.
 
     Args:
         repeat: How many elastic solves, each time.
-        memory: Since when it counts; None: since the elastic solves, after which the first step assembles anew.
+        before: Bytes that do not count; None: all until the elastic solves, after which the first step assembles anew.
         kept: Called after every step with the record, so that a run that is killed leaves it.
     """
     elastic = [elastic_solve(punch, displacements[0], repeat)]
@@ -78,17 +78,18 @@ def measured(punch, displacements, repeat=1, memory=None, kept=lambda record: No
         case=punch.parameters.case, unknowns=punch.head()["unknowns"], ranks=COMM.size, commit=commit(), date=now(),
         load=os.getloadavg()[0], elastic=elastic, steps=[], lowest=punch.parameters.lowest,
     )  # fmt: skip
-    if memory is None:
+    if before is None:
         punch.problem.body.forget()
-        memory = Memory()
+        before = peak_memory(anew=True)
     for displacement in displacements:
         seconds, step = timed(step_to, punch, displacement)
         record["steps"].append(step | dict(seconds=slowest(seconds)))
-        record["bytes_per_unknown"] = COMM.allreduce(memory.added()) / record["unknowns"]
+        record["bytes_per_unknown"] = COMM.allreduce(peak_memory() - before) / record["unknowns"]
         kept(record)
         if "failed" in step:
             break
     elastic.append(elastic_solve(punch, displacements[0], repeat))
+    kept(record)
     return record
 
 
@@ -112,13 +113,14 @@ def keep(file: Path, record: dict) -> None:
 
 def row(record: dict) -> list[str]:
     """Iterations and seconds over those of the elastic solve; means are over a whole cycle, or left out."""
-    iterations = record["elastic"][0]["iterations"]
-    solve = float(np.median([t for run in record["elastic"] for t in run["seconds"]]))
-    cycles = np.array([step["iterations"] for step in record["steps"]]) / iterations
-    times = np.array([step["seconds"] for step in record["steps"]]) / solve
+    elastic, steps = record["elastic"], record["steps"]
+    iterations = elastic[0]["iterations"]
+    solve = float(np.median([seconds for run in elastic for seconds in run["seconds"]]))
+    cycles = np.array([step["iterations"] for step in steps]) / iterations
+    times = np.array([step["seconds"] for step in steps]) / solve
     turn = [f"{x[UNLOADING]:.2f}" if len(x) > UNLOADING else "–" for x in (cycles, times)]
     mean = [f"{x.mean():.2f}" if len(x) == CYCLE else "–" for x in (cycles, times)]
-    failed = " not converged" * ("failed" in record["steps"][-1])
+    failed = " not converged" * ("failed" in steps[-1])
     return [
         f"{record['unknowns']:,}", record["ranks"], f"{iterations}, {solve:.2g}",
         record["case"] + ", flat elements" * bool(record.get("lowest")),
@@ -144,27 +146,23 @@ def main(argv=None) -> None:
     def kept(record):
         if COMM.rank == 0:
             print(
-                f"case {record['case']}, {record['unknowns']} unknowns: {record['steps'][-1]}",
-                flush=True,
+                record["case"], f"{record['unknowns']} unknowns:", record["steps"][-1], flush=True
             )
             if options.json:
                 keep(options.json, record)
 
     results, mesh = [], dict(divisions=options.divisions, layers=options.divisions // 2)
     for refine, case in product(options.refine, options.cases.split(",")):
-        memory, parameters = Memory(), Parameters(case=case, refine=refine, lowest=options.lowest)
+        before = peak_memory()
+        parameters = Parameters(case=case, refine=refine, lowest=options.lowest)
         punch = Punch(parameters, solver=dc.FixedPoint(), **mesh)
         punch.problem.body.options = MULTIGRID
         displacements = (into_the_air() if options.air else programme(parameters))[: options.steps]
-        results.append(measured(punch, displacements, options.repeat, memory, kept))
-        if options.json and COMM.rank == 0:
-            keep(options.json, results[-1])
+        results.append(measured(punch, displacements, options.repeat, before, kept))
+    if options.json:
+        results = json.loads(options.json.read_text())
     if COMM.rank == 0:
-        print(
-            table(
-                TITLES, map(row, json.loads(options.json.read_text()) if options.json else results)
-            )
-        )
+        print(table(TITLES, map(row, results)))
 
 
 if __name__ == "__main__":
