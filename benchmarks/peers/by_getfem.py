@@ -16,45 +16,45 @@ import numpy as np
 
 def punch(getfem, given):
     """The model, what it refers to and must be kept, and the first degree of freedom of each of our nodes."""
-    x, cells, top = (given[name] for name in ("x", "cells", "top"))
-    young, poisson = float(given["young"]), float(given["poisson"])
+    x, cells, top, young, poisson = (given[k] for k in ("x", "cells", "top", "young", "poisson"))
     mesh = getfem.Mesh("empty", 3)
     mesh.add_convex(getfem.GeoTrans("GT_QK(3,1)"), np.transpose(x[cells], (2, 1, 0)))
     mfu = getfem.MeshFem(mesh, 3)
     mfu.set_fem(getfem.Fem("FEM_QK(3,1)"))
     line = "IM_GAUSS1D(3)"  # 2 x 2 x 2 points
     mim = getfem.MeshIm(mesh, getfem.Integ(f"IM_PRODUCT(IM_PRODUCT({line},{line}),{line})"))
-    places = mfu.basic_dof_nodes()[:, ::3].T
-    dof_of = {tuple(np.round(p, 9)): 3 * k for k, p in enumerate(places)}
-    first = np.array([dof_of[tuple(np.round(p, 9))] for p in x])
+    dofs = {tuple(p): 3 * k for k, p in enumerate(mfu.basic_dof_nodes()[:, ::3].T.round(9))}
+    first = np.array([dofs[tuple(p)] for p in x.round(9)])
     held = set(map(int, mesh.pid_from_coords(x[top].T).ravel()))
     mesh.set_region(1, mesh.faces_from_pid(sorted(held)))
     model = getfem.Model("real")
     model.add_fem_variable("u", mfu)
-    model.add_initialized_data("lame", [young * poisson / ((1 + poisson) * (1 - 2 * poisson))])
-    model.add_initialized_data("shear", [young / (2 * (1 + poisson))])
+    given_data = dict(
+        lame=young * poisson / ((1 + poisson) * (1 - 2 * poisson)), shear=young / (2 * (1 + poisson)),
+        # As the manual advises: of the order of Young's modulus times a length, here of a cell.
+        r=young * given["cell"], mu=given["mu"], gamma=1.0,
+    )  # fmt: skip
+    for name, value in given_data.items():
+        model.add_initialized_data(name, [float(value)])
     model.add_isotropic_linearized_elasticity_brick(mim, "u", "lame", "shear")
     model.add_initialized_data("down", [0.0, 0.0, 0.0])
     model.add_Dirichlet_condition_with_multipliers(mim, "u", mfu, 1, "down")
+    add_contact(getfem, model, first[given["contact"]], mfu.nbdof())
     return model, (mesh, mfu, mim), first
 
 
-def add_contact(getfem, model, given, size, first) -> None:
-    """The contact brick on the rows of the contact nodes."""
-    n = len(given["contact"])
+def add_contact(getfem, model, first, size) -> None:
+    """The contact brick on the rows of the contact nodes, by their first degrees of freedom."""
+    n = len(first)
     normal, tangent = getfem.Spmat("empty", n, size), getfem.Spmat("empty", 2 * n, size)
-    for k, node in enumerate(given["contact"]):
-        normal.add(k, first[node] + 2, -1.0)
-        tangent.add(2 * k, first[node], 1.0)
-        tangent.add(2 * k + 1, first[node] + 1, 1.0)
+    for k, dof in enumerate(map(int, first)):
+        normal.add(k, dof + 2, -1.0)
+        tangent.add(2 * k, dof, 1.0)
+        tangent.add(2 * k + 1, dof + 1, 1.0)
     model.add_variable("pressure", n)
     model.add_variable("friction", 2 * n)
-    # As the manual advises: of the order of Young's modulus times a length, here of a cell.
-    model.add_initialized_data("r", [float(given["young"]) * float(given["cell"])])
-    model.add_initialized_data("mu", [float(given["mu"])])
     model.add_initialized_data("gap", np.zeros(n))
     model.add_initialized_data("alpha", np.ones(n))
-    model.add_initialized_data("gamma", [1.0])
     model.add_initialized_data("before", np.zeros(size))
     model.add_basic_contact_brick("u", "pressure", "friction", "r", normal, tangent, "mu", "gap", "alpha", 1,
         "gamma", "before")  # fmt: skip
@@ -65,9 +65,7 @@ def main(mesh_file, found_file):
 
     given = np.load(mesh_file)
     start = process_time()
-    model, kept, first = punch(getfem, given)
-    size = kept[1].nbdof()
-    add_contact(getfem, model, given, size, first)
+    model, _kept, first = punch(getfem, given)
     seconds, found, own, said = [process_time() - start], [], [], ""
     for displacement in given["programme"]:
         start = process_time()

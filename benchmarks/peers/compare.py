@@ -16,7 +16,7 @@ import numpy as np
 import dolfinx_contact as dc
 from benchmarks.measurement import Measurement, mesh_of, run_alone, timed
 from benchmarks.peers import by_calculix, by_getfem, by_siconos
-from benchmarks.report.drawing import OURS, THEIRS, bars
+from benchmarks.report.drawing import OURS, THEIRS, bars, column
 from benchmarks.tables import chosen
 from dolfinx_contact import _kernel
 from dolfinx_contact.solvers.base import SolverResult
@@ -237,7 +237,7 @@ def figure(data):
         (left, -0.2, "seconds", THEIRS, "the peer, its error by our measure"), (left, 0.2, "ours", OURS, "we, at equal error"),
         (right, -0.2, "error", THEIRS, "_"), (right, 0.2, "own", "#999999", "as the peer reports its error"),
     ):  # fmt: skip
-        values = [max(row[key] or np.nan, 1e-16) for row in rows]
+        values = np.maximum(column(rows, key), 1e-16)
         ax.barh(np.arange(len(rows)) + shift, values, height=0.38, color=colour, label=label)
     left.set(xlabel="processor seconds a step")
     right.set(xlabel="largest error of the peer", xlim=(1e-16, 10))

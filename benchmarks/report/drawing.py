@@ -38,6 +38,11 @@ def legend(figure, ax, columns: int = 3) -> None:
     figure.legend(*handles, loc="outside upper center", frameon=False, ncols=columns)
 
 
+def column(rows: list[dict], key: str, scale: float = 1.0) -> np.ndarray:
+    """What the rows have under a key; nan, which is not drawn, for nothing."""
+    return np.array([scale * (row.get(key) or np.nan) for row in rows])
+
+
 def logarithmic(ax) -> None:
     """Both scales, if there is anything to draw."""
     if any((np.asarray(line.get_ydata(), dtype=float) > 0).any() for line in ax.lines):

@@ -118,10 +118,12 @@ def evaluate(results: dict) -> dict:
 def figure(data):
     rows = data["rows"]
     figure, axes = bars([row["rung"] for row in rows], 3)
-    for ax, title, values in zip(
-        axes, ("one step [ms]", "first step with set-up [ms]", "memory beyond mesh and forms [MB]"),
-        zip(*((1e3 * row["step"]["median"], 1e3 * row["set_up"]["median"], 1e-6 * row["bytes"]) for row in rows)),
-    ):  # fmt: skip
+    shown = {
+        "one step [ms]": [1e3 * row["step"]["median"] for row in rows],
+        "first step with set-up [ms]": [1e3 * row["set_up"]["median"] for row in rows],
+        "memory beyond mesh and forms [MB]": [1e-6 * row["bytes"] for row in rows],
+    }
+    for ax, (title, values) in zip(axes, shown.items()):
         values = np.maximum(values, 1e-3)
         ax.bar_label(ax.barh(range(len(rows)), values, color=OURS, height=0.65), fmt="%.3g", padding=3)  # fmt: skip
         ax.set(xlabel=title, xlim=(0.4 * min(values), 4 * max(values)))

@@ -93,21 +93,14 @@ def measured(punch, displacements, repeat=1, before=None, kept=lambda record: No
     return record
 
 
-def into_the_air() -> list[float]:
-    """Pressed, raised nearly to where contact ends, into the air, pressed again, and the first step up."""
-    steps = programme(Parameters(cycles=2, unload_to=0.002))
-    return steps[:15] + [-0.01] + steps[15:21]
-
-
 def keep(file: Path, record: dict) -> None:
     """Write a record to the file, a line each, in place of the one of the same case, mesh and ranks."""
 
-    def which(of):
-        return of["ranks"], of["unknowns"], of["case"], of.get("lowest") or 0.0
-
-    records = {which(of): of for of in (json.loads(file.read_text()) if file.exists() else [])}
-    records[which(record)] = record
-    lines = (json.dumps(records[key], separators=(",", ":")) for key in sorted(records))
+    records = [*(json.loads(file.read_text()) if file.exists() else []), record]
+    kept = {
+        (of["ranks"], of["unknowns"], of["case"], of.get("lowest") or 0.0): of for of in records
+    }
+    lines = (json.dumps(kept[key], separators=(",", ":")) for key in sorted(kept))
     file.write_text("[" + ",\n".join(lines) + "]\n")
 
 
@@ -135,7 +128,6 @@ def main(argv=None) -> None:
     add("--cases", default="A,B,C,frictionless")
     add("--refine", type=int, nargs="*", default=[0, 1])
     add("--steps", type=int, help="only the first ones")
-    add("--air", action="store_true", help="the contact opens and closes again; into a file of its own")  # fmt: skip
     add("--repeat", type=int, default=3, help="elastic solves, before and after the steps")
     add("--json", type=Path, help="where records go, each in place of its predecessor; the table is of all in it")  # fmt: skip
     add("--divisions", type=int, default=8, help="of a block's side; half as many layers")
@@ -157,8 +149,8 @@ def main(argv=None) -> None:
         parameters = Parameters(case=case, refine=refine, lowest=options.lowest)
         punch = Punch(parameters, solver=dc.FixedPoint(), **mesh)
         punch.problem.body.options = MULTIGRID
-        displacements = (into_the_air() if options.air else programme(parameters))[: options.steps]
-        results.append(measured(punch, displacements, options.repeat, before, kept))
+        steps = programme(parameters)[: options.steps]
+        results.append(measured(punch, steps, options.repeat, before, kept))
     if options.json:
         results = json.loads(options.json.read_text())
     if COMM.rank == 0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.measurement import SOLVERS, Measurement, timed
-from benchmarks.report.drawing import legend, logarithmic, panels, style
+from benchmarks.report.drawing import column, legend, logarithmic, panels, style
 from benchmarks.scaling.elastic_ratio import measured, step_to
 from benchmarks.tables import chosen
 from mechanics.convergence import exponent
@@ -95,10 +95,8 @@ def figure(data):
     titles = "processor seconds a step", "iterations a step", "memory beyond mesh and forms [MB]"
     for ax, key, title, unit in zip(axes, ("step", "iterations", "bytes"), titles, (1, 1, 1e-6)):
         for solver in dict.fromkeys(row["solver"] for row in data["rows"]):
-            # Seconds alone were measured of an elastic solve; the smallest bodies take no memory that was not there.
-            of = [row for row in data["rows"] if row["solver"] == solver and row.get(key)]
-            if of or key == "step":
-                ax.plot([row["unknowns"] for row in of], [unit * row[key] for row in of], **style(solver))  # fmt: skip
+            of = [row for row in data["rows"] if row["solver"] == solver]
+            ax.plot(column(of, "unknowns"), column(of, key, unit), **style(solver))
         logarithmic(ax)
         ax.set(xlabel="unknowns", ylabel=title)
     legend(figure, axes[0])
