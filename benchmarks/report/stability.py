@@ -49,19 +49,21 @@ def read(file: str, written: float) -> dict:
 def run(solver: str, every: int) -> dict:
     """Every n-th scene with one solver, without the longest programme."""
     some = [scene for scene in scenes()[::every] if scene.programme != "1000 tiny steps"]
-    return answers(some, solver)
+    return dict(records=answers(some, solver), whole=False)
 
 
 def refused() -> dict:
     """Singular stiffness: a spring without stiffness holds nothing; each law has to be refused."""
-    bodies = {f"held by nothing {law}": dict(spring=0.0, **LAWS[law]) for law in LAWS}
-    return answers([Scene(SINGULAR, name, "one step", body) for name, body in bodies.items()], "default")  # fmt: skip
+    some = [
+        Scene(SINGULAR, f"held by nothing {law}", "one step", dict(spring=0.0, **friction))
+        for law, friction in LAWS.items()
+    ]
+    return dict(records=answers(some, "default"), whole=False)
 
 
-def answers(some: list[Scene], solver: str) -> dict:
-    make = stress.SOLVERS[solver]
-    records = [dict(stress.run(scene, make()), solver=solver) for scene, _ in stress.pairs(some, [solver])]  # fmt: skip
-    return dict(records=list(map(short, records)), whole=False)
+def answers(some: list[Scene], solver: str) -> list[dict]:
+    make, chosen = stress.SOLVERS[solver], stress.pairs(some, [solver])
+    return [short(dict(stress.run(scene, make()), solver=solver)) for scene, _ in chosen]
 
 
 def short(record: dict) -> dict:

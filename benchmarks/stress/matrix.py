@@ -7,7 +7,6 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from time import perf_counter
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -80,20 +79,19 @@ def refuse(record: dict, said: Exception) -> None:
 
 def condensed_steps(scene: Scene, solver, record):
     """The one answer of a condensed problem: (verdict, result, method); none if it is refused."""
-    problem = sliding_problem(scene) if scene.seed is None else random_problem(scene.seed)
-    W, q, mu, p = problem.W, problem.q, np.broadcast_to(problem.mu, 2), np.broadcast_to(problem.p, 2)  # fmt: skip
+    if scene.seed is not None:
+        problem = random_problem(scene.seed)
+        W, q, mu, p = problem.W, problem.q, problem.mu, problem.p
+    else:  # one node that slides by more than 1 while it is pressed by ``scene.depth``
+        W, q = np.eye(3), np.array([[1.0, 0.5, -scene.depth]])
+        mu = np.broadcast_to(scene.body["mu"], 2)
+        p = np.broadcast_to(scene.body.get("p", mu), 2)
     try:
-        found = dc.solve_condensed(W, q, dc.Friction(mu, p), solver, scene.tol, max_seconds=30)
+        law = dc.Friction(mu, p)
+        found = dc.solve_condensed(W, q, law, solver, scene.tol, max_seconds=30)
     except REFUSALS as said:
         return refuse(record, said)
     yield judge.condensed(W, q, mu, p, found.reaction, scene.tol), found, found.branch
-
-
-def sliding_problem(scene: Scene):
-    """One node that slides by more than 1 while it is pressed by ``scene.depth``."""
-    mu = scene.body["mu"]
-    q = np.array([[1.0, 0.5, -scene.depth]])
-    return SimpleNamespace(W=np.eye(3), q=q, mu=mu, p=scene.body.get("p", mu))
 
 
 def body_steps(scene: Scene, solver, record):

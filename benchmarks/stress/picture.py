@@ -31,7 +31,7 @@ def draw(records: list[dict]) -> Figure:
     """A mark for each scene, group by group, at the largest error that the judge found; a panel for each solver."""
     solvers, groups = (list(dict.fromkeys(r[key] for r in records)) for key in ("solver", "group"))
     figure = Figure(figsize=(15, 0.3 * len(groups) + 2), layout="constrained")
-    axes = figure.subplots(1, len(solvers), sharey=True, squeeze=False)[0]
+    axes = figure.subplots(1, len(solvers), sharex=True, sharey=True, squeeze=False)[0]
     for ax, solver in zip(axes, solvers):
         for outcome, colour in MARKS.items():
             of = [r for r in records if (r["solver"], r["outcome"]) == (solver, outcome)]
