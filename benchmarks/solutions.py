@@ -64,7 +64,7 @@ TITLES = "hits open stick error normal tangential work reactions_apart slips_apa
 
 
 def described(found, W, q, friction) -> str:
-    """What a reader wants to know of each solution; what is ``apart`` is the largest nodal difference to another one."""
+    """A table of the solutions; what is ``apart`` is the largest nodal difference to another one."""
     reactions = np.array([r for r, *_ in found])
     slips = np.array([(q + (W @ r.ravel()).reshape(q.shape))[:, :2] for r in reactions])
     lines = []

@@ -71,7 +71,10 @@ def _mesh(x, cells, contact, top) -> list[str]:
 
 def numbered(first: int, rows, style: str = "") -> list[str]:
     """Lines of a number, from ``first`` on, and the values of a row."""
-    return [", ".join([str(k), *(format(value, style) for value in row)]) for k, row in enumerate(rows, first)]  # fmt: skip
+    lines = (
+        [str(k), *(format(value, style) for value in row)] for k, row in enumerate(rows, first)
+    )
+    return list(map(", ".join, lines))
 
 
 def read(file: Path, nodes: int) -> np.ndarray:

@@ -25,8 +25,8 @@ from studies.punch import CASES, Parameters, Punch, programme
 
 TITLE = "Peers, side by side on the same mesh and programme"
 CAPTION = (
-    "Peers beside us: unknowns and steps done. Set-ups are included, but for Siconos, which is given W. GetFEM and CalculiX "
-    "know isotropic friction alone, so only case A can be compared with them."
+    "Peers beside us: unknowns and steps done. Set-ups are included, but for Siconos, which is given W. GetFEM and "
+    "CalculiX know isotropic friction alone, so only case A can be compared with them."
 )
 PYTHON = "/usr/bin/python3"  # Debian's, for which GetFEM and Siconos are packaged
 GETFEM = "GetFEM, basic contact brick"
@@ -219,10 +219,8 @@ def evaluate(results: dict) -> dict:
 
 def _body_row(result: dict) -> dict:
     seconds, whole = result["seconds"] / max(result["done"], 1), result["done"] == result["steps"]
-    kept = {
-        key: result[key] for key in ("peer", "setting", "unknowns", "ours", "ours_tight", "said")
-    }
-    return kept | dict(
+    kept = ("peer", "setting", "unknowns", "ours", "ours_tight", "said")
+    return {key: result[key] for key in kept} | dict(
         case="A", seconds=seconds, ratio=seconds / result["ours"] if whole else None,
         done=f"{result['done']} of {result['steps']}", own=max(result["own"], default=None),
         error=max(result["errors"], default=None), force_error=max(map(max, result["force_error"]), default=None),
@@ -231,12 +229,17 @@ def _body_row(result: dict) -> dict:
 
 def figure(data):
     rows = data["rows"]
-    names = [f"{row['peer']}, {row['case']}, {row['unknowns'] or 'condensed'}, {row['done']}" for row in rows]  # fmt: skip
+    names = [
+        f"{row['peer']}, {row['case']}, {row['unknowns'] or 'condensed'}, {row['done']}"
+        for row in rows
+    ]
     figure, (left, right) = bars(names, 2)
     for ax, shift, key, colour, label in (
-        (left, -0.2, "seconds", THEIRS, "the peer, its error by our measure"), (left, 0.2, "ours", OURS, "we, at equal error"),
-        (right, -0.2, "error", THEIRS, "_"), (right, 0.2, "own", "#999999", "as the peer reports its error"),
-    ):  # fmt: skip
+        (left, -0.2, "seconds", THEIRS, "the peer, its error by our measure"),
+        (left, 0.2, "ours", OURS, "we, at equal error"),
+        (right, -0.2, "error", THEIRS, "_"),
+        (right, 0.2, "own", "#999999", "as the peer reports its error"),
+    ):
         values = np.maximum(column(rows, key), 1e-16)
         ax.barh(np.arange(len(rows)) + shift, values, height=0.38, color=colour, label=label)
     left.set(xlabel="processor seconds a step")

@@ -33,8 +33,8 @@ SECTIONS = dict(
 )  # fmt: skip
 DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
 INTRODUCTION = (
-    "Times are processor seconds of one thread. Repeated runs are interleaved and shown by their median; a step of peers "
-    "and growth is the mean of a programme that ran once. All numbers: report/report.json."
+    "Times are processor seconds of one thread. Repeated runs are interleaved and shown by their median; a step of "
+    "peers and growth is the mean of a programme that ran once. All numbers: report/report.json."
 )
 NAMED = dict(not_run="Not run, there was no time", older="Made with code that has changed since")
 
@@ -96,7 +96,8 @@ def write(report: dict, file: Path, directory: Path) -> dict[str, str]:
             parts.append(page.picture(drawing, of.CAPTION))
             parts += map(page.table, of.tables(data))
         parts += remarks(section)
-    parts += ["<h2>Machine</h2>", page.table([{"": k, " ": v} for k, v in report["machine"].items()])]  # fmt: skip
+    machine_rows = [{"": key, " ": value} for key, value in report["machine"].items()]
+    parts += ["<h2>Machine</h2>", page.table(machine_rows)]
     page.write(file, "dolfinx_contact: error against run time", parts)
     return captions
 
@@ -134,7 +135,8 @@ def main(argv=None) -> Path:
     if options.redraw:
         report = json.loads(file.read_text())
     else:
-        records = run({name: SECTIONS[name].plan(options.size) for name in options.sections}, kept, options.minutes)  # fmt: skip
+        plans = {name: SECTIONS[name].plan(options.size) for name in options.sections}
+        records = run(plans, kept, options.minutes)
         sections = {name: evaluated(name, of) for name, of in records.items()}
         report = dict(date=now(), size=options.size, machine=machine(), sections=sections)
     figures.mkdir(parents=True, exist_ok=True)

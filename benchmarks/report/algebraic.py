@@ -28,6 +28,7 @@ EXTREMES = {
     "spring 1e-6": (dict(spring=1e-6, **C), "rocking", 2),
 }
 TOL = 1e-8  # what the seconds of the table are for
+SECONDS = ("least", "seconds", "largest")  # of the repetitions; in the middle the median
 DEEP = 1e-12  # where the curves end
 
 
@@ -132,8 +133,8 @@ def merged(curves: list) -> dict:
     error = np.array([error for _, error in curves[0][:length]])
     kept = error <= np.minimum.accumulate(error)
     quantiles = np.quantile(np.maximum.accumulate(seconds, axis=1)[:, kept], [0, 0.5, 1], axis=0)
-    spread = zip(("least", "seconds", "largest"), quantiles.tolist())
-    return dict(spread, error=error[kept].tolist(), iterations=length, repetitions=len(curves))
+    spread = dict(zip(SECONDS, quantiles.tolist()))
+    return dict(**spread, error=error[kept].tolist(), iterations=length, repetitions=len(curves))
 
 
 def evaluate(results: dict) -> dict:
@@ -145,14 +146,15 @@ def figure(data):
     figure, axes = panels(len(rows))
     for ax, row in zip(axes, rows):
         for solver, curve in row["curves"].items():
-            least, seconds, largest = (1e3 * np.array(curve[key]) for key in ("least", "seconds", "largest"))  # fmt: skip
-            error, bars = np.maximum(curve["error"], 1e-16), np.abs([seconds - least, largest - seconds])  # fmt: skip
-            some = dict(errorevery=max(1, len(error) // 12), markevery=max(1, len(error) // 25))
-            ax.errorbar(seconds, error, xerr=bars, elinewidth=0.4, **some, **style(solver))
+            least, seconds, largest = 1e3 * np.array([curve[key] for key in SECONDS])
+            error, colour = np.maximum(curve["error"], 1e-16), style(solver)["color"]
+            ax.plot(seconds, error, markevery=max(1, len(error) // 25), **style(solver))
+            ax.fill_betweenx(error, least, largest, color=colour, alpha=0.2, lw=0)
         ax.axhline(TOL, color="0.6", lw=1)
         ax.set(xscale="log", yscale="log", xlabel="processor time of the step [ms]", ylabel="error")
         ax.yaxis.set_major_locator(LogLocator(numticks=8))
-        ax.set_title(f"{row['scene']}: step {row['watched']}, {row['unknowns']} unknowns", fontsize=11)  # fmt: skip
+        title = f"{row['scene']}: step {row['watched']}, {row['unknowns']} unknowns"
+        ax.set_title(title, fontsize=11)
     legend(figure, axes[0])
     return figure
 

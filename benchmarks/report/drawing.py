@@ -22,20 +22,20 @@ def style(solver: str) -> dict:
     return dict(color=COLOURS[solver], marker=MARKERS[solver], ms=4, lw=1.4, label=solver)
 
 
-def panels(count: int, size=(4.4, 3.7), columns: int = 3):
+def panels(count: int, columns: int = 3):
     """A figure with ``count`` panels and room for one legend above."""
     columns = min(columns, count)
     rows = -(-count // columns)
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows + 0.7), layout="constrained")
+    figure = Figure(figsize=(5 * columns, 4 * rows + 0.7), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax in axes[count:]:
         ax.set_axis_off()
     return figure, axes[:count]
 
 
-def legend(figure, ax, columns: int = 3) -> None:
+def legend(figure, ax) -> None:
     handles = ax.get_legend_handles_labels()
-    figure.legend(*handles, loc="outside upper center", frameon=False, ncols=columns)
+    figure.legend(*handles, loc="outside upper center", frameon=False, ncols=3)
 
 
 def column(rows: list[dict], key: str, scale: float = 1.0) -> np.ndarray:

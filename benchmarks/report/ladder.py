@@ -58,9 +58,10 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     if kind.get("moving"):  # the stiffness times a constant that changes from step to step
         problem = dc.ContactProblem(scale * punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
     if kind.get("recorded"):
-        contact = dc.Contact(punch.V, punch.facet_tags.find(1), contact.plane, contact.friction, dc.Wear(3e-8))  # fmt: skip
+        facets, file = punch.facet_tags.find(1), Path(tempfile.mkdtemp()) / "history.csv"
+        contact = dc.Contact(punch.V, facets, contact.plane, contact.friction, dc.Wear(3e-8))
         problem = dc.ContactProblem(punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
-        history = dc.History(problem, Path(tempfile.mkdtemp()) / "history.csv", [(7.5, 0, 0), (0, 7.5, 0)])  # fmt: skip
+        history = dc.History(problem, file, [(7.5, 0, 0), (0, 7.5, 0)])
     if kind.get("away"):
         contact.plane.displacement = np.array([0.0, 0.0, -1e3])
 

@@ -129,7 +129,11 @@ def main(argv=None) -> None:
     add("--refine", type=int, nargs="*", default=[0, 1])
     add("--steps", type=int, help="only the first ones")
     add("--repeat", type=int, default=3, help="elastic solves, before and after the steps")
-    add("--json", type=Path, help="where records go, each in place of its predecessor; the table is of all in it")  # fmt: skip
+    add(
+        "--json",
+        type=Path,
+        help="where records go, each in place of its predecessor; the table is of all",
+    )
     add("--divisions", type=int, default=8, help="of a block's side; half as many layers")
     add("--lowest", type=float, help="height of the elements on the plane, mm; else all are equal")
     options = parser.parse_args(argv)

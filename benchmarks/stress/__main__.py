@@ -21,6 +21,8 @@ from benchmarks.stress.matrix import SOLVERS, pairs
 from benchmarks.stress.picture import draw, summary
 from benchmarks.stress.scenes import scenes, small
 
+SHOWN = ("outcome", "solver", "group", "name", "said", "error", "slip_error", "reactions")
+
 
 def main(argv=None) -> list[dict]:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -49,8 +51,8 @@ def main(argv=None) -> list[dict]:
             record = dict(solver=solver, measured=measured) | matrix.run(scene, SOLVERS[solver]())
             records.append(record)
             print(json.dumps(record), file=file, flush=True)
-            said = f"{record['outcome']:8} {record['seconds']:6.2f} s  {scene.group}: {scene.name} ({solver})"  # fmt: skip
-            print(f"{k}/{len(todo)} {said}", flush=True)
+            said = f"{k}/{len(todo)} {record['outcome']:8} {record['seconds']:6.2f} s"
+            print(f"{said}  {scene.group}: {scene.name} ({solver})", flush=True)
     (options.output / f"{name}.json").write_text(json.dumps(records, indent=1))
     with (options.output / f"{name}.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, dict.fromkeys(key for record in records for key in record))
@@ -60,7 +62,7 @@ def main(argv=None) -> list[dict]:
     print(summary(records))
     for record in records:
         if record["outcome"] != "solved":
-            print(*(record.get(key, "") for key in ("outcome", "solver", "group", "name", "said", "error", "slip_error", "reactions")))  # fmt: skip
+            print(*(record.get(key, "") for key in SHOWN))
     return records
 
 

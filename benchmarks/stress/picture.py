@@ -16,15 +16,17 @@ MARKS = {"solved": "#0072b2", "rounding": "#e69f00", "refused": "#555555", "WRON
 def summary(records: list[dict]) -> str:
     """Table of outcomes by group and solver."""
     solvers, groups = (list(dict.fromkeys(r[key] for r in records)) for key in ("solver", "group"))
-    count = Counter((group, r["solver"], r["outcome"]) for r in records for group in (r["group"], "all"))  # fmt: skip
-
-    def cell(group, solver):
-        found = {outcome: count[group, solver, outcome] for outcome in MARKS}
-        others = (f", {found[o]} {o}" for o in ("rounding", "WRONG") if found[o])
-        return "".join([f"{found['solved']} / {sum(found.values())}", *others]) if any(found.values()) else "–"  # fmt: skip
-
-    lines = [[group, *(cell(group, solver) for solver in solvers)] for group in [*groups, "all"]]
+    lines = []
+    for group in [*groups, "all"]:
+        of = [r for r in records if group in (r["group"], "all")]
+        lines.append([group, *(outcomes([r for r in of if r["solver"] == s]) for s in solvers)])
     return table(["scenes", *solvers], lines)
+
+
+def outcomes(records: list[dict]) -> str:
+    count = Counter(record["outcome"] for record in records)
+    others = [f"{count[outcome]} {outcome}" for outcome in ("rounding", "WRONG") if count[outcome]]
+    return ", ".join([f"{count['solved']} / {len(records)}", *others]) if records else "–"
 
 
 def draw(records: list[dict]) -> Figure:

@@ -142,7 +142,7 @@ def hard_scenes() -> list[Scene]:
     for law, friction in LAWS.items():
         add, many, high = partial(found.add, laws={law: friction}), (12, 10, 2), (4, 4, 3)
         for size, n in ((3, 6), (10, 20), (30, 30), (60, 60), (100, 60)):
-            add("cantilevers", f"L/W {size}", "tip", edges=(size, 1.0, 1.0), cells=(n, 2, 2), tip=2.5 * size / n)  # fmt: skip
+            add("cantilevers", f"L/W {size}", "tip", edges=(size, 1, 1), cells=(n, 2, 2), tip=2.5 * size / n)  # fmt: skip
             add("columns", f"L/W {size}", edges=(1.0, 1.0, size), cells=(2, 2, n // 2))
         for spring in (1e-7, 1e-8, 1e-9):
             add("softest springs", f"spring {spring:g}", "press", "rocking", spring=spring)
