@@ -20,7 +20,7 @@ import dolfinx_contact as dc
 from benchmarks.measurement import SOLVERS
 from benchmarks.tables import table
 from mechanics import judge, scenes
-from studies.punch import CASES, Parameters, Punch, programme
+from studies.punch import Parameters, Punch, programme
 
 TOL, APART = 1e-10, 1e-6  # solutions differ by more than APART of the largest reaction
 CROSSED = dict(mu=(1.0, 0.1), p=(0.01, 1.0))
@@ -115,7 +115,7 @@ def examine(make, programme: list, starts: list[int]) -> None:
 
 def punch(solver):
     """The coarse punch."""
-    made = Punch(Parameters(case="crossed", refine=-1, tol=TOL), solver=solver)
+    made = Punch(Parameters(refine=-1, tol=TOL), solver=solver, friction=CROSSED)
 
     def move(top):
         made.approach.value = -top
@@ -132,6 +132,5 @@ def block(solver):
 if __name__ == "__main__":
     # Pressed and dragged, then dragged back: a step of tests/test_solutions.py.
     examine(block, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)], [0, 200])
-    CASES["crossed"] = CROSSED
     steps = programme(Parameters())
     examine(punch, steps, [20] * len(steps))

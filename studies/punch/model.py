@@ -63,11 +63,20 @@ class Parameters:
 class Punch:
     """Body, plane, friction and supports; ``press`` computes one load step after another.
 
-    ``solver`` as in ``dc.ContactProblem``; ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.
+    ``solver`` as in ``dc.ContactProblem``; ``friction``: arguments of ``dc.Friction`` in place of the case's;
+    ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.
     """
 
-    def __init__(self, parameters: Parameters, comm=MPI.COMM_WORLD, solver=None, **mesh_options):
+    def __init__(
+        self,
+        parameters: Parameters,
+        comm=MPI.COMM_WORLD,
+        solver=None,
+        friction=None,
+        **mesh_options,
+    ):
         self.parameters, self.comm = parameters, comm
+        self.friction = friction or CASES[parameters.case]
         shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
         punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
         self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
@@ -82,7 +91,7 @@ class Punch:
         self.bcs = self._supports()
 
         plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
-        friction = dc.Friction(**CASES[parameters.case])
+        friction = dc.Friction(**self.friction)
         self.contact = dc.Contact(self.V, punch.facet_tags.find(CONTACT), plane, friction)
         self.problem = dc.ContactProblem(
             self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol
@@ -144,7 +153,7 @@ class Punch:
         return {
             "case": self.parameters.case,
             "parameters": asdict(self.parameters),
-            "friction": CASES[self.parameters.case],
+            "friction": self.friction,
             "versions": {
                 "dolfinx": dolfinx_version,
                 "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
