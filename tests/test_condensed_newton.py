@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """solve_condensed on plain arrays: every answer is judged by NumPy code that shares nothing with it."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 import scipy.sparse
@@ -58,14 +60,20 @@ def outcomes(scenes, **options):
 
 
 def test_random_problems_of_every_rank():
-    """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: right answer or exception, 95 % solved.
+    """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: all are solved, a third by paths from easier problems.
 
     A solution exists in all of them; the worst have more contacts than degrees of freedom, mu above 5
-    and a slip rule at right angles to friction, where the method may fail but must not lie.
+    and a slip rule at right angles to friction.
     """
-    count = 150
-    solved = outcomes((random_problem(seed) for seed in range(count)), max_seconds=5)
-    assert solved >= 0.95 * count
+    branches = Counter(check(random_problem(seed)).branch for seed in range(150))
+    assert branches["continuation"] > 25
+
+
+@pytest.mark.slow
+def test_crossed_slip_rules_at_many_contacts():
+    """Sixty contacts of every rank, slip rules crossed by 3: right answer or exception, nine of ten solved."""
+    scenes = (random_problem(seed, contacts=60, ratio=3) for seed in range(1000, 1020))
+    assert outcomes(scenes, max_seconds=20) >= 18
 
 
 def test_random_problems_of_usual_friction():
