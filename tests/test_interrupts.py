@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Ctrl-C and monitors: whoever waits is answered in the midst of a solve, and the last state is in place."""
 
+import gc
 import signal
 from contextlib import contextmanager
 from time import perf_counter
@@ -19,14 +20,20 @@ ALONE = pytest.mark.skipif(COMM.size > 1, reason="a signal reaches one process")
 
 @contextmanager
 def interrupted(seconds: float):
-    """Ctrl-C after so many seconds, which has to arrive as what it is."""
+    """Ctrl-C after so many seconds, which has to arrive as what it is.
+
+    Python drops what is raised while it frees objects, and other tests leave problems to be freed: they are freed before.
+    """
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    gc.collect()
+    gc.disable()
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         with pytest.raises(KeyboardInterrupt):
             yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+        gc.enable()
         signal.signal(signal.SIGALRM, before)
 
 
