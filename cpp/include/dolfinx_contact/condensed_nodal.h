@@ -6,6 +6,7 @@
 
 #include "condensed_system.h"
 #include <array>
+#include <utility>
 
 namespace dolfinx_contact::condensed {
 /// The roots on the circle of g0 + g1 cos t + h1 sin t + g2 cos 2t + h2 sin 2t: at most four.
@@ -75,9 +76,9 @@ template <int T, class Scalar = double> class Nodal {
     using Vector = Eigen::Matrix<Scalar, D, 1>;
     using Matrix = Eigen::Matrix<Scalar, D, D>;
 
-    Nodal(const Matrix &A, bool smooth) : A_(A), smooth_(smooth || T == 0) {
+    Nodal(Matrix A, bool smooth) : A_(std::move(A)), smooth_(smooth || T == 0) {
         if constexpr (T > 0) {
-            const Eigen::FullPivLU<Matrix> lu(A);
+            const Eigen::FullPivLU<Matrix> lu(A_);
             regular_ = lu.isInvertible();
             if (regular_)
                 inverse_ = lu.inverse();
