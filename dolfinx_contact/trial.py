@@ -29,21 +29,21 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
 
 def presses(body, contacts, trial: np.ndarray) -> bool:
     """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
-    deepest = 0.0
-    for contact in contacts:
-        contact.move(trial)
-        deepest = max(deepest, -contact.gap.min(initial=0.0))
-    deepest, largest = (body.largest(a) for a in (np.array([deepest]), np.abs(trial)))
-    return deepest > CERTAIN * largest
+    return _deepest(body, contacts, trial) > CERTAIN * body.largest(np.abs(trial))
 
 
 def may_touch(body, contacts, trial: np.ndarray) -> bool:
     """Whether a displacement without reactions penetrates a plane by more than rounding."""
-    deepest = 0.0
+    return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
+
+
+def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> float:
+    """The deepest penetration of all contacts, at least zero, in a unit of length.  Collective."""
+    depths = [np.zeros(1)]
     for contact in contacts:
         contact.move(trial)
-        deepest = max(deepest, (-contact.gap / contact.gap_rounding(trial)).max(initial=0.0))
-    return body.largest(np.array([deepest])) > 1.0
+        depths.append(-contact.gap / unit(contact))
+    return body.largest(np.concatenate(depths))
 
 
 def refined(body, step, x: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (op_.nodes() == 1 && op_.tied() == 0 &&
             attempt("one contact", [this] { this->one_contact(); }))
             return;
-        if (attempt("newton", [&] { this->newton(given, 10.0, 1.0); }) || !options_.fallbacks)
+        if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;
         constexpr Index pivotable = 64;
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
@@ -64,7 +64,6 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
     /// The start of the smallest residual, scaled; zero is always one.
     VectorXd nearest(const std::vector<VectorXd> &starts) const {
         System<T> system = scaling_.make();
-        system.set_metric(10.0, 1.0);
         State<T> state;
         VectorXd best = VectorXd::Zero(system.size());
         state.evaluate(system, best, system.displacement(best));

@@ -60,7 +60,6 @@ template <int T, int P> class Attempts {
     /// All states that one contact can be in.
     void one_contact() {
         System<T> system = scaling_.make();
-        system.set_metric(10.0, 1.0);
         using Exact = Nodal<T, Real>;
         const typename Exact::Matrix A =
             system.left.template cast<Real>().asDiagonal() *
@@ -76,10 +75,8 @@ template <int T, int P> class Attempts {
             }
     }
 
-    /// Newton's method from r, with a metric of its own.
-    void newton(VectorXd r, double normal, double tangential) {
+    void newton(VectorXd r) {
         System<T> system = scaling_.make();
-        system.set_metric(normal, tangential);
         finish(system, r);
     }
 
@@ -87,7 +84,7 @@ template <int T, int P> class Attempts {
     void swept(VectorXd r, int sweeps) {
         System<T> system = scaling_.make();
         sweep(system, r, 1e-6, sweeps, budget_);
-        newton(r, 10.0, 1.0);
+        newton(r);
         if (!best_.converged)
             proximal_from(r);
     }
@@ -102,7 +99,6 @@ template <int T, int P> class Attempts {
         };
         if (!proximal(system, r, op_.mean_normal(), budget_, error))
             return;
-        system.set_metric(10.0, 1.0);
         Newton<T> newton(system);
         set_change(newton, system, r);
     }
@@ -113,7 +109,6 @@ template <int T, int P> class Attempts {
             constexpr int covers = 20;
             constexpr Index few = 5;
             System<T> system = scaling_.make();
-            system.set_metric(10.0, 1.0);
             const Plane plane(system);
             std::minstd_rand random(1);
             const auto accept = [&](const VectorXd &r) {
@@ -126,7 +121,7 @@ template <int T, int P> class Attempts {
             for (int k = 0; k < covers && !budget_.spent(); ++k, ++budget_.iterations) {
                 VectorXl cover = VectorXl::Ones(3 * op_.nodes());
                 for (Index i = 0; i < cover.size() && k > 0; ++i)
-                    cover[i] = std::pow(10.0, uniform(random) - 0.5);
+                    cover[i] = power_of_ten(random, -0.5, 0.5);
                 if (accept(plane.pivots(cover, options_.heed)))
                     return;
             }
@@ -149,7 +144,6 @@ template <int T, int P> class Attempts {
         const auto solved = [&](double s, VectorXd &trial) {
             System<T> system = scaling_.make(friction ? s : 1.0, s);
             system.shift = (1.0 - s) * shift * op_.mean_normal();
-            system.set_metric(10.0, 1.0);
             if (s == 1.0)
                 finish(system, trial);
             return s == 1.0

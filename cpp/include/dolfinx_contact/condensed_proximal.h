@@ -20,7 +20,6 @@ bool proximal(System<T> system, VectorXd &r, double compliance, Budget &budget, 
     double alpha = first, down = fastest, least = std::numeric_limits<double>::infinity();
     for (int k = 0, in_vain = 0; in_vain < patience && !budget.spent(); ++k, ++in_vain) {
         system.shift = alpha * compliance;
-        system.set_metric(10.0, 1.0);
         system.q = q - system.shifted(system.right.cwiseProduct(r));
         VectorXd trial = r, mapped;
         const auto keep = [&](const VectorXd &found) {

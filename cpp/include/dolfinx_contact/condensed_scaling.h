@@ -69,11 +69,8 @@ template <int T, int P> class Scaling {
             if constexpr (T > 0) {
                 const bool smooth = !(coefficients_.mu(i, 0) > 0.0);
                 system.smooth[static_cast<std::size_t>(i)] = smooth;
-                const double mean = smooth ? 1.0 : std::exp(coefficients_.mu.row(i).log().mean());
                 for (int c = 0; c < T; ++c) {
-                    double mu = smooth ? 1.0 : coefficients_.mu(i, c);
-                    if (friction != 1.0)
-                        mu = mean * std::pow(mu / mean, friction);
+                    const double mu = smooth ? 1.0 : bent(i, c, friction);
                     system.right[D * i + c] = mu * force_;
                     system.left[D * i + c] = mu * std::pow(coefficients_.q2(i, c), rule) / length_;
                     system.q[D * i + c] = q_[(P + 1) * i + c];
@@ -88,10 +85,19 @@ template <int T, int P> class Scaling {
             system.left[D * op_.nodes() + c] = tied_scale(c) / length_;
             system.q[D * op_.nodes() + c] = q_[(P + 1) * op_.nodes() + c];
         }
+        system.set_metric();
         return system;
     }
 
   private:
+    /// mu with its ratio to the mean of all directions to a power.
+    double bent(Index i, int c, double power) const {
+        const double mu = coefficients_.mu(i, c);
+        if (power == 1.0)
+            return mu;
+        const double mean = std::exp(coefficients_.mu.row(i).log().mean());
+        return mean * std::pow(mu / mean, power);
+    }
     void set_length(double length) {
         const double compliance = op_.mean_normal();
         length_ = length > 0.0 ? length : 1.0;

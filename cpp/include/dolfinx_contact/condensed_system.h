@@ -72,9 +72,10 @@ template <int T> struct System {
         return (*inverse * VectorXd(dw.cwiseQuotient(left))).cwiseQuotient(right);
     }
 
-    /// Metric of the residual: rho_n = normal / W_nn and rho_t = tangential / max(W_xx, W_yy).
-    /// The normal and the tangential step want their own.
-    void set_metric(double normal, double tangential) {
+    /// Metric of the residual: rho_n = 10 / W_nn and rho_t = 1 / max(W_xx, W_yy). The normal and
+    /// the tangential step want their own.
+    void set_metric() {
+        constexpr double normal = 10.0, tangential = 1.0;
         const VectorXd diagonal = left.array() * W->diagonal().array().abs() * right.array().abs();
         double mean = 0.0;
         for (Index i = 0; i < nodes; ++i)
