@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
 from collections.abc import Sequence
-from os import PathLike
 from time import perf_counter
 from typing import Any
 
@@ -18,9 +16,9 @@ from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.driven import check_driven, freedom
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
-    ProblemOptions,
     check_alive,
     check_planes,
     check_size,
@@ -30,7 +28,7 @@ from dolfinx_contact.problem_input import (
     checked_options,
     hold,
 )
-from dolfinx_contact.results import checkpoint
+from dolfinx_contact.problem_states import ProblemStates
 from dolfinx_contact.results.record import (
     Counts,
     NotConverged,
@@ -41,14 +39,13 @@ from dolfinx_contact.results.record import (
     warn_of_rounding,
 )
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
-from dolfinx_contact.solvers.condensed import KEPT
 from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.trial import without_reactions
 
 LOG = logging.getLogger("dolfinx_contact")
 
 
-class ContactProblem(ProblemOptions):
+class ContactProblem(ProblemStates):
     """An elastic body pressed against rigid planes, solved load step by load step.
 
     Args:
@@ -114,25 +111,11 @@ class ContactProblem(ProblemOptions):
         self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
-        self._laws = self._present_laws()
+        self._laws, self._freedom = self._present_laws(), freedom(self.contacts)
         for contact in self.contacts:
             contact.belong_to(self)
         self._begin()
         self._made = True
-
-    def reset(self) -> None:
-        """Return to the undeformed body without reactions or history; planes stay where they are."""
-        check_alive(self, self.body, self.contacts)
-        self._begin()
-        self._restore()
-
-    def _begin(self) -> None:
-        """No history.  ``u`` is left: it is the guess of the first step."""
-        self._states = [np.zeros(self.body.size)] * 2
-        self.body.known = None
-        self._memory.clear()
-        for contact in self.contacts:
-            contact.reset()
 
     def close(self) -> None:
         """Free what PETSc holds: matrices, factors, levels.  Collective; results stay, no step can follow."""
@@ -163,6 +146,7 @@ class ContactProblem(ProblemOptions):
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
+        stood = [contact.plane.displacement for contact in self.contacts]
         try:
             self._check_input()
             self._renew_laws()
@@ -170,7 +154,7 @@ class ContactProblem(ProblemOptions):
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not converged(step.errors, done, self.tol):
                 raise NotConverged(
-                    f"not converged: {done}, tol {self.tol:.1e}. Smaller load steps help most often.",
+                    f"not converged: {done}, tol {self.tol:.1e}. {self._advice(step)}",
                     done,
                     found.x,
                     [contact.reaction for contact in self.contacts],
@@ -180,6 +164,8 @@ class ContactProblem(ProblemOptions):
             if not isinstance(failure, Exception) or isinstance(failure, PETSc.Error):
                 self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
                 self.body.forget()
+            for contact, where in zip(self.contacts, stood):
+                contact.plane.displacement = where
             self._restore()
             raise_interrupt(failure)
             raise
@@ -191,34 +177,6 @@ class ContactProblem(ProblemOptions):
         self._large = self._large or check_size(self.body, found.x)
         warn_of_rounding(done, self.tol)
         return done
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
-
-        The file is replaced in one go, so a run that is killed leaves the last one whole.  Collective.
-
-        Args:
-            path: File name, usually ending in ``.npz``.
-        """
-        check_alive(self, self.body, self.contacts)
-        past = self._memory.get("past", ())
-        checkpoint.save(path, self.body, self.contacts, self._states, past)
-
-    def load(self, path: str | PathLike[str]) -> None:
-        """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
-
-        On one rank the steps that follow have the same bits as without the interruption.  On several
-        ranks MUMPS adds in the order in which messages arrive, and they agree to rounding.
-
-        Raises:
-            ValueError: the file is no checkpoint of this problem.
-        """
-        check_alive(self, self.body, self.contacts)
-        self._states, past = checkpoint.load(path, self.body, self.contacts)
-        kept = self._memory.setdefault("past", deque(maxlen=KEPT))
-        kept.clear()
-        kept.extend(past)
-        self._restore()
 
     def load_step(self) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.
@@ -249,12 +207,26 @@ class ContactProblem(ProblemOptions):
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
+        if step.planes is not None and step.planes.beyond(given=True):
+            return step, self._unmoved(step)
         found = without_reactions(self.body, self.contacts, step)
         if found is None:
             with stage("contact: iterations"):
                 found = self.bound().solve(step)
             step.measure(found.x)
         return step, found
+
+    def _unmoved(self, step: LoadStep) -> SolverResult:
+        """The last displacement with the present boundary values, judged as what it is: no solution."""
+        x, fixed = self._states[0].copy(), self.body.fixed
+        x[fixed] = step.b[fixed]
+        step.measure(x)
+        return SolverResult(x, 0, np.inf, "none: there is no solution")
+
+    def _advice(self, step: LoadStep) -> str:
+        """What to do about a step that did not converge.  Collective."""
+        slides = "" if step.planes is None else step.planes.beyond(True) or step.planes.beyond()
+        return f"{slides}." if slides else "Smaller load steps help most often."
 
     def _unbind(self) -> None:
         """Forget what was set up for a stiffness that has changed.  Collective."""
@@ -266,6 +238,7 @@ class ContactProblem(ProblemOptions):
 
     def _check_input(self) -> None:
         check_step(self.u, self.body.comm, self.contacts)
+        check_driven(self.body, self.contacts)
         agree(self.body.comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
 
     def _renew_laws(self) -> None:
@@ -277,6 +250,9 @@ class ContactProblem(ProblemOptions):
             if renew is None or not renew():
                 self._unbind()
             self._laws = laws
+        if freedom(self.contacts) != self._freedom:
+            self._unbind()
+            self._freedom = freedom(self.contacts)
 
     def _present_laws(self) -> list:
         return [contact.friction for contact in self.contacts]
@@ -288,12 +264,3 @@ class ContactProblem(ProblemOptions):
     def counts(self) -> Counts:
         """Contact nodes open, sticking and slipping in the present state.  Collective."""
         return counts(self.body, self.contacts)
-
-    def _show(self, x: np.ndarray) -> None:
-        self.u.x.array[: self.body.size] = x
-        self.u.x.scatter_forward()
-
-    def _restore(self) -> None:
-        self._show(self._states[0])
-        for contact in self.contacts:
-            contact.restore()

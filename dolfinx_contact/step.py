@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact.collective import raised_together
+from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.error import (
     EPSILON,
     Errors,
@@ -44,11 +45,15 @@ class LoadStep:
         tol: Largest error.
         unit: Of force, any that keeps squares within the range of double precision.
         monitor: None, or the user's function of iteration, largest error and ``Counts``.
+
+    Attributes:
+        planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
     """
 
     def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
+        self.planes = driven_planes(body, contacts)
         self._starts, self._unit, self._monitor = starts, unit, monitor
         self._before = None  # reactions of the state judged before
         self._told = 0
@@ -101,8 +106,10 @@ class LoadStep:
 
     def derivatives(self, x: np.ndarray, maps) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of the new reactions of each contact, by the reactions before and by the motion."""
-        asked = self._asked(self.forces(x))
-        return [contact.respond_with_derivatives(x, map) for contact, map in zip(asked, maps)]
+        forces = self.forces(x)
+        self._balance_planes(x, forces, maps)
+        both = zip(self._asked(forces), maps)
+        return [contact.respond_with_derivatives(x, map) for contact, map in both]
 
     def along(self, x: np.ndarray, dx: np.ndarray, maps):
         """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
@@ -139,8 +146,7 @@ class LoadStep:
         if not self._is_measured(x):
             forces = -self.body.residual(x)
             maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
-            for contact, map in zip(self._asked(self.free(forces)), maps):
-                contact.respond(x, map)
+            self._respond(x, self.free(forces), maps)
             self._judge(x, forces)
             self._tell()
         return self.errors
@@ -183,9 +189,18 @@ class LoadStep:
             contact.take_reaction(-forces)
             yield contact
 
-    def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+    def _balance_planes(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+        if self.planes is not None:
+            self.planes.balance(x, maps, lambda: self._asked(forces))
+
+    def _respond(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+        """Give contacts the reactions that maps make of those which balance the forces."""
+        self._balance_planes(x, forces, maps)
         for contact, map in zip(self._asked(forces), maps):
             contact.respond(x, map)
+
+    def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+        self._respond(x, forces, maps)
         return self.with_reactions(forces)
 
     def with_reactions(self, forces: np.ndarray) -> np.ndarray:
@@ -220,5 +235,10 @@ class LoadStep:
         before, self._before = self._before, reaction
         change = np.full(1, np.inf) if before is None else reaction - before
         cancelling = EPSILON * (self.body.cancelling(x) + acting)
+        if self.planes is not None:
+            on_planes, terms = self.planes.left()
+            mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
+            left = np.append(left, on_planes[mine])
+            cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
         return as_errors(self.total([np.square(part / self._unit).sum() for part in parts]))

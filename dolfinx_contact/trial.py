@@ -17,14 +17,21 @@ NOTHING = "none: nothing touches"
 
 def without_reactions(body, contacts, step) -> SolverResult | None:
     """The displacement without reactions, if it is the solution of a ``LoadStep``.  Collective."""
+    if step.planes is not None:
+        if not step.planes.can_rest:
+            return None
+        step.planes.rest()
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
         if not (body.known.exact or presses(body, contacts, trial)):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
-    if may_touch(body, contacts, trial):
-        return None
-    trial = refined(body, step, trial)
-    return SolverResult(trial, 0, 0.0, NOTHING) if step.errors.within(step.tol) else None
+    if not may_touch(body, contacts, trial):
+        trial = refined(body, step, trial)
+        if step.errors.within(step.tol):
+            return SolverResult(trial, 0, 0.0, NOTHING)
+    if step.planes is not None:
+        step.planes.move_to(np.zeros(step.planes.count))
+    return None
 
 
 def presses(body, contacts, trial: np.ndarray) -> bool:

@@ -44,9 +44,10 @@ class ContactLaws(ContactHistory):
 
     def described(self) -> dict[str, str]:
         """Plane and laws, but coefficients per node, in words: the same on all ranks."""
+        driven = self.plane.driven() if self.plane.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         moved = repr(self.plane.displacement.tolist())
-        return {"plane": repr(self.plane), "plane.displacement": moved, "friction": law, "wear": repr(self.wear)}  # fmt: skip
+        return {"plane": repr(self.plane), "plane.displacement": moved, "plane.free": driven, "friction": law, "wear": repr(self.wear)}  # fmt: skip
 
     def check(self, first: dict[str, str]) -> None:
         """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""

@@ -24,6 +24,11 @@ class BipotentialMap:
 
     rho: np.ndarray
 
+    @property
+    def normal(self) -> np.ndarray:
+        """Along the normal, as of the other map."""
+        return self.rho
+
     def __call__(self, law, reaction, gap, slip):
         return law.bipotential_map(reaction, gap, slip, self.rho)
 

@@ -75,5 +75,7 @@ class BoundAutomatic:
                 smallest, best, start = errors.largest, found, found.x
             if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
                 break
+            if step.planes is not None and step.planes.beyond():
+                break
             why = f"the other one ended at {errors.largest:.1e}"
         return best._replace(iterations=iterations, chosen=", then ".join(said))

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank
+from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
@@ -29,7 +30,8 @@ class CondensedBody:
     sparse right-hand sides; it is held by rank 0 alone.  A degree of freedom fixed by a boundary
     condition neither moves nor has a reaction of friction.  Without friction at any contact there are
     normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
-    forces are unknowns behind the reactions, and what they move has to agree with them.
+    forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
+    planes that force drives, with the equilibrium of each: ``w = q + W r - D c`` and ``-D^T r - k c + F = 0``.
 
     Args:
         options: ``CondensedNewton``, which solves the condensed problem.
@@ -52,10 +54,13 @@ class CondensedBody:
         self._held_by = body.anchors or body
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
-        self.nodes, self._tied = nodes.size // self.dim, anchored.size
+        self.nodes, self._anchored = nodes.size // self.dim, anchored.size
+        planes = driven_planes(body, contacts)
+        self._tied = anchored.size + (planes.count if planes else 0)
         check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
         W = self.compliance()
         a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
+        D = self._gathered_axes(planes) if planes else None
         self.operator, size = None, nodes.size
         if self.comm.rank == 0:
             # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
@@ -64,12 +69,15 @@ class CondensedBody:
             W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
             last = range(size, len(W))
             W[last, last] -= 1 / a
+            W = W if D is None else _bordered(W, D, planes.springs)
             self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
             del W  # copied
             self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]
         self.friction = self._gathered_friction()
-        self._scales = self._gathered_stiffness(stiffness) | {"tied_stiffness": a}
+        self._scales = self._gathered_stiffness(stiffness) | {
+            "tied_stiffness": np.append(a, np.ones(self._tied - anchored.size))
+        }
 
     def destroy(self) -> None:
         """Nothing to free: the body owns the factorisation."""
@@ -90,17 +98,26 @@ class CondensedBody:
             step: The ``LoadStep``.
             start: Not used: reactions of earlier steps are better starts.
         """
-        free = self._held_by.solve(step.b) if self._tied else self._body.free_state(step.b)
-        acting = self._body.norm(step.external)
-        q, anchors = self._motion(free), slice(self.dim * self.nodes, None)
+        held, first = self._held_by.solve, self.dim * self.nodes
+        free = held(step.b) if self._anchored else self._body.free_state(step.b)
+        acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
+        self._move_planes(step, np.zeros(first + self._tied))
+        q = self._motion(step, free)
         starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
-            result = self._reactions(step, q + rounding, factor * step.tol, starts, acting)
-            iterations += result.iterations
-            force = np.concatenate((result.reaction.ravel(), result.tied))
-            x, previous = self.displacement(base, force - known), error
-            error = step.measure(x).largest
+            previous = error
+            for fallbacks in (True,) if step.planes is None else (False, True):
+                goal = factor * step.tol
+                result = self._reactions(step, q + rounding, goal, starts, acting, fallbacks)
+                iterations += result.iterations
+                force = np.concatenate((result.reaction.ravel(), result.tied))
+                x = self.displacement(base, force - known)
+                self._move_planes(step, force)
+                error = step.measure(x).largest
+                solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
+                if solved or (step.planes is not None and step.planes.beyond()):
+                    break
             if not error < previous:
                 break
             best = x, force, result
@@ -110,12 +127,13 @@ class CondensedBody:
             # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
             left = step.b + self._nodal(force) - self._held_by.multiply(x)
             left[self._body.fixed] = 0.0
-            base, known, starts = x + self._held_by.solve(left), force, [force]
-            moved = np.concatenate(
-                (result.displacement.ravel(), force[anchors] / self._scales["tied_stiffness"])
-            )
-            rounding = rounding + self._motion(base) - moved
+            base, known, starts = x + held(left), force, [force]
+            self._move_planes(step, force)
+            anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
+            moved = (result.displacement.ravel(), anchored, self._driving(step))
+            rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result = best
+        self._move_planes(step, force)
         self.past.append((q, force, self._tied))
         forward = max(result.change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
@@ -145,15 +163,28 @@ class CondensedBody:
         node = gdim * (dofs // gdim)[:, None] + np.arange(gdim)
         return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
 
-    def _motion(self, displacement: np.ndarray) -> np.ndarray:
-        """Slip and gap of all nodes, and motion of the anchors, at a displacement of owned dofs."""
+    def _gathered_axes(self, planes) -> np.ndarray:
+        """``D`` of all nodes along the principal axes, ``shape=(rows, m)``.  Collective."""
+        local = np.einsum("nij,njm->nim", self._turns, np.concatenate(planes.axes))
+        return self.gather(local.reshape(-1, planes.count))
+
+    def _move_planes(self, step, force: np.ndarray) -> None:
+        if step.planes is not None:
+            step.planes.move_to(force[self.dim * self.nodes + self._anchored :].copy())
+
+    def _driving(self, step) -> np.ndarray:
+        return np.zeros(0) if step.planes is None else step.planes.driving()
+
+    def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
+        """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
         for contact in self._contacts:
             contact.move(displacement)
             rows.append(np.column_stack((contact.slip_increment, contact.gap)))
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
-        return np.concatenate((nodes.gather(local), anchored.gather(anchored.of(displacement))))
+        held = anchored.gather(anchored.of(displacement))
+        return np.concatenate((nodes.gather(local), held, self._driving(step)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Displacement of owned dofs with more forces of all rows than ``base`` has."""
@@ -165,17 +196,22 @@ class CondensedBody:
         """Forces of all rows on owned degrees of freedom."""
         forces = np.zeros(self._body.size)
         self._parts[0].add_forces(force[: self.dim * self.nodes], forces)
-        self._parts[1].add_forces(force[self.dim * self.nodes :], forces)
+        self._parts[1].add_forces(
+            force[self.dim * self.nodes :], forces
+        )  # those of planes act on no node
         return forces
 
-    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float):
+    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, fallbacks: bool):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
+        options = self._options
+        if not fallbacks:
+            options = type(options)(**vars(options) | {"fallbacks": False})
 
         def solve(monitor):
             try:
                 with warnings.catch_warnings():  # the body's own rounding counts
                     warnings.simplefilter("ignore", RoundingWarning)
-                    return self._options.solve_condensed(
+                    return options.solve_condensed(
                         self.operator, self.friction, q, max(tol, 1e-14), starts,
                         monitor=monitor, external=acting, **self._scales,
                     )  # fmt: skip
@@ -239,6 +275,16 @@ class CondensedBody:
             for name in ("mu", "p")
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
+
+
+def _bordered(W: np.ndarray, D: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """``W`` with rows and columns for motions of planes, their springs on the diagonal."""
+    size, m = len(W), len(springs)
+    bordered = np.zeros((size + m, size + m))
+    bordered[:size, :size] = W
+    bordered[: len(D), size:], bordered[size:, : len(D)] = -D, -D.T
+    bordered[size:, size:] = -np.diag(springs)
+    return bordered
 
 
 def components(contacts) -> int:

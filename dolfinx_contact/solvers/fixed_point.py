@@ -80,6 +80,14 @@ class FixedPoint:
         return BoundFixedPoint(self, body, contacts, stiffness)
 
 
+def _slides(step, x: np.ndarray) -> bool:
+    """Whether force pushes a plane by more than friction carries in this state.  Collective."""
+    if step.planes is None:
+        return False
+    step.measure(x)
+    return bool(step.planes.beyond())
+
+
 class BoundFixedPoint:
     """The fixed point for one body; keeps the preconditioner of the rho used last."""
 
@@ -113,6 +121,8 @@ class BoundFixedPoint:
         newton = options.newton
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
             self._fall(search, factor, EVERY)
+            if not search.over and _slides(step, search.best):
+                break
             if not search.over and self.preconditioner.soften():
                 self._fall(search, factor, EVERY)
             if not search.over and options.max_iterations > EVERY:

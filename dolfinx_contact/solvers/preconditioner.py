@@ -8,7 +8,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.solvers.plane_border import PlaneBorder
 from dolfinx_contact.solvers.rigid_balance import RigidBalance, patch_motions
 from dolfinx_contact.solvers.surface_layer import SurfaceLayer
 
@@ -40,6 +42,8 @@ class ContactPreconditioner:
             self._patched = body.exact
             self.stiffened = body.stiffened(A, S)
         self._A = A
+        planes = driven_planes(body, contacts)
+        self._border = planes and PlaneBorder(body, planes, A, self.stiffened, self._spring_rates)
         S.destroy()
 
     def soften(self) -> bool:
@@ -112,5 +116,7 @@ class ContactPreconditioner:
         if self._linearised:
             near, residual = self._layer.correct(residual)
         correction = near + self.stiffened.apply(residual)
+        if self._border is not None:
+            correction += self._border.correct(residual)
         correction[self._body.fixed] = 0.0
         return correction

@@ -96,13 +96,22 @@ class RigidBalance:
 
         All in roots of energy: each force over the root of its node's stiffness in A.
         """
-        n = len(self)
-        slope = np.zeros((n, n))
+        n, planes = len(self), step.planes
+        slope, pushed, pushing = np.zeros((n, n)), 0.0, 0.0
         step.know(x, forces)
-        for contact, both in zip(self._contacts, step.derivatives(x, maps)):
+        derivatives = step.derivatives(x, maps)
+        for k, (contact, both) in enumerate(zip(self._contacts, derivatives)):
             shape = contact.points.count, contact.points.dim, n
             Z, KZ = ((contact.points.B @ part).reshape(shape) for part in (self.modes, self.forces))
-            slope -= np.tensordot(Z, both[0] @ KZ + both[1] @ Z, ((0, 1), (0, 1)))
+            change = both[0] @ KZ + both[1] @ Z
+            slope -= np.tensordot(Z, change, ((0, 1), (0, 1)))
+            if planes is not None:
+                axes = planes.axes[k]
+                pushed = pushed + np.tensordot(axes, change, ((0, 1), (0, 1)))
+                pushing = pushing + np.tensordot(Z, both[1] @ axes, ((0, 1), (0, 1)))
+        if planes is not None:  # which follow
+            pushed = self._body.total(pushed)
+            slope -= pushing @ np.linalg.solve(planes.tangent(derivatives), pushed)
         left = step.free(step.with_reactions(forces))
         scaled = self._scale * left
         sums = np.concatenate((self.modes.T @ left, slope.ravel(), [scaled @ scaled]))

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact import compat
+from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
@@ -48,6 +49,8 @@ class SurfaceLayer:
         self._stiffness = stiffness[self.dofs]
         self._size = (width, width)
         self._solver = None
+        self._planes = driven_planes(body, contacts)
+        self._pushing = None if self._planes is None else self._planes.columns()
 
     def destroy(self) -> None:
         """Free the factorisation and the columns of K.  Collective."""
@@ -66,6 +69,9 @@ class SurfaceLayer:
         self._by_forces, self._by_motion = (
             sum(of.matrix(part) for of, part in zip(points, parts)) for parts in zip(*derivatives)
         )
+        if self._planes is not None:
+            self._pushed = self._by_motion @ self._pushing
+            self._resisting = self._planes.tangent(derivatives)
         near = sparse.csr_matrix(
             (np.ones(self.dofs.size), (np.arange(self.dofs.size), self.dofs)),
             (self.dofs.size, self._body.size),
@@ -98,7 +104,11 @@ class SurfaceLayer:
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
-        product = forces - self._by_forces @ forces - self._by_motion @ x
+        change = self._by_forces @ forces + self._by_motion @ x
+        product = forces - change
+        if self._planes is not None:  # which follow
+            pushed = self._body.total(self._pushing.T @ change)
+            product -= self._pushed @ np.linalg.solve(self._resisting, pushed)
         product[self._body.fixed] = 0.0
         return product
 
