@@ -20,7 +20,7 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
     if step.planes is not None:
         if not step.planes.can_rest:
             return None
-        step.planes.rest()
+        step.planes.move_to(step.planes.at_rest())
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
         if not (body.known.exact or presses(body, contacts, trial)):

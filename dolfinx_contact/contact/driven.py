@@ -88,12 +88,14 @@ class DrivenPlanes:
         for plane, home, part in zip(self._planes, self._home, self._parts):
             plane.displacement = home + moved[part] @ plane.free_axes
 
-    def rest(self) -> None:
-        """Move the planes where their springs hold them without reactions; those without a spring stay."""
-        driving, held = self.driving(), self.springs > 0
-        self.move_to(
-            self.moved + np.divide(driving, self.springs, np.zeros(self.count), where=held)
-        )
+    def at_rest(self, softest: float = 0.0) -> np.ndarray:
+        """The motions at which springs hold the planes without reactions.
+
+        Args:
+            softest: Planes whose springs are no stiffer than that, force per length, stay where they are.
+        """
+        springs, stretch = self.springs, np.zeros(self.count)
+        return self.moved + np.divide(self.driving(), springs, stretch, where=springs > softest)
 
     @property
     def can_rest(self) -> bool:

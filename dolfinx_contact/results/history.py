@@ -23,7 +23,8 @@ class History:
 
     Every row has ``step``, the caller's own columns, the step's record, and for each contact
     (``contact0_...``) the total reaction in global components, the sum of the norms of the
-    tangential reactions, dissipation and worn volume so far; for each tracked node
+    tangential reactions, dissipation and worn volume so far, and the displacement of a plane that force drives when the
+    table is made; for each tracked node
     (``node0_...``) its local reaction, displacement relative to the plane, slip path, dissipation, gap and
     status.
 
@@ -59,6 +60,7 @@ class History:
             if not isinstance(resume, (int, np.integer)) or resume < 0:
                 raise ValueError(f"resume must be a number of rows, 0 or more, got {resume!r}.")
         self._tracked = problem.contacts[contact]
+        self._driven = [bool(contact.plane.free) for contact in problem.contacts]
         at, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
         if at.size and (at.ndim != 2 or at.shape[1] != gdim):
             raise ValueError(f"points must have shape (m, {gdim}), got {at.shape}.")
@@ -84,6 +86,8 @@ class History:
         row.update(step.counts._asdict())
         for k, contact in enumerate(self.problem.contacts):
             row.update((f"contact{k}_{name}", value) for name, value in self._totals(contact))
+            moved = zip("xyz", contact.plane.displacement if self._driven[k] else ())
+            row.update((f"contact{k}_plane_{axis}", float(value)) for axis, value in moved)
         for k, node in enumerate(self._nodes):
             row.update((f"node{k}_{name}", value) for name, value in self._state(node))
         with raised_together(self.comm):

@@ -13,12 +13,12 @@ from mpi4py import MPI
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank
-from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
 from dolfinx_contact.solvers.condensed_input import principal_axes
 from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged
+from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -31,7 +31,7 @@ class CondensedBody:
     condition neither moves nor has a reaction of friction.  Without friction at any contact there are
     normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
     forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
-    planes that force drives, with the equilibrium of each: ``w = q + W r - D c`` and ``-D^T r - k c + F = 0``.
+    planes that force drives, see ``CondensedPlanes``.
 
     Args:
         options: ``CondensedNewton``, which solves the condensed problem.
@@ -55,12 +55,12 @@ class CondensedBody:
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
-        planes = driven_planes(body, contacts)
-        self._tied = anchored.size + (planes.count if planes else 0)
+        normal = self.gather(np.concatenate([of.normal for of in stiffness]))
+        self._planes = CondensedPlanes(body, contacts, self._turns, normal)
+        self._tied = anchored.size + self._planes.tied
         check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
         W = self.compliance()
         a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
-        D = self._gathered_axes(planes) if planes else None
         self.operator, size = None, nodes.size
         if self.comm.rank == 0:
             # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
@@ -69,14 +69,14 @@ class CondensedBody:
             W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
             last = range(size, len(W))
             W[last, last] -= 1 / a
-            W = W if D is None else _bordered(W, D, planes.springs)
+            W = self._planes.border(W, size)
             self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
             del W  # copied
             self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]
         self.friction = self._gathered_friction()
         self._scales = self._gathered_stiffness(stiffness) | {
-            "tied_stiffness": np.append(a, np.ones(self._tied - anchored.size))
+            "tied_stiffness": np.append(a, np.ones(self._planes.tied))
         }
 
     def destroy(self) -> None:
@@ -101,7 +101,7 @@ class CondensedBody:
         held, first = self._held_by.solve, self.dim * self.nodes
         free = held(step.b) if self._anchored else self._body.free_state(step.b)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
-        self._move_planes(step, np.zeros(first + self._tied))
+        self._planes.begin(step)
         q = self._motion(step, free)
         starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
@@ -113,7 +113,7 @@ class CondensedBody:
                 iterations += result.iterations
                 force = np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
-                self._move_planes(step, force)
+                self._planes.move(step, force)
                 error = step.measure(x).largest
                 solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
                 if solved or (step.planes is not None and step.planes.beyond()):
@@ -128,12 +128,12 @@ class CondensedBody:
             left = step.b + self._nodal(force) - self._held_by.multiply(x)
             left[self._body.fixed] = 0.0
             base, known, starts = x + held(left), force, [force]
-            self._move_planes(step, force)
+            self._planes.move(step, force)
             anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
-            moved = (result.displacement.ravel(), anchored, self._driving(step))
+            moved = (result.displacement.ravel(), anchored, self._planes.driving(step))
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result = best
-        self._move_planes(step, force)
+        self._planes.move(step, force)
         self.past.append((q, force, self._tied))
         forward = max(result.change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
@@ -163,18 +163,6 @@ class CondensedBody:
         node = gdim * (dofs // gdim)[:, None] + np.arange(gdim)
         return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
 
-    def _gathered_axes(self, planes) -> np.ndarray:
-        """``D`` of all nodes along the principal axes, ``shape=(rows, m)``.  Collective."""
-        local = np.einsum("nij,njm->nim", self._turns, np.concatenate(planes.axes))
-        return self.gather(local.reshape(-1, planes.count))
-
-    def _move_planes(self, step, force: np.ndarray) -> None:
-        if step.planes is not None:
-            step.planes.move_to(force[self.dim * self.nodes + self._anchored :].copy())
-
-    def _driving(self, step) -> np.ndarray:
-        return np.zeros(0) if step.planes is None else step.planes.driving()
-
     def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
@@ -184,7 +172,7 @@ class CondensedBody:
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
         held = anchored.gather(anchored.of(displacement))
-        return np.concatenate((nodes.gather(local), held, self._driving(step)))
+        return np.concatenate((nodes.gather(local), held, self._planes.driving(step)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Displacement of owned dofs with more forces of all rows than ``base`` has."""
@@ -275,16 +263,6 @@ class CondensedBody:
             for name in ("mu", "p")
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
-
-
-def _bordered(W: np.ndarray, D: np.ndarray, springs: np.ndarray) -> np.ndarray:
-    """``W`` with rows and columns for motions of planes, their springs on the diagonal."""
-    size, m = len(W), len(springs)
-    bordered = np.zeros((size + m, size + m))
-    bordered[:size, :size] = W
-    bordered[: len(D), size:], bordered[size:, : len(D)] = -D, -D.T
-    bordered[size:, size:] = -np.diag(springs)
-    return bordered
 
 
 def components(contacts) -> int:

@@ -1,0 +1,76 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Planes that force drives in the condensed problem: rows and columns for their motions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.contact.driven import driven_planes
+
+
+class CondensedPlanes:
+    """Motions ``c`` of planes beside the reactions of the nodes, ``w = q + W r - D c``.
+
+    Equilibrium of a plane, ``-D^T r - k c + F = 0``, is a tied row.  Of springs ``k`` that are stiffer than a node ``c``
+    is eliminated: ``w = q + (W + D k^-1 D^T) r``, from where the spring is not stretched.
+
+    Args:
+        body: The body.
+        contacts: Its contacts.
+        turns: Rotations of the nodes' frames to the principal axes, ``shape=(n, dim, gdim)``.
+        stiffness: Normal stiffness of all nodes, force per length.  Collective.
+
+    Attributes:
+        tied: Number of tied rows.
+    """
+
+    def __init__(self, body, contacts, turns: np.ndarray, stiffness: np.ndarray):
+        planes = driven_planes(body, contacts)
+        self.tied, self._planes = 0, planes
+        if planes is None:
+            return
+        local = np.einsum("nij,njm->nim", turns, np.concatenate(planes.axes))
+        parts = body.comm.allgather(local.reshape(-1, planes.count))
+        self._stiff = planes.springs > stiffness.max()
+        self._stiffest = float(stiffness.max())
+        self._axes, self._springs = np.concatenate(parts), planes.springs
+        self.tied = int((~self._stiff).sum())
+
+    def border(self, W: np.ndarray, nodal: int) -> np.ndarray:
+        """``W`` with the planes.
+
+        Args:
+            W: Compliance, length per force.
+            nodal: How many of its rows are of nodes.
+        """
+        if self._planes is None:
+            return W
+        stiff, loose, size = self._stiff, ~self._stiff, len(W)
+        W[:nodal, :nodal] += self._axes[:, stiff] / self._springs[stiff] @ self._axes[:, stiff].T
+        bordered = np.zeros((size + self.tied,) * 2)
+        bordered[:size, :size] = W
+        bordered[:nodal, size:] = -self._axes[:, loose]
+        bordered[size:, :nodal] = -self._axes[:, loose].T
+        bordered[size:, size:] = -np.diag(self._springs[loose])
+        return bordered
+
+    def begin(self, step) -> None:
+        """Planes begin where they were; where springs are not stretched if these are eliminated."""
+        if step.planes is not None:
+            step.planes.move_to(np.zeros(step.planes.count))
+            self._at_first = step.planes.at_rest(self._stiffest)
+            step.planes.move_to(self._at_first)
+
+    def move(self, step, force: np.ndarray) -> None:
+        """Move the planes where forces of all rows have them, the tied rows' last."""
+        if step.planes is not None:
+            moved, stiff = np.zeros(step.planes.count), self._stiff
+            moved[~stiff] = force[len(force) - self.tied :]
+            reactions = force[: len(self._axes)]
+            moved[stiff] = -(reactions @ self._axes[:, stiff]) / self._springs[stiff]
+            step.planes.move_to(self._at_first + moved)
+
+    def driving(self, step) -> np.ndarray:
+        """Forces that drive the planes of the tied rows at present."""
+        return np.zeros(0) if step.planes is None else step.planes.driving()[~self._stiff]

@@ -1,0 +1,351 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Planes driven by force: closed forms, balances, and the displacement-driven runs whose forces they are given."""
+
+import numpy as np
+import pytest
+import scenes
+from dolfinx import mesh
+
+import dolfinx_contact as dc
+from dolfinx_contact.contact.plane_balance import PlaneBalance
+from mechanics.scenes import build, problem_of
+
+COMM = scenes.COMM
+E, TOL = 210e3, 1e-10
+SOLVERS = {"default": None, "fixed point": dc.FixedPoint(), "paper's map": dc.FixedPoint(map="bipotential")}  # fmt: skip
+CELLS = {3: (4, 4, 2), 2: (4, 3)}
+
+
+def free_block(free, dim=3, **options):
+    """A block whose top stands still, on a plane that is free in some directions; pushes it in the scene's axes."""
+    scene = scenes.block(cells=CELLS[dim], tol=TOL, **options)
+    scene.move_top(*np.zeros(dim))
+    scene.plane.free = free
+
+    def push(*force):
+        scene.plane.force = scene.axes @ np.array(force, dtype=float)
+        return scene.problem.solve()
+
+    scene.push = push
+    scene.force = lambda: scene.axes.T @ scene.contact.force()
+    scene.moved = lambda: scene.axes.T @ scene.plane.displacement
+    return scene
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_pressed_block_has_the_pressure_force_over_area(dim, solver):
+    """Without Poisson's effect: pressure F / A everywhere, and the plane rises by F h / (E A)."""
+    scene = free_block(("n",), dim, mu=0.0, p=None, nu=0.0, solver=SOLVERS[solver])
+    for load in (1e-5 * E, 1e-3 * E, 2e-3 * E, 5e-4 * E):
+        scene.push(*np.zeros(dim - 1), load)
+        assert np.allclose(scene.contact.pressure, load, rtol=1e-8, atol=0)
+        assert scene.moved()[-1] == pytest.approx(load * 0.6 / E, rel=1e-8)
+        assert scene.force()[-1] == pytest.approx(load, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_stroke_under_dead_weight_is_resisted_by_mu_times_it(dim, solver):
+    """Normal force prescribed, stroke prescribed: once the block slides, friction is mu N, N stays."""
+    scene = free_block(("n",), dim, mu=0.3, p=None, solver=SOLVERS[solver])
+    load = 1e-3 * E
+    for stroke in (0.0, 0.5, 1.0):
+        scene.plane.displacement = np.array([stroke, *scene.plane.displacement[1:]])
+        scene.push(*np.zeros(dim - 1), load)
+        assert scene.moved()[0] == stroke
+        assert scene.force()[-1] == pytest.approx(load, rel=1e-9)
+    assert scene.force()[0] == pytest.approx(0.3 * load, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("case", ["isotropic", "not associated", "in the plane"])
+def test_forces_of_a_displacement_driven_run_lead_back_to_its_displacements(case, solver):
+    """A plane that is given the forces which a prescribed programme needed goes through the same programme."""
+    dim, mu, p, free = {
+        "isotropic": (3, 0.3, None, ("t1", "n")),
+        "not associated": (3, (0.3, 0.15), (0.05, 0.20), ("t1", "t2", "n")),
+        "in the plane": (2, 0.3, None, ("t", "n")),
+    }[case]
+    given = free_block((), dim, mu=mu, p=p)
+    driven = free_block(free, dim, mu=mu, p=p, solver=SOLVERS[solver])
+    programme = [(0, 0, 2), (0.5, 0.2, 2), (1.0, 0.3, 2.2), (0.6, 0.3, 1.8), (-0.4, 0.1, 2.5)]
+    for place in programme:
+        place = 1e-3 * np.array(place)[[0, 2] if dim == 2 else [0, 1, 2]]
+        if case == "isotropic":
+            driven.plane.displacement = np.array([*driven.plane.displacement[:1], place[1], 0])
+        given.plane.displacement = place
+        given.problem.solve()
+        step = driven.push(*given.force())
+        assert max(step.error, step.slip_error) <= TOL
+        free_part = np.array([name in free for name in driven.plane.directions])
+        assert driven.moved() == pytest.approx(place, abs=1e-7 * 2e-3)
+        assert driven.force()[free_part] == pytest.approx(given.force()[free_part], abs=1e-8 * E * 1e-3)  # fmt: skip
+
+
+@pytest.mark.parametrize("length, modulus, turned", [(1, 1, True), (1e-6, 1e9, False), (1e8, 1e-12, True)])  # fmt: skip
+def test_units_and_axes_do_not_matter(length, modulus, turned):
+    """Lengths, moduli and the directions of the scene change the plane's motion as they must, and nothing else."""
+    found = []
+    for size, stiff, turn in ((1, 1, None), (length, modulus, scenes.rotation(3) if turned else None)):  # fmt: skip
+        options = dict(length=size, E=E * stiff, turn=turn)
+        scene = free_block(("t1", "n"), **options)
+        unit = E * stiff * size**2 * 1e-3
+        steps = [scene.push(force * unit, 0, unit).counts for force in (0.0, 0.1, 0.27, -0.1)]
+        found.append((scene.moved() / size, scene.force() / unit, steps))
+    (moved, force, steps), (moved_too, force_too, steps_too) = found
+    assert moved_too == pytest.approx(moved, abs=1e-8 * np.abs(moved).max())
+    assert force_too[[0, 2]] == pytest.approx([-0.1, 1.0], rel=1e-9)
+    assert steps == steps_too
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_shear_force_below_friction_sticks(dim):
+    """Where nothing slips the plane moves in proportion to the force, and back to where it was."""
+    scene = free_block(("t1", "n") if dim == 3 else ("t", "n"), dim, mu=20.0, p=None)
+    load = 1e-3 * E
+    rest = np.zeros(dim - 2)
+    scene.push(0, *rest, load)
+    at = [scene.moved()[0]]
+    for part in (0.1, 0.2, -0.2, 0.0):
+        assert scene.push(part * load, *rest, load).counts.slip == 0
+        at.append(scene.moved()[0])
+    at = np.array(at) - at[0]
+    assert at[1:] / at[1] == pytest.approx([1, 2, -2, 0], abs=1e-7)
+    assert at[1] > 0
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_no_state_beyond_gross_sliding(dim, solver):
+    """More than mu N is refused, whether N is given or found; the last state stays, and the run goes on from it."""
+    tangent, rest = ("t1" if dim == 3 else "t"), np.zeros(dim - 2)
+    for free in ((tangent, "n"), (tangent,)):
+        scene = free_block(free, dim, mu=0.3, p=None, solver=solver)
+        scene.plane.displacement = np.append(np.zeros(dim - 1), 0.0 if "n" in free else 1e-3)
+        load = 1e-3 * E
+        scene.push(0.2 * load, *rest, load)
+        stood, reaction = scene.plane.displacement, scene.contact.reaction
+        for part in (1.2, -1.2) if "n" in free else (3.0,):
+            with pytest.raises(dc.NotConverged, match="the plane slides away") as caught:
+                scene.push(part * 0.3 * load, *rest, load)
+            assert caught.value.step.error > TOL
+            assert (scene.plane.displacement == stood).all()
+            assert (scene.contact.reaction == reaction).all()
+        scene.push(0.24 * load, *rest, load)
+        assert scene.force()[0] == pytest.approx(0.24 * load, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_spring_in_series(solver):
+    """Body and spring share the drive: R = F + k (drive - u) with R = E A u / h; pulled off, the spring alone holds."""
+    scene = free_block(("n",), mu=0.0, p=None, nu=0.0, solver=SOLVERS[solver])
+    body, drive = E / 0.6, 1e-3
+    for k in (1e-6 * body, body, 1e6 * body):
+        scene.plane.stiffness = k
+        for force in (0.0, 1e-4 * body):
+            scene.plane.drive = np.array([0, 0, drive])
+            scene.push(0, 0, force)
+            assert scene.moved()[2] == pytest.approx((force + k * drive) / (k + body), rel=1e-8)
+        scene.plane.drive = np.array([0, 0, -drive])
+        scene.push(0, 0, 0.5 * k * drive)
+        assert scene.moved()[2] == pytest.approx(-0.5 * drive, rel=1e-8)
+        assert (scene.contact.reaction == 0).all()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_pulled_spring_slides_at_mu_n(solver):
+    """A slider pulled by a spring: once it slides friction is mu N, and the spring is stretched by mu N / k."""
+    scene = free_block(("t1", "n"), mu=0.3, p=None, solver=SOLVERS[solver])
+    load, k = 1e-3 * E, 1e-2 * E
+    scene.plane.stiffness = (k, 0.0)
+    scene.push(0, 0, load)
+    for drive in (0.5, 1.0, 1.5):
+        scene.plane.drive = np.array([drive, 0, 0])
+        scene.push(0, 0, load)
+    assert scene.force()[[0, 2]] == pytest.approx([0.3 * load, load], rel=1e-9)
+    assert scene.moved()[0] == pytest.approx(1.5 - 0.3 * load / k, rel=1e-9)
+
+
+def two_contacts():
+    """A block that meets one plane in two places."""
+    scene = scenes.block(cells=CELLS[3], mu=0.3, p=None)
+    scene.move_top(0, 0, 0)
+
+    def facets(low, high):
+        def here(x):
+            return np.isclose(x[2], 0) & (x[0] > low - 0.01) & (x[0] < high + 0.01)
+
+        return mesh.locate_entities_boundary(scene.mesh, 2, here)
+
+    laws = (((-0.5, 0.0), dc.Friction(0.3)), ((0.25, 0.5), dc.Friction(0.1)))
+    contacts = [dc.Contact(scene.V, facets(*ends), scene.plane, law) for ends, law in laws]
+    return scene.plane, dc.ContactProblem(scene.F, scene.u, contacts, bcs=scene.bcs, tol=TOL)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_two_contacts_share_a_plane(solver):
+    """A plane under two contacts has one motion, that of the run with displacements that needs these forces."""
+    (plane, problem), (given, other) = two_contacts(), two_contacts()
+    problem.solver, plane.free = solver, ("t1", "n")
+    for place in ((0, 0, 1e-3), (3e-4, 0, 1.1e-3), (1e-4, 0, 9e-4)):
+        given.displacement = place
+        other.solve()
+        plane.force = sum(contact.force() for contact in other.contacts)
+        problem.solve()
+        together = sum(contact.force() for contact in problem.contacts)
+        assert together[[0, 2]] == pytest.approx(plane.force[[0, 2]], rel=1e-9)
+        assert plane.displacement == pytest.approx(place, abs=1e-10)
+    with pytest.raises(dc.NotConverged, match="slides away"):
+        plane.force = (0.31 * plane.force[2], 0, plane.force[2])
+        problem.solve()
+
+
+def test_an_unbalanced_plane_is_never_converged(monkeypatch):
+    """Its out-of-balance force counts in the error, over the same scale as those of the nodes."""
+    scene = free_block(("n",), mu=0.0, p=None, nu=0.0)
+    load = 1e-3 * E
+    scene.push(0, 0, load)
+    problem, x = scene.problem, scene.u.x.array[: scene.problem.body.size].copy()
+    scene.plane.force = (0, 0, load * (1 + 1e-6))
+    monkeypatch.setattr(PlaneBalance, "reach", lambda self: None)  # it stays where it was
+    step = problem.load_step()
+    size = np.sqrt(COMM.allreduce((scene.contact.reaction**2).sum()))
+    assert step.measure(x).error == pytest.approx(1e-6 * load / size, rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_checkpoints_resets_and_failures_keep_the_plane(solver, tmp_path):
+    """The plane's place is part of the history: a run continued from a file, or after a failure, goes on alike."""
+    path, load = COMM.bcast(tmp_path / "state.npz", root=0), 1e-3 * E
+    programme = [(0, 1), (0.1, 1), (0.25, 1.1), (-0.2, 1.1)]
+    scene, other = (free_block(("t1", "n"), mu=0.3, p=None, solver=solver) for _ in range(2))
+    for k, (side, down) in enumerate(programme):
+        scene.push(side * load, 0, down * load)
+        if k == 1:
+            scene.problem.save(path)
+            stood = scene.plane.displacement
+            with pytest.raises(ValueError, match="NaN"):
+                scene.held.x.array[:] = np.nan
+                scene.problem.solve()
+            scene.move_top(0, 0, 0)
+            assert (scene.plane.displacement == stood).all()
+    other.problem.load(path)
+    assert (other.plane.displacement == stood).all()
+    for side, down in programme[2:]:
+        other.push(side * load, 0, down * load)
+    assert other.plane.displacement == pytest.approx(scene.plane.displacement, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_how_a_plane_is_driven_may_change_between_steps(solver):
+    """Pressed by displacement, held by the force that took, sheared by force, then by displacement: one history."""
+    scene, given = (free_block((), mu=0.3, p=None, solver=s) for s in (solver, None))
+    for place in ((0, 0, 1e-3), (2e-4, 0, 1e-3), (3e-4, 0, 1e-3), (1e-4, 0, 1.2e-3)):
+        given.plane.displacement = place
+        given.problem.solve()
+        free = {0: (), 2e-4: ("n",), 3e-4: ("t1", "n"), 1e-4: ()}[place[0]]
+        scene.plane.free = free
+        start = scene.plane.displacement
+        stays = [name in free for name in scene.plane.directions]
+        scene.plane.displacement = np.where(stays, start, place)
+        scene.push(*given.force())
+        assert scene.moved() == pytest.approx(place, abs=1e-10)
+        assert scene.force() == pytest.approx(given.force(), abs=1e-8 * E * 1e-3)
+
+
+def test_ranks_do_not_change_the_motion():
+    """All ranks together find what one rank alone finds, with a factorisation and with the condensed system."""
+    for solver in (None, dc.FixedPoint()):
+        found = []
+        for comm in (COMM, scenes.MPI.COMM_SELF):
+            scene = free_block(("t1", "n"), mu=0.3, p=None, solver=solver, comm=comm)
+            for part in (0.0, 0.25, -0.1):
+                scene.push(part * 1e-3 * E, 0, 1e-3 * E)
+            found.append(scene.plane.displacement)
+        assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+def test_a_body_on_soft_springs():
+    """A body on soft springs, with its anchors or its motions balanced apart: weight on the plane, and a shear force."""
+    for spring in (1e-2, 1e-4):
+        for options in ({}, {"solver": dc.FixedPoint()}):
+            scene = build(spring=spring, mu=0.5)
+            problem = problem_of(scene, tol=1e-8, **options)
+            scene.move_top((0, 0, 0))
+            scene.plane.free = ("t1", "n")
+            for part in (0.0, 0.2):
+                scene.plane.force = 1e-3 * spring * E * np.array([part, 0, 1.0])
+                problem.solve()
+            force = scene.contact.force()
+            assert force[[0, 2]] == pytest.approx(scene.plane.force[[0, 2]], rel=1e-7)
+            # springs of the top, per area: they carry all of it
+            assert scene.plane.displacement[2] == pytest.approx(1e-3, rel=2 * spring + 1e-6)
+
+
+MISTAKES = {
+    "unknown name": (dict(free=("n", "t")), "tuple of names among"),
+    "a string": (dict(free="n"), "tuple of names among"),
+    "a name of two dimensions": (dict(free=("t",)), "tuple of names among"),
+    "force of two numbers": (dict(force=(0, 1)), "vector of 3"),
+    "force not finite": (dict(force=(0, 0, np.nan)), "finite"),
+    "stiffness below zero": (dict(stiffness=-1.0), "zero or more"),
+    "stiffness not finite": (dict(stiffness=np.inf), "NaN or infinity"),
+    "two stiffnesses": (dict(free=("n",), force=(0, 0, 1), stiffness=(1, 2)), "2 numbers"),
+    "drive of two numbers": (dict(drive=(0, 1)), "vector of 3"),
+    "no force": (dict(free=("n",)), "set plane.force"),
+    "nothing for one direction": (dict(free=("t1", "n"), stiffness=(0, 1)), "set plane.force"),
+    "pulled off": (dict(free=("n",), force=(0, 0, -1)), "does not press"),
+    "no weight": (dict(free=("t1", "n"), force=(1, 0, 0)), "does not press"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_nonsense_is_refused(mistake):
+    """What makes no sense is a ValueError that says so, on all ranks; the problem can be used on."""
+    given, message = MISTAKES[mistake]
+    scene = free_block((), mu=0.3, p=None)
+    with pytest.raises(ValueError, match=message):
+        for name, value in given.items():
+            setattr(scene.plane, name, value)
+        scene.problem.solve()
+    scene.plane.free, scene.plane.stiffness = ("n",), 0.0
+    scene.push(0, 0, E * 1e-3)
+
+
+def test_nothing_holds_a_plane_without_friction():
+    """A plane that is free along itself needs friction or a spring."""
+    scene = free_block(("t1", "n"), mu=0.0, p=None)
+    with pytest.raises(ValueError, match="nothing holds the plane"):
+        scene.push(0, 0, E * 1e-3)
+    scene.plane.stiffness = (E, 0)
+    scene.push(E * 1e-3, 0, E * 1e-3)
+    assert scene.moved()[0] == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_planes_that_are_driven_differently_on_ranks_are_refused():
+    """Force and free directions must be the same on all ranks."""
+    if COMM.size == 1:
+        pytest.skip("needs more than one rank")
+    scene = free_block(("n",), mu=0.3, p=None)
+    with pytest.raises(ValueError, match="differs between ranks"):
+        scene.push(0, 0, E * 1e-3 * (1 + COMM.rank))
+
+
+def test_a_plane_beyond_the_body_comes_to_it():
+    """A dead weight that starts far from the body presses it all the same."""
+    scene = free_block(("n",), mu=0.3, p=None, nu=0.0)
+    for far in (-3.0, 0.02):
+        scene.plane.displacement = (0, 0, far)
+        scene.push(0, 0, E * 1e-3)
+        assert scene.force()[2] == pytest.approx(E * 1e-3, rel=1e-9)
+        assert 0 < scene.moved()[2] < 1e-3
+
+
+def test_tables_have_the_motion_of_driven_planes(tmp_path):
+    """History has a column of the plane's displacement for each direction, if the plane is driven by force."""
+    scene = free_block(("n",), mu=0.3, p=None)
+    history = dc.History(scene.problem)
+    history.record(scene.push(0, 0, E * 1e-3))
+    assert history.column("contact0_plane_z")[0] == scene.plane.displacement[2]
