@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.contact.contact import Contact as Contact
     from dolfinx_contact.contact.history import Status as Status
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.increments import advance as advance
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
     from dolfinx_contact.law.friction import Friction as Friction
     from dolfinx_contact.law.friction_cone import load_function as load_function
@@ -66,6 +67,7 @@ _HOME = {  # the module of every name
     "Status": "contact.history",
     "Step": "results.record",
     "Wear": "law.wear",
+    "advance": "increments",
     "bipotential_gap": "law.bipotential",
     "load_function": "law.friction_cone",
     "project_cone": "law.friction_cone",

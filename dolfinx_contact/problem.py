@@ -173,6 +173,7 @@ class ContactProblem(ProblemStates):
         self._show(found.x)
         for contact in self.contacts:
             contact.advance()
+        self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
         warn_of_rounding(done, self.tol)

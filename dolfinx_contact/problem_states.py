@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from os import PathLike
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,60 @@ from dolfinx_contact.results import checkpoint
 from dolfinx_contact.solvers.condensed import KEPT
 
 
+class Kept(NamedTuple):
+    """All that a step ends with and the next one starts from: references, nothing is copied."""
+
+    states: list  # the last displacement and the one before
+    contacts: list  # histories
+    planes: list  # displacements
+    known: Any  # the body's free state
+    past: tuple  # steps of the condensed solver
+
+
 class ProblemStates(ProblemOptions):
     """The last converged states of a ``ContactProblem``, which has body, contacts and displacement."""
+
+    _before: Kept | None = None
+
+    def rewind(self) -> None:
+        """Go back by one accepted step, as if it had not been made, to try another one.  Collective.
+
+        Displacement, contacts with their sums, and planes are those of the end of the step before; loads, boundary values and
+        laws stay as they are.  One step is kept: after it, ``rewind`` again needs another one to go back by.
+
+        Raises:
+            ValueError: no step has been accepted since the beginning, the last ``reset``, ``load`` or ``rewind``.
+        """
+        check_alive(self, self.body, self.contacts)
+        if self._before is None:
+            raise ValueError(
+                "there is no step to go back by: rewind goes back once after a step; save and load go further."
+            )
+        kept = self._before
+        self._states, self.body.known = kept.states, kept.known
+        for contact, history, where in zip(self.contacts, kept.contacts, kept.planes):
+            contact.go_back(history)
+            contact.plane.displacement = where
+        self._remember(kept.past)
+        self._restore()
+        self._keep()
+
+    def _keep(self, step: bool = False) -> None:
+        """Keep the present state to go back to; after a ``step`` the one before, too."""
+        self._before = self._kept if step else None
+        self._kept = Kept(
+            self._states,
+            [contact.history() for contact in self.contacts],
+            [contact.plane.displacement for contact in self.contacts],
+            self.body.known,
+            tuple(self._memory.get("past", ())),
+        )
+
+    def _remember(self, past) -> None:
+        """Starts for the condensed solver."""
+        kept = self._memory.setdefault("past", deque(maxlen=KEPT))
+        kept.clear()
+        kept.extend(past)
 
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history; planes stay where they are."""
@@ -30,6 +83,7 @@ class ProblemStates(ProblemOptions):
         self._memory.clear()
         for contact in self.contacts:
             contact.reset()
+        self._keep()
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
@@ -54,10 +108,9 @@ class ProblemStates(ProblemOptions):
         """
         check_alive(self, self.body, self.contacts)
         self._states, past = checkpoint.load(path, self.body, self.contacts)
-        kept = self._memory.setdefault("past", deque(maxlen=KEPT))
-        kept.clear()
-        kept.extend(past)
+        self._remember(past)
         self._restore()
+        self._keep()
 
     def _show(self, x: np.ndarray) -> None:
         self.u.x.array[: self.body.size] = x

@@ -110,7 +110,7 @@ class Contact(ContactResults):
     def reset(self) -> None:
         """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
         n, gdim = self.points.count, self.points.dim
-        self._settled_by: Friction | None = None
+        self._settled_by = None
         moved = self.frame @ self.plane.displacement
         self.begin(
             State(

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,8 @@ SUMS = ("dissipation", "slip_path", "wear_depth")
 class ContactHistory(Guarded):
     """States and sums of ``n`` nodes.  All arrays are read-only: the next step starts from them."""
 
+    _settled_by: Any = None  # friction of the last converged step
+
     def begin(self, state: State) -> None:
         """Forget everything: this is the state, and all sums are zero."""
         self._sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
@@ -56,6 +58,15 @@ class ContactHistory(Guarded):
         added = dict(zip(SUMS, (work, path, depth)))
         self._sums = {name: frozen(self._sums[name] + added[name]) for name in SUMS}
         self._last = self._present
+
+    def history(self) -> tuple:
+        """Last converged state and sums, and the law that was slipped by, for ``go_back``."""
+        return self._last, self._sums, self._settled_by
+
+    def go_back(self, history: tuple) -> None:
+        """Take back what ``history`` returned."""
+        self._last, self._sums, self._settled_by = history
+        self.restore()
 
     def save(self) -> dict[str, np.ndarray]:
         """Last converged state and sums as arrays by name; this rank's nodes."""

@@ -1,0 +1,121 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A programme of loading in increments that are halved where a step fails, and grow again."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dolfinx_contact.checks import finite, positive
+from dolfinx_contact.collective import agree, raised_together
+from dolfinx_contact.results.history import History
+from dolfinx_contact.results.record import NotConverged, Step
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+LOG = logging.getLogger("dolfinx_contact")
+
+# Steps in a row after which an increment is doubled again.
+EASY = 2
+
+
+def advance(
+    problem: ContactProblem,
+    programme: Callable[[float], object],
+    points: Sequence[float],
+    start: float = 0.0,
+    smallest: float = 1 / 64,
+    history: History | None = None,
+    monitor: Callable[[float, Step], object] | None = None,
+) -> History:
+    """Solve load steps along a programme, from ``start`` through all ``points``.
+
+    An increment from one point to the next is tried as a whole.  A step that does not converge is tried again with half
+    of it, from the last converged state; after two steps that converge increments are doubled again.  Every point is the end of a step.
+
+    ``logging.getLogger("dolfinx_contact")`` tells of halved increments; on a terminal there is a progress bar if tqdm is installed.
+
+    Args:
+        problem: The ContactProblem.  Collective.
+        programme: Function of the programme's parameter, a time for instance, that sets loads, boundary values and planes.
+        points: Values of the parameter, rising.
+        start: Its value for the problem's present state.
+        smallest: Smallest increment, over the distance of its two points.
+        history: Table to record every step in, with the column ``t``; None makes one.
+        monitor: None, or a function of parameter and record, called after every step.
+
+    Returns:
+        The table.
+
+    Raises:
+        NotConverged: a step with the smallest increment did not converge; problem and table are at the last one that did.
+        ValueError: points that do not rise.
+    """
+    comm = problem.body.comm
+    with raised_together(comm):
+        ends = np.atleast_1d(finite("points", points))
+        if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
+            raise ValueError(f"points must rise from start = {start!r}, got {points!r}.")
+        smallest = positive("smallest", smallest, finite=True)
+        if not callable(programme):
+            raise ValueError(f"programme must be a function of one number, got {programme!r}.")
+    agree(comm, points=ends.tolist(), start=float(start), smallest=smallest)
+    history = History(problem) if history is None else history
+    bar = _bar(comm.rank, ends[-1] - start)
+    now = float(start)
+    try:
+        for end in ends.tolist():
+            for at, step in _increments(problem, programme, now, end, smallest):
+                history.record(step, t=at)
+                if monitor is not None:
+                    monitor(at, step)
+                if bar is not None:
+                    bar.update(at - now)
+                now = at
+    finally:
+        if bar is not None:
+            bar.close()
+    return history
+
+
+def _increments(problem, programme, now: float, end: float, smallest: float):
+    """Parameter and record of every step from ``now`` to ``end``."""
+    whole, begun = end - now, now
+    parts, done, easy = (
+        1,
+        0,
+        0,
+    )  # increments are the whole over ``parts``, of which so many are done
+    while done < parts:
+        at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
+        programme(at)
+        try:
+            step = problem.solve()
+        except NotConverged as failure:
+            if 0.5 / parts < smallest:
+                raise
+            parts, done, easy = 2 * parts, 2 * done, 0
+            if problem.body.comm.rank == 0:
+                LOG.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
+            continue
+        now, done, easy = at, done + 1, easy + 1
+        yield at, step
+        if easy >= EASY and parts > 1 and done % 2 == 0:
+            parts, done, easy = parts // 2, done // 2, 0
+
+
+def _bar(rank: int, total: float):
+    """A progress bar, on a terminal and if tqdm is installed."""
+    if rank != 0 or not sys.stderr.isatty():
+        return None
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return None
+    return tqdm(total=total)
