@@ -3,6 +3,7 @@
 import sys
 
 import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
+from dolfinx_contact.compat import second_order
 
 # isort: split
 import numpy as np
@@ -45,7 +46,7 @@ def hooke(strain, E: float, nu: float):
     return lame * ufl.tr(strain) * ufl.Identity(strain.ufl_shape[0]) + 2 * shear * strain
 
 
-def rounded_body(radius, contact, size, cells: int, half=False, crossed=False):
+def rounded_body(radius, contact, size, cells: int, half=False, crossed=False, order=1):
     """A body with the face y = x^2 / (2 radius), as in the theory of Hertz, in two dimensions.
 
     Widths of its quadrilaterals grow like ``cosh(x / fine)``; ``fine`` is such that a quarter of them are within
@@ -59,6 +60,7 @@ def rounded_body(radius, contact, size, cells: int, half=False, crossed=False):
         half: Only the half x > 0, for symmetry.
         crossed: Each quadrilateral is cut into four triangles by its diagonals; in first order these do not lock
             when the material hardly changes its volume [B. Mercier, RAIRO Anal. Numer. 13 (1979) 117].
+        order: Of the cells' geometry; with 2 their edges are curved, for displacements of second order.
 
     Returns:
         The mesh; the facets of the face within twice ``contact``; those of the far boundary, the sides and the top.
@@ -71,6 +73,7 @@ def rounded_body(radius, contact, size, cells: int, half=False, crossed=False):
     kind = mesh.CellType.triangle if crossed else mesh.CellType.quadrilateral
     diagonal = mesh.DiagonalType.crossed
     domain = mesh.create_rectangle(COMM, corners, [across, cells], kind, diagonal=diagonal)
+    domain = second_order(domain) if order == 2 else domain
     width = np.arcsinh(2 * contact / fine) / np.arcsinh(size / fine)
 
     def on_face(x):

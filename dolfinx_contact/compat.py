@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from inspect import signature
 from types import SimpleNamespace
 from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
+import ufl
 from dolfinx import fem, graph, la
+from dolfinx.mesh import create_mesh
 from petsc4py import PETSc
 
 if np.issubdtype(PETSc.ScalarType, np.complexfloating):
@@ -60,6 +63,24 @@ def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int = 3) -> Any:
     return SimpleNamespace(mesh=found[0], cell_tags=found[1], facet_tags=found[2])
 
 
+def second_order(domain: Any) -> Any:
+    """A mesh with the cells of another one, each with the nodes of second order, which may then be moved.  Collective."""
+    gdim, cell = domain.geometry.dim, domain.topology.cell_name()
+    V = functionspace(domain, ("Lagrange", 2, (gdim,)))
+    count, index_map = domain.topology.index_map(domain.topology.dim).size_local, V.dofmap.index_map
+    cells = index_map.local_to_global(cell_nodes(V)[:count].ravel().astype(np.int32))
+    cells = cells.reshape(count, -1).astype(np.int64)
+    x = V.tabulate_dof_coordinates()[: index_map.size_local, :gdim].copy()
+    if hasattr(ufl, "VectorElement"):  # legacy UFL elements
+        element = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 2))
+    else:
+        import basix.ufl
+
+        element = basix.ufl.element("Lagrange", cell, 2, shape=(gdim,))
+    given = {"x": x, "domain" if "domain" in signature(create_mesh).parameters else "e": element}
+    return create_mesh(domain.comm, cells, **given)
+
+
 def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
     """A ``partitioner`` for ``create_box`` and others, from a function of this rank's number of cells.
 
@@ -101,17 +122,38 @@ def cell_nodes(V):
 
 
 def original_nodes(V):
-    """Index of each owned node in the mesh as it was read or made, whatever the ranks; ``V`` of degree 1."""
-    geometry, nodes = V.mesh.geometry, cell_nodes(V)
+    """A number for each owned node by the mesh as it was read or made, whatever the ranks; ``V`` of degree 1 or 2.
+
+    That of a vertex is its index there. The node of an edge, face or cell is named by two of its vertices that face each
+    other, the lowest and its opposite: two entities of a mesh do not share both.
+    """
+    geometry, nodes, topology = V.mesh.geometry, cell_nodes(V), V.mesh.topology
     points = getattr(geometry, "dofmaps", None)  # one for each type of cells since 0.8
     points = geometry.dofmap if points is None else points(0) if callable(points) else points[0]
     if hasattr(points, "array"):  # an adjacency list before 0.8
         points = points.array.reshape(-1, points.array.size // max(points.num_nodes, 1) or 1)
-    index_map = V.dofmap.index_map
+    index_map, layout = V.dofmap.index_map, V.dofmap.dof_layout
     original = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int64)
-    corners = points[: len(nodes), : nodes.shape[1]]
-    original[nodes] = np.asarray(geometry.input_global_indices)[corners]
+    count = dolfinx.cpp.mesh.cell_num_entities(topology.cell_type, 0)
+    vertices = np.asarray(geometry.input_global_indices)[points[: len(nodes), :count]]
+    for dim in range(topology.dim + 1):
+        for entity in range(dolfinx.cpp.mesh.cell_num_entities(topology.cell_type, dim)):
+            own = layout.entity_dofs(dim, entity)
+            if len(own) > 1:
+                raise ValueError("nodes are named by their mesh for spaces of degree 1 and 2 only.")
+            if len(own) == 1:
+                corners = [k for k in layout.entity_closure_dofs(dim, entity) if k < count]
+                original[nodes[:, own[0]]] = _name_of(vertices[:, corners])
     return original[: index_map.size_local]
+
+
+def _name_of(vertices):
+    """One number from the vertices of an entity, ``shape=(n, m)``, which face each other from both ends of a row."""
+    low, rows = vertices.argmin(axis=1), np.arange(len(vertices))
+    if vertices.shape[1] == 1:
+        return vertices[:, 0]
+    opposite = vertices[rows, vertices.shape[1] - 1 - low]
+    return (vertices[rows, low].astype(np.int64) + 1 << 32) + opposite
 
 
 def bc_dofs(bc, size: int):

@@ -169,13 +169,12 @@ def test_no_facets_on_one_rank_is_fine(scene):
     "element, message",
     [
         (("Lagrange", 1), "component"),
-        (("DG", 1, (3,)), "continuous Lagrange of degree 1"),
+        (("DG", 1, (3,)), "continuous Lagrange, got"),
         (("Lagrange", 1, (2,)), "component"),
-        (("Lagrange", 2, (3,)), "degree 1"),
     ],
 )
 def test_contact_refuses_spaces(scene, element, message):
-    """Displacements are first-order continuous Lagrange vectors of the mesh's dimension."""
+    """Displacements are continuous Lagrange vectors of the mesh's dimension."""
     V = functionspace(scene.mesh, element)
     with pytest.raises(ValueError, match=message):
         dc.Contact(V, scene.facets, plane(), FRICTION)

@@ -30,11 +30,8 @@ def check_space(V) -> None:
             f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
             f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
         )
-    if compat.lagrange_degree(V) != 1:
-        raise ValueError(
-            f"V must be continuous Lagrange of degree 1 (other orders are not supported yet), "
-            f"got {V.ufl_element()}."
-        )
+    if compat.lagrange_degree(V) is None:
+        raise ValueError(f"V must be continuous Lagrange, got {V.ufl_element()}.")
 
 
 def checked_facets(facets, index_map, boundary) -> np.ndarray:

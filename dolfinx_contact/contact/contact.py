@@ -21,6 +21,7 @@ from dolfinx_contact.contact.checks import (
     check_wear,
     checked_facets,
 )
+from dolfinx_contact.contact.fields import contact_nodes
 from dolfinx_contact.contact.history import State, Status
 from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.plane import RigidPlane
@@ -43,7 +44,7 @@ class Contact(ContactResults):
     it, and the normal.
 
     Args:
-        V: First-order continuous Lagrange space of displacements, one component per dimension.
+        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2.
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The rigid plane.
         friction: The friction law, the same on all ranks; or on all of them one with coefficients
@@ -55,7 +56,8 @@ class Contact(ContactResults):
             does not fit, a plane of another dimension or without an axis where friction needs one.
 
     Attributes:
-        nodes: Indices of the nodes among the blocks of ``V``, ``shape=(n,)``.
+        nodes: Indices of the nodes among the blocks of ``V``, ``shape=(n,)``: those of the facets, but not
+            vertices of tetrahedra of second order, on which an even pressure makes no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
         points: The ``ContactPoints``: motion as a sparse operator, directions that supports hold.
@@ -82,11 +84,9 @@ class Contact(ContactResults):
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             check_law(plane, friction, gdim)
             check_wear(wear)
-        blocks = fem.locate_dofs_topological(V, fdim, facets)
-        owned = V.dofmap.index_map.size_local
         self.V, self.comm, self.plane, self.frame = V, mesh.comm, plane, frozen(plane.frame)
         self.friction, self.wear, self.rho = friction, wear, None
-        self.nodes = frozen(np.unique(blocks[blocks < owned]))
+        self.nodes = frozen(contact_nodes(V, facets))
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
         described = mesh.comm.bcast(self.described(), root=0)
         with raised_together(mesh.comm):
@@ -99,7 +99,7 @@ class Contact(ContactResults):
         self._flat = (self.x[:, :gdim] - plane.point) @ plane.normal
         dofs = gdim * self.nodes[:, None] + np.arange(gdim)
         frames = np.tile(self.frame, (self.nodes.size, 1, 1))
-        self.points = ContactPoints(dofs, frames, gdim * owned)
+        self.points = ContactPoints(dofs, frames, gdim * V.dofmap.index_map.size_local)
         self.reset()
         self._made = True
 

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Nodal areas of a surface, and values at its nodes as functions for output."""
+"""Nodes of a surface that may touch, their areas, and values at them as functions for output."""
 
 from __future__ import annotations
 
@@ -8,19 +8,60 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import meshtags
+from mpi4py import MPI
 
 from dolfinx_contact import compat
+from dolfinx_contact.collective import raised_together
+
+# Of the largest integral of a shape function over reference facets: below this it is rounding.
+ZERO = 1e-10
 
 
-def areas(V, facets: np.ndarray) -> np.ndarray:
-    """Integral of each shape function over facets, in the first component of an array on ``V``.  Collective."""
+def areas(V, facets: np.ndarray, reference: bool = False) -> np.ndarray:
+    """Integral of each shape function over facets, in the first component of an array on ``V``.  Collective.
+
+    Args:
+        V: The space.
+        facets: Local indices.
+        reference: Whether all facets count as large as the reference facet.
+    """
     mesh, fdim = V.mesh, V.mesh.topology.dim - 1
     mine = np.unique(facets[facets < mesh.topology.index_map(fdim).size_local])
     tags = meshtags(mesh, fdim, mine, np.ones(mine.size, dtype=np.int32))
     ds = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(1)
-    work = fem.Function(V)
-    compat.assemble_into(work.x, fem.form(ufl.TestFunction(V)[0] * ds))
+    work, shape = fem.Function(V), ufl.TestFunction(V)[0]
+    if reference:
+        shape = shape / abs(ufl.classes.FacetJacobianDeterminant(mesh))
+    compat.assemble_into(work.x, fem.form(shape * ds))
     return work.x.array.copy()
+
+
+def contact_nodes(V, facets: np.ndarray) -> np.ndarray:
+    """Owned nodes of facets that carry a part of an even pressure.  Collective.
+
+    An even pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
+    and with second order on quadrilaterals and on edges, all are positive. Those of the vertices of triangles of second
+    order are zero, and the middles of their edges are the points of a rule that integrates quadratic functions exactly: the
+    vertices are left out. It is the element that decides, on the reference facet, so that a curved one cannot change it.
+
+    Raises:
+        ValueError: on all ranks, if an integral is negative: such a node would have to pull.
+    """
+    nodes = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, facets)
+    nodes = np.unique(nodes[nodes < V.dofmap.index_map.size_local])
+    if compat.lagrange_degree(V) == 1:
+        return nodes
+    comm, weights = V.mesh.comm, areas(V, facets, reference=True)[V.mesh.geometry.dim * nodes]
+    zero = ZERO * comm.allreduce(np.abs(weights).max(initial=0.0), op=MPI.MAX)
+    with raised_together(comm):
+        if (weights < -zero).any():
+            node = int(np.argmin(weights))
+            raise ValueError(
+                f"V has degree {compat.lagrange_degree(V)}, and the integral of the shape function of the node at "
+                f"{V.tabulate_dof_coordinates()[nodes[node]].tolist()} over the facets is negative: under an even pressure "
+                "it would have to pull, which contact cannot. Take degree 1 or 2."
+            )
+    return nodes[weights > zero]
 
 
 def scalar(V, nodes: np.ndarray, values, name: str, elsewhere: float):

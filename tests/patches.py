@@ -1,0 +1,128 @@
+"""Blocks of every cell under an even stress on a plane, whose exact state is known: patch tests."""
+
+from types import SimpleNamespace
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+from dolfinx.mesh import CellType
+from scenes import COMM, MPI, elasticity, rotation
+
+from dolfinx_contact.compat import functionspace, second_order
+
+E, NU = 210e3, 0.3
+G, LAME = E / (2 + 2 * NU), E * NU / ((1 + NU) * (1 - 2 * NU))
+MU, P = np.array([0.3, 0.15]), np.array([0.05, 0.2])
+PRESSURE = 1e-3 * E
+CELLS = {
+    "triangle": (CellType.triangle, (3, 2)),
+    "quadrilateral": (CellType.quadrilateral, (3, 2)),
+    "tetrahedron": (CellType.tetrahedron, (2, 2, 2)),
+    "hexahedron": (CellType.hexahedron, (2, 2, 2)),
+    "prism": (CellType.prism, (2, 2, 2)),
+}
+
+
+def turned(d: int) -> np.ndarray:
+    """A rotation of the whole scene that no axis survives."""
+    return rotation(1) if d == 3 else np.array([[0.8, -0.6], [0.6, 0.8]])
+
+
+def box(cell: str, distorted=True, curved=False, comm=COMM):
+    """The unit square or cube, inner nodes and nodes in the faces moved within it; facets of its bottom and top."""
+    kind, cells = CELLS[cell]
+    d = len(cells)
+    make = mesh.create_rectangle if d == 2 else mesh.create_box
+    domain = make(comm, [np.zeros(d), np.ones(d)], cells, kind)
+    domain = second_order(domain) if curved else domain
+    bottom, top = (
+        mesh.locate_entities_boundary(domain, d - 1, lambda x, z=z: np.isclose(x[d - 1], z)) for z in (0, 1)
+    )  # fmt: skip
+    if distorted:
+        x = domain.geometry.x
+        waves = np.sin(np.pi * x[:, :d])
+        wave = waves[:, : d - 1].prod(
+            axis=1
+        )  # not zero on the bottom, where it moves nodes along it
+        if curved and cell == "tetrahedron":
+            wave = wave * waves[:, -1]  # there the facets stay as they are, see docs/method.md
+        x[:, : d - 1] += 0.06 * wave[:, None] * np.array([1.0, -0.7])[: d - 1]
+        x[:, d - 1] += 0.05 * waves.prod(axis=1)
+    return domain, bottom, top
+
+
+def even_state(d: int, slips: bool):
+    """Gradient of a displacement of even stress on the plane, the traction of the plane, and the slip; the scene's axes."""
+    if d == 2:
+        along, slip = MU[:1], np.array([-2e-3])
+    else:
+        along = MU * np.array([np.cos(0.7), np.sin(0.7)])  # |M^-1 r_t| = r_n
+        slip = -1e-4 * along / P**2  # along -P^-2 r_t
+    along, slip = (along, slip) if slips else (0.5 * along, 0 * slip)
+    traction = PRESSURE * np.append(along, 1.0)
+    gradient = np.zeros((d, d))
+    gradient[:-1, -1] = -traction[:-1] / G
+    gradient[-1, -1] = -PRESSURE / (LAME + 2 * G)
+    return gradient, traction, np.append(slip, 0.0)
+
+
+def pressed(
+    cell,
+    degree,
+    slips,
+    tilted,
+    curved=False,
+    distorted=True,
+    solver=None,
+    tol=1e-12,
+    comm=COMM,
+    **options,
+):
+    """A block under the tractions of an even stress, its top held where that puts it: one step of a ContactProblem."""
+    domain, bottom, top = box(cell, distorted, curved, comm)
+    d = domain.geometry.dim
+    turn = turned(d) if tilted else np.eye(d)
+    domain.geometry.x[:, :d] = domain.geometry.x[:, :d] @ turn.T
+    V = functionspace(domain, ("Lagrange", degree, (d,)))
+    u, v, held = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
+    gradient, traction, slip = even_state(d, slips)
+    gradient, slip_ = turn @ gradient @ turn.T, turn @ slip
+    strain = (gradient + gradient.T) / 2
+    sigma = LAME * np.trace(strain) * np.eye(d) + 2 * G * strain
+    exact = V.tabulate_dof_coordinates()[:, :d] @ gradient.T + slip_
+    held.x.array[:] = exact.ravel()
+    # the sides are loaded; the forces that this makes on top and bottom are carried by support and plane
+    sides = np.setdiff1d(mesh.exterior_facet_indices(domain.topology), np.union1d(bottom, top))
+    tags = mesh.meshtags(domain, d - 1, sides, np.ones(sides.size, dtype=np.int32))
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)(1)
+    load = fem.Constant(domain, sigma) * ufl.FacetNormal(domain)
+    # exact for these curved bricks; what UFL takes by itself makes FFCx warn of so many points
+    dx = ufl.dx(metadata={"quadrature_degree": 6}) if curved else ufl.dx
+    F = elasticity(u, v, E, NU, dx) - ufl.inner(load, v) * ds
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top))
+    axis = turn[:, 0] if d == 3 else None
+    plane = dc.RigidPlane(np.zeros(d), turn[:, -1], axis)
+    friction = dc.Friction(MU, P) if d == 3 else dc.Friction(MU[0])
+    contact = dc.Contact(V, bottom, plane, friction)
+    problem = dc.ContactProblem(F, u, contact, [bc], solver=solver, tol=tol, **options)
+    assert np.allclose(plane.frame, turn.T)
+    step = problem.solve()
+    return SimpleNamespace(
+        V=V, u=u, contact=contact, problem=problem, exact=exact, traction=traction, slip=slip, step=step, mesh=domain
+    )  # fmt: skip
+
+
+def passes_patch_test(found) -> None:
+    """Displacements, statuses, reactions and slips are those of the even stress."""
+    contact, size = found.contact, found.u.x.array.size // len(found.slip)
+    error = np.abs(found.u.x.array - found.exact.ravel()).max(initial=0.0)
+    assert error <= 1e-10 * np.abs(found.exact).max(initial=1e-3), (error, size)
+    force = contact.area[:, None] * found.traction
+    scale = COMM.allreduce(np.abs(force).max(initial=0.0), op=MPI.MAX)
+    assert np.abs(contact.reaction - force).max(initial=0.0) <= 1e-10 * scale
+    slips = found.slip.any()
+    assert (contact.status == (dc.Status.SLIP if slips else dc.Status.STICK)).all()
+    assert np.abs(contact.slip_increment - found.slip[:-1]).max(initial=0.0) <= 1e-12
