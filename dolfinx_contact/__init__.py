@@ -47,6 +47,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.solvers.condensed_newton import CondensedResult as CondensedResult
     from dolfinx_contact.solvers.condensed_newton import solve_condensed as solve_condensed
     from dolfinx_contact.solvers.fixed_point import FixedPoint as FixedPoint
+    from dolfinx_contact.solvers.sparse_newton import SparseNewton as SparseNewton
 
     __version__: str
 
@@ -64,6 +65,7 @@ _HOME = {  # the module of every name
     "NotConverged": "results.record",
     "RigidPlane": "contact.plane",
     "RoundingWarning": "checks",
+    "SparseNewton": "solvers.sparse_newton",
     "Status": "contact.history",
     "Step": "results.record",
     "Wear": "law.wear",

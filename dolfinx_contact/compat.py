@@ -121,6 +121,19 @@ def cell_nodes(V):
     return nodes
 
 
+def cell_dofs(V):
+    """Local degrees of freedom of each cell, components unrolled, ``shape=(cells, dofs)``."""
+    bs = V.dofmap.index_map_bs
+    cells = cell_nodes(V)
+    return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), -1)
+
+
+def original_cells(mesh):
+    """Index of each owned cell in the mesh as it was read or made, whatever the ranks."""
+    owned = mesh.topology.index_map(mesh.topology.dim).size_local
+    return np.array(mesh.topology.original_cell_index[:owned], dtype=np.int64)
+
+
 def original_nodes(V):
     """A number for each owned node by the mesh as it was read or made, whatever the ranks; ``V`` of degree 1 or 2.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -13,10 +13,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies.elastic import ElasticBody
+from dolfinx_contact.bodies.internal_variables import InternalVariables
+from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.driven import check_driven, freedom
+from dolfinx_contact.nonlinear_step import NonlinearStep
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     check_alive,
@@ -39,6 +41,7 @@ from dolfinx_contact.results.record import (
     warn_of_rounding,
 )
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
+from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.trial import without_reactions
 
@@ -49,7 +52,8 @@ class ContactProblem(ProblemStates):
     """An elastic body pressed against rigid planes, solved load step by load step.
 
     Args:
-        F: Residual form, internal minus external virtual work, linear in ``u``.
+        F: Residual form, internal minus external virtual work.  One that is not linear in ``u`` makes a nonlinear
+            body, see docs/nonlinear.md.
         u: Displacement, a Function.  Holds the solution after a step; at the start of one, the first too, it is
             only a guess, the last converged state is kept inside.
         contacts: The contacts; no node in two of them.
@@ -60,6 +64,10 @@ class ContactProblem(ProblemStates):
         tol: Largest error, slip error and forward error of a converged step, see ``dolfinx_contact.error``.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
         petsc_options_prefix: Their prefix.
+        state: Internal variables, Functions: a step that fails leaves them as they were; saved in checkpoints.
+        before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
+            ``state``, and changes no ``state``.  ``J`` has to be given.
+        after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
@@ -78,8 +86,7 @@ class ContactProblem(ProblemStates):
 
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
-        NotImplementedError: ``F`` is not linear, or a tangential direction of a contact node is held
-            that is no axis of its contact.
+        NotImplementedError: a tangential direction of a contact node is held that is no axis of its contact.
     """
 
     def __init__(
@@ -93,6 +100,9 @@ class ContactProblem(ProblemStates):
         tol: float = 1e-8,
         petsc_options: dict[str, Any] | None = None,
         petsc_options_prefix: str | None = None,
+        state: Sequence[fem.Function] = (),
+        before_residual: Callable[[fem.Function], object] | None = None,
+        after_step: Callable[[fem.Function], object] | None = None,
     ) -> None:
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
@@ -102,10 +112,11 @@ class ContactProblem(ProblemStates):
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
             petsc_options = checked_options(petsc_options)
+            self._variables = InternalVariables(state, after_step)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol)
         self.u, self.monitor = u, None
-        self.body = ElasticBody(F, u, bcs, J, petsc_options, petsc_options_prefix)
+        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual)
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
         self._large = False  # whether a displacement was, and the user told
@@ -147,6 +158,7 @@ class ContactProblem(ProblemStates):
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
         stood = [contact.plane.displacement for contact in self.contacts]
+        self._variables.settle()  # with what the user has written into them
         try:
             self._check_input()
             self._renew_laws()
@@ -159,6 +171,8 @@ class ContactProblem(ProblemStates):
                     found.x,
                     [contact.reaction for contact in self.contacts],
                 )
+            (self.body.put if self.body.nonlinear else self._show)(found.x)
+            self._variables.advance(self.u)
         except BaseException as failure:
             self._log(f"step failed: {type(failure).__name__}: {failure}")
             if not isinstance(failure, Exception) or isinstance(failure, PETSc.Error):
@@ -170,7 +184,7 @@ class ContactProblem(ProblemStates):
             raise_interrupt(failure)
             raise
         self._states = [found.x, self._states[0]]
-        self._show(found.x)
+        self._variables.settle()
         for contact in self.contacts:
             contact.advance()
         self._keep(step=True)
@@ -185,15 +199,17 @@ class ContactProblem(ProblemStates):
         For solvers of one's own and for measurements; ``solve`` makes it for itself.
         """
         body = self.body
-        assembled = body.refresh()
+        assembled = body.refresh(self._states[0])
         if assembled != self._assembled:
             self._assembled = assembled
-            self._unbind()
+            if not body.nonlinear:  # else its stiffness is new in every iteration
+                self._unbind()
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         b, external = body.load()
         last, before = self._states
         starts = [self.u.x.array[: body.size].copy(), 2 * last - before]
-        return LoadStep(
+        kind = NonlinearStep if body.nonlinear else LoadStep
+        return kind(
             body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
         )  # fmt: skip
 
@@ -201,7 +217,10 @@ class ContactProblem(ProblemStates):
         """The solver, bound to the body as it is now, see ``solver.py``.  Collective."""
         if self._bound_to is not self.solver:
             self._unbind()
-            self._bound = self.solver.bind(self.body, self.contacts, self._stiffness, self._memory)
+            solver = self.solver
+            if self.body.nonlinear and not getattr(solver, "nonlinear", False):
+                solver = Linearised(solver)
+            self._bound = solver.bind(self.body, self.contacts, self._stiffness, self._memory)
             self._bound_to = self.solver
         return self._bound
 
@@ -210,7 +229,9 @@ class ContactProblem(ProblemStates):
         step = self.load_step()
         if step.planes is not None and step.planes.beyond(given=True):
             return step, self._unmoved(step)
-        found = without_reactions(self.body, self.contacts, step)
+        found = None
+        if not self.body.nonlinear:
+            found = without_reactions(self.body, self.contacts, step)
         if found is None:
             with stage("contact: iterations"):
                 found = self.bound().solve(step)

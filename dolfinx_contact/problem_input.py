@@ -234,7 +234,8 @@ def check_size(body, x: np.ndarray) -> bool:
         return False
     warnings.warn(
         f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
-        f"{body.extent:.3g}: check the units of lengths, loads and moduli. (Elasticity is linear here.)",
+        f"{body.extent:.3g}: check the units of lengths, loads and moduli."
+        + ("" if body.nonlinear else " (Elasticity is linear here.)"),
         stacklevel=3,
     )
     return True

@@ -23,6 +23,7 @@ class Kept(NamedTuple):
     planes: list  # displacements
     known: Any  # the body's free state
     past: tuple  # steps of the condensed solver
+    variables: list  # values of internal variables
 
 
 class ProblemStates(ProblemOptions):
@@ -50,6 +51,7 @@ class ProblemStates(ProblemOptions):
             contact.go_back(history)
             contact.plane.displacement = where
         self._remember(kept.past)
+        self._variables.go_back(kept.variables)
         self._restore()
         self._keep()
 
@@ -62,6 +64,7 @@ class ProblemStates(ProblemOptions):
             [contact.plane.displacement for contact in self.contacts],
             self.body.known,
             tuple(self._memory.get("past", ())),
+            self._variables.last,
         )
 
     def _remember(self, past) -> None:
@@ -74,6 +77,7 @@ class ProblemStates(ProblemOptions):
         """Return to the undeformed body without reactions or history; planes stay where they are."""
         check_alive(self, self.body, self.contacts)
         self._begin()
+        self._variables.reset()
         self._restore()
 
     def _begin(self) -> None:
@@ -95,7 +99,7 @@ class ProblemStates(ProblemOptions):
         """
         check_alive(self, self.body, self.contacts)
         past = self._memory.get("past", ())
-        checkpoint.save(path, self.body, self.contacts, self._states, past)
+        checkpoint.save(path, self.body, self.contacts, self._states, past, self._variables)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
@@ -107,7 +111,7 @@ class ProblemStates(ProblemOptions):
             ValueError: the file is no checkpoint of this problem.
         """
         check_alive(self, self.body, self.contacts)
-        self._states, past = checkpoint.load(path, self.body, self.contacts)
+        self._states, past = checkpoint.load(path, self.body, self.contacts, self._variables)
         self._remember(past)
         self._restore()
         self._keep()
@@ -118,5 +122,6 @@ class ProblemStates(ProblemOptions):
 
     def _restore(self) -> None:
         self._show(self._states[0])
+        self._variables.restore()
         for contact in self.contacts:
             contact.restore()

@@ -54,7 +54,7 @@ class LoadStep:
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
         self.planes = driven_planes(body, contacts)
-        self._starts, self._unit, self._monitor = starts, unit, monitor
+        self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before = None  # reactions of the state judged before
         self._told = 0
         self._known = None  # a displacement, and the forces b - K x that it leaves
@@ -132,7 +132,7 @@ class LoadStep:
         self.errors = self._errors(left, x, self.body.support_forces(x))
         if self.errors.within(self.tol):
             change = self.errors.change
-            self._judge(x, -self.body.residual(x))
+            self._judge(x, self.by_form(x))
             self.errors = self.errors._replace(change=change)
         self._tell()
         return left, self.errors
@@ -144,12 +144,16 @@ class LoadStep:
         rounding in the forces.
         """
         if not self._is_measured(x):
-            forces = -self.body.residual(x)
+            forces = self.by_form(x)
             maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
             self._respond(x, self.free(forces), maps)
             self._judge(x, forces)
             self._tell()
         return self.errors
+
+    def by_form(self, x: np.ndarray) -> np.ndarray:
+        """``-F(x)``, by which errors are measured."""
+        return -self.body.residual(x)
 
     def _is_measured(self, x: np.ndarray) -> bool:
         """Whether the errors are those of ``x``, and nobody has moved the contacts since."""
@@ -164,7 +168,7 @@ class LoadStep:
         for contact in self.contacts:
             contact.move(x)
             contact.release()
-        self._judge(x, -self.body.residual(x))
+        self._judge(x, self.by_form(x))
         return self.errors
 
     @property
@@ -241,4 +245,4 @@ class LoadStep:
             left = np.append(left, on_planes[mine])
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
-        return as_errors(self.total([np.square(part / self._unit).sum() for part in parts]))
+        return as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))

@@ -21,7 +21,7 @@ from dolfinx_contact.bodies.checks import (
     check_dilation,
     warn_of_unread,
 )
-from dolfinx_contact.bodies.forms import digest_of, linear_part
+from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.collective import OverRanks, raised_together
 from dolfinx_contact.petsc.linear_solver import LinearSolver, preconditioner
@@ -37,25 +37,23 @@ class ElasticBody(OverRanks):
         F: Residual form, linear in ``u``.
         u: Displacement.
         bcs: Dirichlet conditions; their values may change between steps, their places not.
-        J: Derivative of ``F``; found by UFL if None.
+        derivative: Of ``F``, as ``derivative_of`` returns it.
         petsc_options: Options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
         petsc_options_prefix: Their prefix.
 
-    Raises:
-        ValueError: ``F`` is no residual form in ``u``.
-        NotImplementedError: ``F`` is not linear in ``u``.
     """
 
-    def __init__(self, F, u, bcs, J=None, petsc_options=None, petsc_options_prefix=None):
+    nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
+
+    def __init__(self, F, u, bcs, derivative, petsc_options=None, petsc_options_prefix=None):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
-        with raised_together(self.comm):
-            derivative = linear_part(F, u, J)
         self._residual_form = fem.form(F)
         self._stiffness_form = fem.form(derivative)
-        self._parameters = [*derivative.coefficients(), *derivative.constants()]
+        coefficients = [c for c in derivative.coefficients() if c is not u]
+        self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
         self._work = fem.Function(self.V)
         self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
@@ -71,8 +69,11 @@ class ElasticBody(OverRanks):
         self.known: FreeState | None = None  # the last one
         self.extent = rigid_motion.extent(self.V)
 
-    def refresh(self) -> int:
+    def refresh(self, x=None) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.
+
+        Args:
+            x: Last converged displacement; not used here.
 
         Returns:
             How often it was assembled so far: a number that changes with the matrix.
@@ -83,6 +84,18 @@ class ElasticBody(OverRanks):
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
+        self._assemble()
+        with raised_together(self.comm):
+            check_diagonal(self.diagonal(), self.V)
+        check_dilation(self)
+        self._hold()
+        self.soft = rigid_motion.soft_motions(self)
+        self._digest = digest
+        return self._assemblies
+
+    def _assemble(self) -> None:
+        """The stiffness, nothing held yet.  Collective."""
+        self.forget_solver()
         self._free_matrices()
         if self.K is None:
             self.K = fem.petsc.assemble_matrix(self._stiffness_form)
@@ -92,18 +105,9 @@ class ElasticBody(OverRanks):
         self.K.assemble()
         # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
         entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
-        diagonal = self.diagonal()
-        self._row_size = np.sqrt(entries) * np.abs(diagonal)
+        self._row_size = np.sqrt(entries) * np.abs(self.diagonal())
         self._right, self._left = self.K.createVecs()
-        with raised_together(self.comm):
-            check_diagonal(diagonal, self.V)
-        check_dilation(self)
-        self._hold()
-        self.forget_solver()
-        self.soft = rigid_motion.soft_motions(self)
-        self._digest = digest
         self._assemblies += 1
-        return self._assemblies
 
     def _hold(self) -> None:
         """Keep the forces of boundary values; then rows and columns of fixed dofs become the identity's."""
@@ -292,9 +296,4 @@ class ElasticBody(OverRanks):
 
     def rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""
-        gdim = self.V.mesh.geometry.dim
-        x = self.V.tabulate_dof_coordinates()[: self.size // gdim, :gdim]
-        modes = rigid_motion.rigid_modes(x, np.ones(len(x), dtype=bool), self.comm)
-        modes[self.fixed] = 0.0
-        lower = np.linalg.cholesky(self.total(modes.T @ modes))
-        return np.linalg.solve(lower, modes.T).T
+        return rigid_motion.free_modes(self)

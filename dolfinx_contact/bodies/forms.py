@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The user's forms: the bilinear part of F, and a number that changes with what stands in them."""
+"""The user's forms: the derivative of F, whether it is linear, and a number that changes with what stands in them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,15 @@ import numpy as np
 import ufl
 
 
-def linear_part(F, u, J):
-    """The bilinear form of F, after a check that F is linear in u."""
+def derivative_of(F, u, J, moving: bool = False):
+    """The bilinear form of the tangent, and whether F is linear in u.
+
+    Args:
+        F: Residual form.
+        u: Displacement.
+        J: Derivative of F, or None.
+        moving: Whether coefficients of F depend on ``u`` in a way that UFL does not know.
+    """
     if not isinstance(F, ufl.Form) or len(F.arguments()) != 1:
         raise ValueError(
             f"F must be a residual form with one test function, as in DOLFINx's NonlinearProblem; got "
@@ -20,20 +27,31 @@ def linear_part(F, u, J):
         )
     if F.arguments()[0].ufl_function_space() != u.ufl_function_space():
         raise ValueError("the test function of F lives on another space than u.")
+    if moving:
+        if not isinstance(J, ufl.Form) or len(J.arguments()) != 2:
+            raise ValueError(
+                "with before_residual UFL cannot find the derivative of F: give J, a form with a test and a trial "
+                "function."
+            )
+        return ufl.algorithms.expand_derivatives(J), False
     derivative = ufl.algorithms.expand_derivatives(
         ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
     )
     if derivative.empty():
         raise ValueError(
-            "F does not depend on u: write it as residual, internal minus external work."
+            "F does not depend on u: write it as residual, internal minus external work. If its coefficients do, "
+            "give before_residual and J."
         )
-    if J is not None:
-        derivative, given = ufl.algorithms.expand_derivatives(J), derivative
-        if any(c is u for c in given.coefficients()):
-            derivative = given
-    if any(c is u for c in derivative.coefficients()):
-        raise NotImplementedError("F is not linear in u: nonlinear bodies are not supported yet.")
-    return derivative
+    linear = not depends_on(derivative, u)
+    given = None if J is None else ufl.algorithms.expand_derivatives(J)
+    if given is not None and not (linear and depends_on(given, u)):
+        derivative = given
+    return derivative, linear
+
+
+def depends_on(form, u) -> bool:
+    """Whether ``u`` is among the coefficients of a form."""
+    return any(c is u for c in form.coefficients())
 
 
 def digest_of(parameters) -> bytes:

@@ -78,6 +78,16 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
     return modes.reshape(gdim * n, modes.shape[2])
 
 
+def free_modes(body) -> np.ndarray:
+    """Orthonormal rigid motions that vanish at fixed degrees of freedom.  Collective."""
+    gdim = body.V.mesh.geometry.dim
+    x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
+    modes = rigid_modes(x, np.ones(len(x), dtype=bool), body.comm)
+    modes[body.fixed] = 0.0
+    lower = np.linalg.cholesky(body.total(modes.T @ modes))
+    return np.linalg.solve(lower, modes.T).T
+
+
 def extent(V) -> float:
     """Largest edge of the box around the body.  Collective."""
     x, comm = V.tabulate_dof_coordinates(), V.mesh.comm

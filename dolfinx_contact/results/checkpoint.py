@@ -19,7 +19,7 @@ from dolfinx_contact.bodies.elastic import FreeState
 from dolfinx_contact.collective import raised_together
 
 
-def save(path, body, contacts, states, past) -> None:
+def save(path, body, contacts, states, past, variables) -> None:
     """Write the history of a problem.  Collective.
 
     Args:
@@ -28,6 +28,7 @@ def save(path, body, contacts, states, past) -> None:
         contacts: Its contacts.
         states: The last displacement and the one before, owned degrees of freedom.
         past: Earlier steps of the condensed solver.
+        variables: ``InternalVariables``.
     """
     comm, nodes = body.comm, _nodes(body, contacts)
     with raised_together(comm):
@@ -44,6 +45,7 @@ def save(path, body, contacts, states, past) -> None:
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
     if past:
         mine["past_nodes"] = np.concatenate([a for name, a in nodes.items() if name != "nodes"])
+    mine |= variables.save()
     stiffness, everything = body.stiffness_norm(), comm.gather(mine, root=0)
     with raised_together(comm):
         if comm.rank == 0:
@@ -63,8 +65,8 @@ def save(path, body, contacts, states, past) -> None:
             os.replace(unfinished, path)
 
 
-def load(path, body, contacts) -> tuple[list[np.ndarray], list]:
-    """Give contacts and body the history in a file.  Collective.
+def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
+    """Give contacts, body and internal variables the history in a file.  Collective.
 
     Returns:
         The last displacement and the one before, and the earlier steps of the condensed solver.
@@ -76,7 +78,8 @@ def load(path, body, contacts) -> tuple[list[np.ndarray], list]:
     with raised_together(comm):
         _check_path(path)
     body.refresh()
-    stiffness, asked = body.stiffness_norm(), comm.gather(_nodes(body, contacts), root=0)
+    asked = comm.gather(_nodes(body, contacts) | variables.cells(), root=0)
+    stiffness = body.stiffness_norm()
     parts, past = None, ()
     with raised_together(comm):
         if comm.rank == 0:
@@ -99,6 +102,7 @@ def load(path, body, contacts) -> tuple[list[np.ndarray], list]:
             contact.check_saved(saved)
     for contact, saved in zip(contacts, own):
         contact.load(saved)
+    variables.load(mine)
     body.known = None
     if comm.allreduce("digest" in mine, op=MPI.LAND):
         exact = "free" in mine

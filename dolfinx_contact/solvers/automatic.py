@@ -11,6 +11,8 @@ from dolfinx_contact.solvers.compliance import fits
 from dolfinx_contact.solvers.condensed import components
 from dolfinx_contact.solvers.condensed_newton import CondensedNewton
 from dolfinx_contact.solvers.fixed_point import FixedPoint
+from dolfinx_contact.solvers.linearised import Linearised
+from dolfinx_contact.solvers.sparse_newton import SparseNewton
 
 CROSSOVER = 400  # contact nodes, see docs/solvers.md
 
@@ -18,8 +20,11 @@ CROSSOVER = 400  # contact nodes, see docs/solvers.md
 class Automatic:
     """Newton's method on the condensed problem for small contacts, else the fixed point.
 
-    If the choice fails, the other one is tried; the result says what was done and why.
+    For a nonlinear body Newton's method on both together, if linear systems are factorised; else the fixed point on the
+    linearised body, also with planes driven by force.  If the choice fails, the other one is tried; the result says what was done and why.
     """
+
+    nonlinear = True
 
     def bind(self, body, contacts, stiffness, memory):
         """See ``Solver``."""
@@ -31,6 +36,20 @@ class BoundAutomatic:
 
     def __init__(self, body, contacts, stiffness, memory):
         self._arguments, self._bound = (body, contacts, stiffness, memory), {}
+        if body.nonlinear:
+            self._choose_nonlinear()
+        else:
+            self._choose_linear()
+
+    def _choose_nonlinear(self) -> None:
+        body, contacts, *_ = self._arguments
+        self._components = components(contacts)
+        self._solvers, self._why = [Linearised(FixedPoint())], "F is not linear in u"
+        if body.factorised and not any(contact.plane.free for contact in contacts):
+            self._solvers.insert(0, SparseNewton())
+
+    def _choose_linear(self) -> None:
+        body, contacts, *_ = self._arguments
         nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
         self._components = components(contacts)
         enough = fits(body.comm, nodes, self._components, body.K.getSize()[0])
@@ -72,7 +91,8 @@ class BoundAutomatic:
             said.append(f"{found.chosen} ({why})")
             errors = step.measure(found.x)
             if best is None or errors.largest < smallest:
-                smallest, best, start = errors.largest, found, found.x
+                smallest, best = errors.largest, found
+                start = found.x if smallest < np.inf else None
             if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
                 break
             if step.planes is not None and step.planes.beyond():

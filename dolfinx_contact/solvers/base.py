@@ -48,6 +48,10 @@ class BoundSolver(Protocol):
 class Solver(Protocol):
     """Options of a solver; one object may be used for many problems."""
 
+    # Optional, without it steps of nonlinear bodies come as a sequence of linear ones:
+    # nonlinear = True
+    #     Whether it solves steps whose forces out of balance are no linear function of the displacement.
+
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """Set up for a body with its assembled stiffness.  Collective.
 

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.collective import by_first_rank
+from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
@@ -62,17 +62,18 @@ class CondensedBody:
         W = self.compliance()
         a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
         self.operator, size = None, nodes.size
-        if self.comm.rank == 0:
-            # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
-            inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
-            share = 1 - len(inert) / size
-            W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
-            last = range(size, len(W))
-            W[last, last] -= 1 / a
-            W = self._planes.border(W, size)
-            self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
-            del W  # copied
-            self.operator.prepare()  # pays after some ten iterations
+        with raised_together(self.comm):
+            if self.comm.rank == 0:
+                # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
+                inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
+                share = 1 - len(inert) / size
+                W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
+                last = range(size, len(W))
+                W[last, last] -= 1 / a
+                W = self._planes.border(W, size)
+                self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
+                del W  # copied
+                self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]
         self.friction = self._gathered_friction()
         self._scales = self._gathered_stiffness(stiffness) | {

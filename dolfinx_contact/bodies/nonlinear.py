@@ -1,0 +1,186 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A body whose residual form is not linear in the displacement: large strains, plasticity, follower loads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact import compat
+from dolfinx_contact.bodies import rigid_motion
+from dolfinx_contact.bodies.checks import agree_on_values, check_diagonal
+from dolfinx_contact.bodies.elastic import ElasticBody
+from dolfinx_contact.bodies.forms import derivative_of
+from dolfinx_contact.collective import raised_together
+from dolfinx_contact.petsc.linear_solver import preconditioner
+
+
+def body_of(F, u, bcs, J=None, options=None, prefix=None, before_residual=None) -> ElasticBody:
+    """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
+
+    Args:
+        F: Residual form.
+        u: Displacement.
+        bcs: Dirichlet conditions.
+        J: Derivative of ``F``; found by UFL if None.
+        options: PETSc options of linear solves.
+        prefix: Their prefix.
+        before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
+
+    Raises:
+        ValueError: ``F`` is no residual form in ``u``.
+    """
+    with raised_together(u.function_space.mesh.comm):
+        moving = before_residual is not None
+        if moving and not callable(before_residual):
+            raise ValueError(f"before_residual must be a function of u, got {before_residual!r}.")
+        derivative, linear = derivative_of(F, u, J, moving)
+    if linear:
+        return ElasticBody(F, u, bcs, derivative, options, prefix)
+    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual)
+
+
+class NonlinearBody(ElasticBody):
+    """F(u) = 0 on the free degrees of freedom; ``K`` is the derivative of F where it was linearised last.
+
+    ``residual`` is that of F.  All that has to do with ``K`` is about the linearised body,
+    ``F(x) + K (u - x)``, at the place ``x`` of the last ``linearise``.
+    """
+
+    nonlinear = True
+
+    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before_residual=None):
+        super().__init__(F, u, bcs, derivative, options, prefix)
+        self._before = before_residual
+        self._given = [*self._parameters, *self._load_parameters]
+        self._place = None  # where K stands
+        self.soft = None
+
+    # -- at a displacement ---------------------------------------------------------------------
+
+    def put(self, values: np.ndarray) -> None:
+        """Let ``u`` and what the user makes of it be those of a displacement; its owned or all local entries.  Collective."""
+        self.u.x.array[: values.size] = values
+        self.u.x.scatter_forward()
+        if self._before is not None:
+            with raised_together(self.comm):
+                self._before(self.u)
+
+    def internal_force(self, values: np.ndarray) -> np.ndarray:
+        """See ``ElasticBody``."""
+        kept = self.u.x.array.copy()
+        try:
+            self.put(values)
+            compat.assemble_into(self._work.x, self._residual_form)
+        finally:
+            self.u.x.array[:] = kept
+        return self._work.x.array[: self.size].copy()
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """See ``ElasticBody``; not finite where an element is turned inside out."""
+        with np.errstate(all="ignore"):
+            return self.internal_force(x)
+
+    def linearise(self, x: np.ndarray) -> None:
+        """Let ``K`` be the derivative of F at a displacement, and the linearised body the one there.  Collective."""
+        if self._place is not None and self.same(x, self._place):
+            return
+        kept, self._place = self.u.x.array.copy(), None
+        try:
+            self.put(x)
+            self._assemble()
+        finally:
+            self.u.x.array[:] = kept
+        self._hold()
+        self._place = x.copy()
+
+    # -- a step --------------------------------------------------------------------------------
+
+    def refresh(self, x=None) -> int:
+        """Agree on what is given, and linearise at the last converged displacement.
+
+        Args:
+            x: Last converged displacement, owned degrees of freedom; None leaves ``K`` as it is.
+
+        Returns:
+            How often ``K`` was assembled so far.
+        """
+        agree_on_values((*self._given, *compat.bc_constants(self.bcs)), self.comm)
+        if x is not None:
+            self._place = None  # constants and coefficients may have changed
+            self.linearise(x)
+            with raised_together(self.comm):
+                check_diagonal(self.diagonal(), self.V)
+            if self.soft is None:
+                self.soft = rigid_motion.soft_motions(self)
+        return self._assemblies
+
+    def load(self) -> tuple[np.ndarray, np.ndarray]:
+        """Boundary values of this step, and the external forces ``-F(0)``.
+
+        Returns:
+            An array that is zero but for the boundary values at fixed degrees of freedom, and the forces.
+        """
+        values, local = np.zeros(self.size), np.zeros_like(self._work.x.array)
+        compat.set_bc_values(local, self.bcs)
+        values[self.fixed] = local[self.fixed]
+        external = -self.internal_force(np.zeros_like(local))
+        external[self.fixed] = 0.0
+        with raised_together(self.comm):
+            for name, array in (("boundary values", values), ("loads, F at u = 0,", external)):
+                if not np.isfinite(array).all():
+                    raise ValueError(f"the {name} contain NaN or infinity: nothing was solved.")
+        return values, external
+
+    # -- the linearised body -------------------------------------------------------------------
+
+    def carried(self, motion: np.ndarray) -> np.ndarray:
+        """``K d`` of a motion of supports alone, zero at fixed degrees of freedom."""
+        self._lift.array_w[:] = motion[self.fixed]
+        self._coupling.mult(self._lift, self._lifted)
+        forces = self._lifted.array_r.copy()
+        forces[self.fixed] = 0.0
+        return forces
+
+    def linear_load(self, values: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """``b`` of the linearised body, see ``ElasticBody.load``.
+
+        Args:
+            values: Zero but for the boundary values.
+            residual: F where ``K`` stands.
+        """
+        x = self._place
+        motion = np.where(self._is_fixed(), values - x, 0.0)
+        free = np.where(self._is_fixed(), 0.0, x)
+        b = self.multiply(free) - residual - self.carried(motion)
+        self._right.array_w[:] = x
+        self._coupling.multTranspose(self._right, self._lift)
+        self._external = np.zeros(self.size)
+        self._external[self.fixed] = self._lift.array_r - residual[self.fixed]
+        b[self.fixed] = values[self.fixed]
+        return b
+
+    def _is_fixed(self) -> np.ndarray:
+        fixed = np.zeros(self.size, dtype=bool)
+        fixed[self.fixed] = True
+        return fixed
+
+    def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:
+        """Displacement of the linearised body under ``b`` alone."""
+        x = self.solve(b, rough)
+        x[self.fixed] = b[self.fixed]
+        return x
+
+    def stiffness_norm(self) -> float:
+        """Zero: the stiffness is that of a state, and tells no body from another."""
+        return 0.0
+
+    def forget(self) -> None:
+        """See ``ElasticBody``."""
+        super().forget()
+        self._place = None
+
+    @property
+    def factorised(self) -> bool:
+        """Whether linear systems of this size are factorised."""
+        return preconditioner(self.K, self.options, self.prefix) in ("lu", "cholesky")
