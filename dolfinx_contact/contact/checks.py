@@ -58,7 +58,8 @@ def checked_facets(facets, index_map, boundary) -> np.ndarray:
     return array.astype(np.int32)
 
 
-def check_law(plane, friction, gdim: int) -> None:
+def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
+    """``directed``: directions of friction are given in space."""
     if not isinstance(plane, RigidPlane):
         raise ValueError(f"plane must be a RigidPlane, got {type(plane).__name__}: {plane!r}.")
     if not isinstance(friction, Friction):
@@ -67,8 +68,10 @@ def check_law(plane, friction, gdim: int) -> None:
         )
     if plane.point.size != gdim:
         raise ValueError(f"{plane} has {plane.point.size} dimensions, the mesh {gdim}.")
+    if friction.field:
+        return  # until its values are known
     friction.law(gdim)  # refuses what has no meaning in two dimensions
-    if gdim == 3 and plane.axis is None and not friction.isotropic:
+    if gdim == 3 and plane.axis is None and not friction.isotropic and not directed:
         raise ValueError(
             f"plane.axis is None, but {friction} depends on the direction: give RigidPlane the first "
             "principal friction direction, axis=(...)."

@@ -48,7 +48,7 @@ class Contact(ContactResults):
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The rigid plane.
         friction: The friction law, the same on all ranks; or on all of them one with coefficients
-            per node, ``shape=(n, 2)``, for the n nodes of each.
+            per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
 
     Raises:
@@ -85,15 +85,15 @@ class Contact(ContactResults):
             check_law(plane, friction, gdim)
             check_wear(wear)
         self.V, self.comm, self.plane, self.frame = V, mesh.comm, plane, frozen(plane.frame)
-        self.friction, self.wear, self.rho = friction, wear, None
         self.nodes = frozen(contact_nodes(V, facets))
+        self.x = frozen(V.tabulate_dof_coordinates()[self.nodes])
+        self.friction, self.wear, self.rho = friction, wear, None
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
         described = mesh.comm.bcast(self.described(), root=0)
         with raised_together(mesh.comm):
             self.check(described)
             if total == 0:
                 raise ValueError("facets is empty on all ranks: name the facets that may touch.")
-        self.x = frozen(V.tabulate_dof_coordinates()[self.nodes])
         self.facets, self._geometry, self._owner = frozen(facets), self._digest(), None
         self._apart = CLEAR * np.abs(mesh.geometry.x).max(initial=0.0)
         self._flat = (self.x[:, :gdim] - plane.point) @ plane.normal

@@ -8,7 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
+from dolfinx_contact.contact.friction_field import directed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
@@ -19,13 +21,20 @@ class ContactLaws(ContactHistory):
 
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks."""
+        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then."""
         return self._friction
 
     @friction.setter
     def friction(self, friction: Friction) -> None:
-        check_law(self.plane, friction, self.V.mesh.geometry.dim)
-        self._friction, self._law = friction, friction.law(self.V.mesh.geometry.dim)
+        gdim = self.V.mesh.geometry.dim
+        if getattr(friction, "field", False):
+            with raised_together(self.comm):
+                turned = directed(friction, gdim)
+                friction = on_nodes(self, friction)
+                check_law(self.plane, friction, gdim, turned)
+        else:
+            check_law(self.plane, friction, gdim)
+        self._friction, self._law = friction, friction.law(gdim)
 
     @property
     def law(self):

@@ -8,10 +8,15 @@ anisotrope", 18e Congrès Français de Mécanique, 2007.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
+
+Field = Callable[[Any], Any]  # or a DOLFINx Function, which this module does not know
 
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
@@ -49,12 +54,17 @@ class Friction:
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
             ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
-            frictionless.
+            frictionless. Or a field, see below.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
             ``(cos, sin)`` in the tangential part of the local frame, ``shape=(n, 2)``. Omitted: the
-            frame's own first direction.
+            frame's own first direction. As a field also directions in space, ``(3, n)``, of any length, which
+            are projected on the plane.
+
+    ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as DOLFINx interpolates them, that return
+    values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them
+    at its own nodes when it takes the law: ``contact.friction`` has the values. Until then there are none.
 
     Raises:
         ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
@@ -67,6 +77,8 @@ class Friction:
         frictionless: All ``mu`` are zero.
         isotropic: Both directions have the same ``mu`` and ``p`` everywhere.
         associated: ``p`` is proportional to ``mu`` everywhere.
+        field: Something is given as a field; what is above is then known to a contact's ``friction`` alone.
+        exponent: ``k`` of a field.
     """
 
     mu: np.ndarray
@@ -75,9 +87,19 @@ class Friction:
     frictionless: bool
     isotropic: bool
     associated: bool
-    __slots__ = ("mu", "p", "axes", "frictionless", "isotropic", "associated", "_laws")
+    field: bool
+    exponent: float | None
+    __slots__ = ("mu", "p", "axes", "frictionless", "isotropic", "associated", "field", "exponent", "_given", "_laws")  # fmt: skip
 
-    def __init__(self, mu: ArrayLike, p: ArrayLike | None = None, k: float | None = None, *, axes: ArrayLike | None = None) -> None:  # fmt: skip
+    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, k: float | None = None, *, axes: ArrayLike | Field | None = None) -> None:  # fmt: skip
+        fields = {"mu": mu, "p": p, "axes": axes}
+        object.__setattr__(self, "field", any(map(is_field, fields.values())))
+        object.__setattr__(self, "exponent", k)
+        object.__setattr__(self, "_given", fields if self.field else None)
+        if self.field:
+            if p is not None and k is not None:
+                raise ValueError("give p or k, not both")
+            return
         given = f"mu={mu!r}, p={p!r}, k={k!r}"
         mu_given = mu
         mu = _coefficients("mu", mu)
@@ -137,14 +159,28 @@ class Friction:
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"Friction is immutable: make a new one to change {name}")
 
+    def __getattr__(self, name: str) -> Any:
+        if name in Friction.__slots__:
+            raise AttributeError(f"{self!r} has no {name} yet: contact.friction has the values at the contact's nodes.")  # fmt: skip
+        raise AttributeError(f"Friction has no attribute {name!r}")
+
+    def given(self) -> dict[str, Any]:
+        """What ``mu``, ``p`` and ``axes`` were given as, if any is a field."""
+        return self._given
+
     def __delattr__(self, name: str) -> None:
         self.__setattr__(name, None)
 
     def __reduce__(self) -> tuple:
+        if self.field:
+            return _restore_field, (*self._given.values(), self.exponent)
         p = np.where(self.mu > 0, self.p, 1.0)
         return _restore, (self.mu, p, self.axes)
 
     def __repr__(self) -> str:
+        if self.field:
+            names = ", ".join(name for name, value in self._given.items() if is_field(value))
+            return f"<Friction with {names} as a field>"
         if self.mu.ndim == 2:
             return f"<Friction with coefficients for {len(self.mu)} nodes>"
         mu, p = (tuple(map(float, array)) for array in (self.mu, self.p))
@@ -232,6 +268,15 @@ def _unit_vectors(axes, mu: np.ndarray) -> np.ndarray:
     unit = given.astype(np.float64) / length[:, None]
     unit.flags.writeable = False
     return unit
+
+
+def is_field(value) -> bool:
+    """Whether a value is a callable of positions or a DOLFINx Function."""
+    return callable(value) or hasattr(value, "function_space")
+
+
+def _restore_field(mu, p, axes, k) -> Friction:
+    return Friction(mu, p, k, axes=axes)
 
 
 def _restore(mu, p, axes) -> Friction:

@@ -34,6 +34,10 @@ def checked_problem(q, W, friction, r0) -> tuple:
         friction = Friction(np.column_stack((mu, mu)))
     if not isinstance(friction, Friction):
         raise ValueError(f"friction must be a Friction or an array, not {friction!r}.")
+    if friction.field:
+        raise ValueError(
+            f"{friction!r}: give numbers for the contacts, there are no positions here."
+        )
     for name, rows in (("coefficients", friction.mu), ("axes", friction.axes)):
         if rows is not None and rows.ndim == 2 and len(rows) != len(q):
             raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")

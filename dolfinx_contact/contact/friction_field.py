@@ -1,0 +1,94 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Friction given by callables and Functions, evaluated at the nodes of a contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact import compat
+from dolfinx_contact.law.friction import Friction, is_field
+
+# Part of a direction that has to lie in the plane.
+ALONG = 1e-8
+
+
+def on_nodes(contact, friction: Friction) -> Friction:
+    """The law with coefficients and axes for each owned node of a contact, which has ``V``, ``nodes``, ``x`` and ``frame``.
+
+    Raises:
+        ValueError: values of another shape, Functions of another mesh or of a space that is not continuous, and what
+            ``Friction`` refuses.  On this rank alone.
+    """
+    given, k = friction.given(), friction.exponent
+    mu, p = (_coefficients(contact, name, given[name]) for name in ("mu", "p"))
+    return Friction(mu, p, k, axes=_axes(contact, given["axes"]))
+
+
+def directed(friction: Friction, gdim: int) -> bool:
+    """Whether the axes may be directions in space, which need no axis of the plane."""
+    return friction.field and gdim == 3 and is_field(friction.given()["axes"])
+
+
+def _coefficients(contact, name: str, given):
+    if not is_field(given):
+        return given
+    values, n = _values(contact, name, given), contact.nodes.size
+    if values.shape not in ((), (n,), (1, n), (2, n)):
+        raise ValueError(
+            f"{name} must give one value per point, shape {(n,)}, or two, {(2, n)}, for x of shape {(3, n)}, not "
+            f"{values.shape}."
+        )
+    return np.broadcast_to(values, (2, n)).T.copy()
+
+
+def _axes(contact, given):
+    if not is_field(given):
+        return given
+    values, (n, gdim) = _values(contact, "axes", given), (contact.nodes.size, len(contact.frame))
+    if gdim != 3 or values.shape not in ((2, n), (3, n)):
+        raise ValueError(
+            f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
+            f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
+        )
+    along = values if len(values) == 2 else contact.frame[:2] @ values
+    length, full = np.linalg.norm(along, axis=0), np.linalg.norm(values, axis=0)
+    if not (length > ALONG * full).all():
+        node = int(np.argmin(length - ALONG * full))
+        raise ValueError(
+            f"axes has no direction along the plane at {contact.x[node].tolist()}: {values[:, node].tolist()}."
+        )
+    return (along / length).T.copy()
+
+
+def _values(contact, name: str, given) -> np.ndarray:
+    """Values at the nodes, ``shape=(n,)`` or ``(components, n)``."""
+    if hasattr(given, "function_space"):
+        return _of_function(contact, name, given)
+    n = contact.nodes.size
+    values = given(contact.x.T.copy())
+    try:
+        values = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must give an array of real numbers, got {values!r}.") from None
+    return np.zeros((2, 0)) if n == 0 else values
+
+
+def _of_function(contact, name: str, function) -> np.ndarray:
+    V = function.function_space
+    if V.mesh is not contact.V.mesh or compat.lagrange_degree(V) is None:
+        raise ValueError(
+            f"{name} is a Function on another mesh, or not in a continuous Lagrange space: its values at nodes are not "
+            "determined; interpolate it into such a space, or give a callable of x."
+        )
+    size = V.dofmap.index_map_bs
+    parts = [function] if size == 1 else [function.sub(k).collapse() for k in range(size)]
+    scalars, parent = contact.V.sub(0).collapse()
+    at = np.argsort(np.ravel(parent) // contact.V.dofmap.index_map_bs)[contact.nodes]
+    values = fem.Function(scalars)
+    found = []
+    for part in parts:
+        values.interpolate(part)
+        found.append(values.x.array[at])
+    return found[0] if size == 1 else np.array(found)
