@@ -5,11 +5,12 @@
 #               the kernel without Python
 # make test-all all tests: make test, the slow ones, 3 ranks, and the C++ ones
 # make stress   every solver on some 640 scenes, each answer judged from the mechanics in NumPy; resumable
+# make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
 # make report   error against run time: every solver, the peers beside it, the price of every ingredient;
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress report test test-rest test-all test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress report docs test test-rest test-all test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 # tests of plain arrays, the same on every rank: make test has them on one, make test-all on three
@@ -29,6 +30,9 @@ report: .venv/ready
 
 study: .venv/ready
 	.venv/bin/python -m studies.punch --output results/study $(if $(EXPLORE),--explore) $(ARGS)
+
+docs: .venv/ready
+	tools/site .venv
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" $(ARGS)

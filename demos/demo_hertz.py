@@ -31,8 +31,8 @@
 # At a distance $\rho \gg a$ the half space sees the contact as a point force, whose displacement is that of
 # Boussinesq,
 #
-# $$ b_r = \frac{(1+\nu) F}{2 \pi E \rho} \Big( \frac{r z}{\rho^2} - \frac{(1 - 2\nu)\, r}{\rho + z} \Big), \qquad
-#    b_z = \frac{(1+\nu) F}{2 \pi E \rho} \Big( 2 (1 - \nu) + \frac{z^2}{\rho^2} \Big). $$
+# $$ b_r = \frac{(1+\nu) F}{2 \pi E \rho} \left( \frac{r z}{\rho^2} - \frac{(1 - 2\nu)\, r}{\rho + z} \right), \qquad
+#    b_z = \frac{(1+\nu) F}{2 \pi E \rho} \left( 2 (1 - \nu) + \frac{z^2}{\rho^2} \right). $$
 #
 # A body of size $L$ whose far boundary is *held rigidly*, $u = (0, -\delta)$, is therefore too stiff: its contact
 # feels an approach that is too large by something between $b_z(L, 0) = F / (\pi E^* L)$, beside the contact, and

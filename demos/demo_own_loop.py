@@ -1,6 +1,6 @@
-"""The paper's predictor and corrector in a loop of one's own, with plain DOLFINx and PETSc.
+"""Predictor and corrector in a loop of one's own.
 
-For those who have a solver already and want contact in it: ``contact.update`` turns displacements
+With plain DOLFINx and PETSc, for those who have a solver already and want contact in it: ``contact.update`` turns displacements
 into reactions, ``contact.assemble_reaction`` adds them to a residual. Without acceleration the loop
 takes well over a thousand iterations a step on a coarse punch, each one back-solve; its answer is
 checked against ``dc.ContactProblem``.  From the root of the clone: ``python -m demos.demo_own_loop``.
