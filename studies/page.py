@@ -6,16 +6,26 @@ import math
 from pathlib import Path
 
 STYLE = """
+:root { color-scheme: light dark; --line: #bbb; --bad: #b00020; }
+@media (prefers-color-scheme: dark) { :root { --line: #555; --bad: #ff8a8a; } }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 1500px; margin: 2em auto; padding: 0 1em; }
-img { max-width: 100%; } table { border-collapse: collapse; margin: 1em 0; } .bad { color: #b00020; }
-td, th { border: 1px solid #bbb; padding: 0.2em 0.6em; text-align: right; vertical-align: top; }
-td.text { text-align: left; } figure { margin: 2em 0; }
+.bad { color: var(--bad); } .scroll { overflow-x: auto; } figure { margin: 2em 0; }
+img { width: 100%; min-width: 44em; background: white; } figcaption { max-width: 60em; }
+table { border-collapse: collapse; margin: 1em 0; }
+td, th { border: 1px solid var(--line); padding: 0.2em 0.6em; text-align: right; vertical-align: top; }
+td { white-space: nowrap; } td.text { text-align: left; } td.long { white-space: normal; min-width: 14em; }
+p, h1, h2 { overflow-wrap: anywhere; }
 """
+LONG = 24  # letters of a text beyond which its cell may have several lines
+UNITS = {"_Nmm": " [N mm]", "_mm3": " [mm³]", "_um": " [µm]"}
 
 
 def write(file: Path, title: str, parts: list[str]) -> None:
     """A page of a heading and parts, which are HTML."""
-    head = f'<meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style>'
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    )
+    head += f"<title>{html.escape(title)}</title><style>{STYLE}</style>"
     body = "\n".join([f"<h1>{html.escape(title)}</h1>", *parts])
     text = f'<!doctype html><html lang="en"><head>{head}</head><body>{body}</body></html>\n'
     file.write_text(text, encoding="utf-8")
@@ -25,25 +35,40 @@ def paragraph(text: str, kind: str = "") -> str:
     return f'<p class="{kind}">{html.escape(text)}</p>' if text else ""
 
 
-def picture(file: Path, caption: str) -> str:
-    """An SVG with its caption."""
-    data, caption = base64.b64encode(file.read_bytes()).decode(), html.escape(caption)
-    image = f'<img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
-    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+def picture(file: Path, caption: str, data: str = "") -> str:
+    """An SVG with its caption, and a link to the file that has its data."""
+    image, caption = base64.b64encode(file.read_bytes()).decode(), html.escape(caption)
+    shown = f'<img src="data:image/svg+xml;base64,{image}" alt="{caption}">'
+    link = f' <a href="{html.escape(data)}">{html.escape(Path(data).name)}</a>' if data else ""
+    return f'<figure><div class="scroll">{shown}</div><figcaption>{caption}{link}</figcaption></figure>'
 
 
 def table(rows: list[dict]) -> str:
-    """Dictionaries with the same keys as rows; numbers to four digits."""
+    """Dictionaries with the same keys as rows; numbers to four digits; columns in which nothing stands are left out."""
     if not rows:
         return ""
-    titles = "".join(f"<th>{html.escape(key.replace('_', ' '))}</th>" for key in rows[0])
-    lines = ["".join(_cell(row.get(key)) for key in rows[0]) for row in rows]
-    return "<table>" + "\n".join(f"<tr>{line}</tr>" for line in (titles, *lines)) + "</table>"
+    keys = [key for key in rows[0] if not all(_missing(row.get(key)) for row in rows)]
+    titles = "".join(f"<th>{html.escape(_title(key))}</th>" for key in keys)
+    lines = ["".join(_cell(row.get(key)) for key in keys) for row in rows]
+    lines = "\n".join(f"<tr>{line}</tr>" for line in (titles, *lines))
+    return f'<div class="scroll"><table>{lines}</table></div>'
+
+
+def _title(key: str) -> str:
+    for ending, unit in UNITS.items():
+        if key.endswith(ending):
+            key = key.removesuffix(ending) + unit
+    return key.replace("_", " ")
+
+
+def _missing(value) -> bool:
+    return value is None or value == "" or isinstance(value, float) and math.isnan(value)
 
 
 def _cell(value) -> str:
-    if value is None or isinstance(value, float) and math.isnan(value):
+    if _missing(value):
         return "<td>–</td>"
     if isinstance(value, (int, float)):
         return f"<td>{value if isinstance(value, int) else format(value, '.4g')}</td>"
-    return f'<td class="text">{html.escape(str(value).replace("_", " "))}</td>'
+    text = str(value).replace("_", " ")
+    return f'<td class="text{" long" if len(text) > LONG else ""}">{html.escape(text)}</td>'

@@ -68,7 +68,9 @@ def test_study_writes_everything(study):
         assert len(rows(stem.with_suffix(".csv"))) > 3, name
     page = (study / "study.html").read_text()
     assert page.count("data:image/svg+xml;base64,") == len(list((study / "figures").glob("*.svg")))
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert not re.findall(r'src="(?!data:)', page)
+    linked = re.findall(r'href="([^"]*)"', page)
+    assert linked and all((study / name).exists() for name in linked)
     assert '<td class="text">unload to</td><td>0.02</td>' in page
 
 

@@ -134,10 +134,25 @@ def figure(data):
     return figure
 
 
+def ratio(row: dict, rows: dict[str, dict], key: str) -> str | None:
+    """A ratio of times, and whether the repetitions of the two rungs overlap: then no difference was seen."""
+    other = rows.get(row["compared_with"])
+    if other is None:
+        return None
+    here, there = row[key], other[key]
+    apart = here["least"] > there["largest"] or here["largest"] < there["least"]
+    return f"{here['median'] / there['median']:.2f}" + ("" if apart else " (within the spread)")
+
+
 def tables(data):
+    rows = {row["rung"]: row for row in data["rows"]}
+    shown = [
+        row | {f"{key}_ratio": ratio(row, rows, key) for key in ("step", "set_up")}
+        for row in data["rows"]
+    ]
     titles = dict(
         rung="rung", compared_with="compared with", step_ratio="step, ratio", set_up_ratio="set-up, ratio",
         bytes_ratio="memory, ratio", unknowns="unknowns", condensed="condensed", iterations="iterations a step",
     )  # fmt: skip
-    yield chosen(data["rows"], titles)
+    yield chosen(shown, titles)
     yield [{"a step of": row["rung"], **row["counts"]} for row in data["rows"]]

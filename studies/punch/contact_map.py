@@ -7,8 +7,9 @@ from studies.punch.mesh import CONTACT
 # isort: split
 import numpy as np
 from dolfinx import fem
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import ConvexHull
@@ -20,6 +21,9 @@ ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
     REVERSE: dict(facecolor="#c25700", edgecolor="#c25700", label="slip inwards, $f=0$"),
     OPEN: dict(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
 }
+STICKING = ListedColormap(
+    colormaps["Blues_r"](np.linspace(0, 0.72, 256))
+)  # blue up to f = 0, as in the legend
 HANDLES = [Patch(**style) for style in ZONES.values()]
 LEGEND = dict(handles=HANDLES, loc="outside lower center", ncols=4, frameon=False)
 
@@ -129,7 +133,7 @@ def draw_zones(axes, disc: ContactMap):
     """Map of f with zones and slip vectors; returns what a colour bar needs."""
     zone = np.where(disc.inward(), REVERSE, disc.status)[disc.faces.ravel()]
     f = disc.load_function / disc.area() / disc.mean_pressure()
-    image = paint(axes, disc, f, zone == STICK, cmap="Blues_r", clim=(-1.2, 0))
+    image = paint(axes, disc, f, zone == STICK, cmap=STICKING, clim=(-1.2, 0))
     for number in (SLIP, OPEN, REVERSE):
         quarters, width = disc.quarters().reshape(-1, 4, 2), 0 if number == OPEN else 0.6
         style = dict(linewidth=width, **ZONES[number])

@@ -81,7 +81,9 @@ def pictures(directory: Path) -> list[str]:
     drawn = {file.stem: file for file in sorted(directory.glob("*.svg"))}
     order = [name for name in CAPTIONS if name in drawn]
     return [
-        page.picture(drawn[name], f"{CAPTIONS.get(name, 'Another tracked node.')} ({name}.csv)")
+        page.picture(
+            drawn[name], CAPTIONS.get(name, "Another tracked node."), f"{directory.name}/{name}.csv"
+        )
         for name in dict.fromkeys([*order, *drawn])
     ]
 
