@@ -28,6 +28,7 @@ autodoc_typehints = (
 napoleon_google_docstring = True
 napoleon_use_ivar = True
 napoleon_use_rtype = False
+napoleon_attr_annotations = False
 
 html_theme = "furo"
 html_title = "dolfinx_contact"
