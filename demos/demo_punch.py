@@ -27,7 +27,8 @@
 #
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v, $$
 #
-# hexahedra of first order, one load step after another.
+# hexahedra of first order, one load step after another. With `--accuracy 0.01` they are of second order, and refined
+# until an estimate of the error of the work of friction and of the forces is below one per cent (`docs/study.md`).
 #
 # ## Code
 
@@ -38,11 +39,13 @@ import logging
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from time import perf_counter, process_time
 
 from tqdm import tqdm
 
 import dolfinx_contact as dc
 from studies.punch import CASES, Parameters, Punch, programme
+from studies.punch.accuracy import NotAccurate, accurate
 from studies.punch.contact_map import draw, gather
 from studies.punch.fields import FieldWriter
 from studies.punch.model import add_options
@@ -94,6 +97,8 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--unload-to", type=float, default=Parameters.unload_to, help="end of unloading, mm")
     add("--point", type=float, nargs=2, metavar=("X", "Y"), help="P, mm; 3/4 R at 45 degrees")
     add("--lowest", type=float, help="height of elements on the plane, mm; else all are as high")
+    add("--accuracy", type=float, metavar="PART", help="of work of friction and forces: mesh, order and increments are chosen, "
+        "--refine, --lowest and --solver are not used; estimated, see docs/study.md")  # fmt: skip
     add("--solver", choices=SOLVERS, default="auto", help="paper: fixed point with its own map")
     add("--json", type=Path, metavar="FILE", help="numbers of all steps; DIR/punch.json")
     add("--output", type=Path, metavar="DIR", default=Path("results/punch"), help="what is written")
@@ -102,18 +107,46 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def main(argv=None) -> None:
     """Compute, print the table, write numbers, picture and ParaView files."""
+    begin = perf_counter()
     logging.disable(logging.INFO)  # DOLFINx 0.5 logs each call of the C compiler in a first run
     options = vars(arguments(argv))
     output, solver = options.pop("output"), SOLVERS[options.pop("solver")]()
     json_file = options.pop("json") or output / "punch.json"
+    accuracy = options.pop("accuracy")
     parameters = Parameters(**{**options, "point": options["point"] and tuple(options["point"])})
     last = len(programme(parameters)) - 1
     loaded = last - parameters.unloading
     shown = {loaded: "loaded", (loaded + last) // 2: "unloading", last: "unloaded"}
-
-    punch = Punch(parameters, solver=solver)
     output.mkdir(parents=True, exist_ok=True)
-    records, maps, failure = [], [], None
+    if accuracy is None:
+        numbers, punch, maps, failure = compute(parameters, solver, shown, output)
+    else:
+        numbers, punch, maps, failure = compute_accurately(parameters, accuracy, shown)
+    head, records = punch.head(), numbers["steps"]
+    numbers |= {"seconds": perf_counter() - begin, "processor_seconds": process_time()}
+    if punch.comm.rank == 0:
+        rows = [ROW.format(step=step, **record) for step, record in enumerate(records, start=1)]
+        print(HEAD, *rows, sep="\n")
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        json_file.write_text(json.dumps({"head": head} | numbers, indent=1) + "\n")
+        print(f"\nnumbers   {json_file}")
+        if accuracy is None:
+            print(f"ParaView  {output / 'punch.pvd'}")
+        else:
+            print("work of friction {dissipation:.2f} N mm, estimated error {dissipation_error:.1e}, of forces "
+                  "{force_error:.1e}, {seconds:.3g} s".format(**numbers))  # fmt: skip
+        if maps:
+            title = "Punch, case {case}: $\\mu$ = {friction[mu]}, $p$ = {friction[p]}".format(**head)  # fmt: skip
+            title += f"; cycle {parameters.cycles}; x to the right, y up"
+            draw(maps, title, output / "punch.png", head["point"])
+            print(f"picture   {output / 'punch.png'}")
+    if failure:
+        sys.exit(failure if punch.comm.rank == 0 else 1)
+
+
+def compute(parameters, solver, shown, output) -> tuple:
+    """Numbers, punch, discs to draw, and the reason if a step failed: one run on the mesh that the parameters name."""
+    punch, records, maps, failure = Punch(parameters, solver=solver), [], [], None
     with FieldWriter(punch, output) as fields:
         try:
             for index, record in enumerate(run(punch)):
@@ -123,20 +156,20 @@ def main(argv=None) -> None:
                     maps.append((f"{shown[index]}, {record['displacement']:g} mm", gather(punch)))
         except dc.NotConverged as error:  # what was computed before is kept
             failure = f"Step {len(records) + 1}: {error}"
-    head = punch.head()
-    if punch.comm.rank == 0:
-        rows = [ROW.format(step=step, **record) for step, record in enumerate(records, start=1)]
-        print(HEAD, *rows, sep="\n")
-        json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(json.dumps({"head": head, "steps": records}, indent=1) + "\n")
-        print(f"\nnumbers   {json_file}\nParaView  {fields.path}")
-        if maps:
-            title = "Punch, case {case}: $\\mu$ = {friction[mu]}, $p$ = {friction[p]}".format(**head)  # fmt: skip
-            title += f"; cycle {parameters.cycles}; x to the right, y up"
-            draw(maps, title, output / "punch.png", head["point"])
-            print(f"picture   {output / 'punch.png'}")
-    if failure:
-        sys.exit(failure if punch.comm.rank == 0 else 1)
+    work = punch.comm.allreduce(float(punch.contact.dissipation.sum()))
+    return {"dissipation": work, "steps": records}, punch, maps, failure
+
+
+def compute_accurately(parameters, accuracy, shown) -> tuple:
+    """The same on meshes and with increments that are refined until the estimated error is small enough."""
+    failure = None
+    try:
+        found = accurate(parameters, accuracy, shown)
+    except NotAccurate as error:
+        found, failure = error.found, str(error)
+    names = ("dissipation", "dissipation_error", "force_error", "tried")
+    numbers = {name: getattr(found, name) for name in names} | {"steps": found.records}
+    return numbers, found.punch, found.maps, failure
 
 
 if __name__ == "__main__":

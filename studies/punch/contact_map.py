@@ -28,6 +28,9 @@ HANDLES = [Patch(**style) for style in ZONES.values()]
 LEGEND = dict(handles=HANDLES, loc="outside lower center", ncols=4, frameon=False)
 
 
+VALUES = ("reaction", "slip_increment", "status", "load_function")  # of nodes
+
+
 class ContactMap(NamedTuple):
     """The contact disc with all its nodes on one rank; rows of nodes and of faces in any order."""
 
@@ -37,6 +40,9 @@ class ContactMap(NamedTuple):
     slip_increment: np.ndarray  # (n, 2) mm
     status: np.ndarray  # (n,)
     load_function: np.ndarray  # (n,) N
+    nodal_area: np.ndarray | None = (
+        None  # (n,) mm^2; None: that of the quarters, as good in first order
+    )
 
     def quarters(self) -> np.ndarray:
         """Four quarters of each face, ``shape=(m, 4, 4, 2)``: quarter i belongs to its node i.
@@ -50,7 +56,9 @@ class ContactMap(NamedTuple):
         return np.stack([corner, after, centre, before], axis=2)
 
     def area(self) -> np.ndarray:
-        """Area of the quarters around each node, ``shape=(n,)``, mm^2."""
+        """Area that belongs to each node, ``shape=(n,)``, mm^2."""
+        if self.nodal_area is not None:
+            return self.nodal_area
         x, y = np.moveaxis(self.quarters(), -1, 0)
         quarter = ((x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)).sum(-1)) / 2
         return np.bincount(self.faces.ravel(), quarter.ravel(), minlength=len(self.x))
@@ -88,20 +96,36 @@ def gather(punch) -> ContactMap | None:
     contact, V = punch.contact, punch.V
     owned = punch.mesh.topology.index_map(2).size_local
     facets = punch.facet_tags.find(CONTACT)
+    second = V.dofmap.dof_layout.num_dofs == 27
     position = V.tabulate_dof_coordinates()[:, :2]
     faces = []
     for facet in facets[facets < owned]:
         nodes = fem.locate_dofs_topological(V, 2, np.array([facet], dtype=np.int32), remote=False)
-        spoke = position[nodes] - position[nodes].mean(axis=0)
-        faces.append(nodes[np.argsort(np.arctan2(spoke[:, 1], spoke[:, 0]))])
+        middle = nodes[
+            np.linalg.norm(position[nodes] - position[nodes].mean(axis=0), axis=1).argmin()
+        ]
+        ring = np.setdiff1d(nodes, middle) if second else nodes
+        spoke = position[ring] - position[nodes].mean(axis=0)
+        ring = ring[np.argsort(np.arctan2(spoke[:, 1], spoke[:, 0]))]
+        faces += _four(V, ring, middle) if second else [ring]
     faces = V.dofmap.index_map.local_to_global(np.array(faces, dtype=np.int32).ravel())
     faces = punch.comm.gather(faces)
-    values = [getattr(contact, name) for name in ContactMap._fields[2:]]
-    node, *values = at_nodes(punch, contact.x[:, :2], *values)
+    values = [getattr(contact, name) for name in VALUES]
+    node, *values = at_nodes(punch, contact.x[:, :2], *values, contact.area)
     if node is None:
         return None
-    x, *values = values
-    return ContactMap(x, np.searchsorted(node, np.concatenate(faces)).reshape(-1, 4), *values)
+    x, *values, area = values
+    faces = np.searchsorted(node, np.concatenate(faces)).reshape(-1, 4)
+    return ContactMap(x, faces, *values, area if second else None)
+
+
+def _four(V, ring, middle) -> list:
+    """A face of nine nodes as four of four: ``ring`` goes round, corners and middles of edges by turns."""
+    x = V.tabulate_dof_coordinates()[ring, :2]
+    between = (np.roll(x, 1, axis=0) + np.roll(x, -1, axis=0)) / 2
+    off = np.linalg.norm(x - between, axis=1)  # middles of edges lie between their neighbours
+    first = 0 if off[::2].sum() > off[1::2].sum() else 1
+    return [[ring[k], ring[(k + 1) % 8], middle, ring[k - 1]] for k in range(first, 8, 2)]
 
 
 def draw(maps, title, file, point) -> None:

@@ -17,26 +17,32 @@ from dolfinx_contact.compat import model_to_mesh
 CONTACT, TOP = 1, 2  # tags of the facets z = 0 and z = height
 
 
-def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4, lowest=None):
+def punch_mesh(
+    comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4, lowest=None, order=1, rim=None
+):  # fmt: skip
     """Mesh of a punch standing on z = 0, its axis along z, distributed over ``comm``.
 
     Args:
         comm: MPI communicator; gmsh runs on its rank 0.
         refine: Each level doubles ``divisions`` and ``layers``, a negative one halves them; 0 is the paper's mesh.
         radius, height: Of the punch, length units.
-        divisions: Quadrilaterals along each side of each of the five blocks; even: the axis is a line of nodes.
+        divisions: Quadrilaterals along each side of each of the five blocks; even in first order: the axis is a line of nodes.
         layers: Hexahedra along the height.
         lowest: Height of those on the plane, from where they grow by the same factor; None: all are as high.
+        order: 2 for bricks of 27 nodes whose outer faces are curved: a circle is one, to the fourth order.
+        rim: Width of the quadrilaterals at the rim over that of their block; inwards they grow by the same factor.
 
     Returns:
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
     """
     divisions, layers = divisions * 2.0**refine, layers * 2.0**refine
-    if divisions < 2 or divisions % 2 or layers < 1 or layers % 1:
-        raise ValueError("divisions must be even and >= 2, layers whole and >= 1; with refine "
+    if divisions < 2 or divisions * order % 2 or layers < 1 or layers % 1:
+        raise ValueError("divisions must be even (whole in second order) and >= 2, layers whole and >= 1; with refine "
                          f"{refine!r} they are {divisions:g} and {layers:g}.")  # fmt: skip
     if not (0 < radius < math.inf and 0 < height < math.inf):
         raise ValueError(f"radius and height must be positive, got {radius!r} and {height!r}.")
+    if rim is not None and not 0 < rim * divisions < 1:
+        raise ValueError(f"rim must be less than a {divisions:g}th, got {rim!r}.")
     if lowest is not None and not 0 < lowest * layers < height:
         raise ValueError(f"lowest must be less than a {layers:g}th of the height, got {lowest!r}.")
     gmsh.initialize()
@@ -45,7 +51,9 @@ def punch_mesh(comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.model.add("punch")
             shares = _layers(int(layers), lowest and lowest / height)
-            _build(height / radius, int(divisions), **shares)
+            growth = 1.0 if rim is None else math.exp(_growth(int(divisions), rim))
+            _build(height / radius, int(divisions), growth, **shares)
+            gmsh.model.mesh.setOrder(order)
         punch = model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()
@@ -57,15 +65,21 @@ def _layers(count, lowest):
     """What gmsh is told of the layers; ``lowest`` over the height."""
     if lowest is None:
         return dict(numElements=[count])
-
-    def tops(growth):
-        return lowest * np.expm1(growth * np.arange(1, count + 1)) / np.expm1(growth)
-
-    growth = brentq(lambda growth: tops(growth)[-1] - 1, 1e-9, -math.log(lowest))
-    return dict(numElements=[1] * count, heights=[*tops(growth)[:-1], 1.0])
+    growth = _growth(count, lowest)
+    tops = np.expm1(growth * np.arange(1, count)) / math.expm1(growth * count)
+    return dict(numElements=[1] * count, heights=[*tops, 1.0])
 
 
-def _build(height, divisions, **layers):
+def _growth(count, smallest):
+    """Logarithm of the factor by which ``count`` lengths grow whose sum is 1."""
+
+    def excess(growth):
+        return smallest * math.expm1(growth * count) / math.expm1(growth) - 1
+
+    return brentq(excess, 1e-9, -math.log(smallest))
+
+
+def _build(height, divisions, growth, **layers):
     """The punch of radius 1 (gmsh's tolerances are absolute), every block transfinite."""
     geo = gmsh.model.geo
     rim = 1 / math.sqrt(2)
@@ -80,8 +94,10 @@ def _build(height, divisions, **layers):
 
     loops = [sides] + [[spokes[i - 1], arcs[i], -spokes[i], -sides[i]] for i in range(4)]
     blocks = [geo.addPlaneSurface([geo.addCurveLoop(loop)]) for loop in loops]
-    for curve in sides + arcs + spokes:
+    for curve in sides + arcs:
         geo.mesh.setTransfiniteCurve(curve, divisions + 1)
+    for curve in spokes:
+        geo.mesh.setTransfiniteCurve(curve, divisions + 1, "Progression", 1 / growth)
     for block in blocks:
         geo.mesh.setTransfiniteSurface(block)
         geo.mesh.setRecombine(2, block)

@@ -80,12 +80,13 @@ class Punch:
         shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
         punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
         self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
-        self.V = functionspace(self.mesh, ("Lagrange", 1, (3,)))
+        order = mesh_options.get("order", 1)
+        self.V = functionspace(self.mesh, ("Lagrange", order, (3,)))
         self.u = fem.Function(self.V, name="displacement")
         self.approach = fem.Constant(self.mesh, PETSc.ScalarType(0))  # u_z of the top face
 
-        # 2 x 2 x 2 Gauss points, as usual for bricks of eight nodes
-        dx = ufl.dx(domain=self.mesh, metadata={"quadrature_degree": 3})
+        # 2 x 2 x 2 Gauss points for bricks of eight nodes, 3 x 3 x 3 for those of 27, as usual
+        dx = ufl.dx(domain=self.mesh, metadata={"quadrature_degree": 2 * order + 1})
         v = ufl.TestFunction(self.V)
         self.F = elasticity(self.u, v, parameters.young, parameters.poisson, dx)
         self.bcs = self._supports()

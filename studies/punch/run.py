@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import dolfinx_contact as dc
-from studies.punch.contact_map import ContactMap, at_nodes, gather
+from studies.punch.contact_map import VALUES, ContactMap, at_nodes, gather
 from studies.punch.model import Parameters, Punch, programme
 
 # isort: split
@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 COMM = MPI.COMM_WORLD
 FAILED = "not_converged.txt"
-FIELDS = (*ContactMap._fields[2:], "displacement", "dissipation")  # kept after every step
+FIELDS = (*VALUES, "displacement", "dissipation")  # kept after every step
 
 
 class EnergyBalance:
@@ -193,7 +193,7 @@ class Run:
     def disc(self, step: int) -> ContactMap:
         """The contact disc after a step."""
         fields = self.fields(step)
-        return ContactMap(self.x, self.faces, *(fields[name] for name in ContactMap._fields[2:]))
+        return ContactMap(self.x, self.faces, *(fields[name] for name in VALUES))
 
     def dissipation(self, cycle: int):
         """Work of friction per node up to the end of a cycle, ``shape=(n,)``, N mm."""

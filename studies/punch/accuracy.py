@@ -1,0 +1,141 @@
+"""The punch to an accuracy that is asked for: bricks of 27 nodes, graded and curved, refined until two differences are small.
+
+Both errors are estimated from runs that are made anyway or cost little:
+
+- mesh: the difference to the next coarser mesh with the same increments. That is the error of the coarser one, if the finer one is
+  much better; of the finer one it is a guess on the safe side.
+- increments: twice the difference that half as large increments make on the coarser mesh, which is their error if it falls with
+  the first order (docs/dissipation.md).
+
+An estimate, no bound: measured against limits in notes/2026-11-22-accurate-punch.md.
+"""
+
+from dataclasses import dataclass, replace
+
+import dolfinx_contact as dc
+from studies.punch.contact_map import gather
+from studies.punch.model import Parameters, Punch, programme
+
+# isort: split
+import numpy as np
+
+DIVISIONS = (2, 3, 4, 6, 8)  # of the meshes, one after another
+HALVINGS = 6  # of the increments, at most
+
+
+@dataclass
+class Found:
+    """A run and what it is worth; errors over the work of friction and over the largest forces of the cycle."""
+
+    punch: Punch
+    records: list
+    maps: list
+    dissipation: float
+    dissipation_error: float = np.inf
+    force_error: float = np.inf
+    tried: tuple = ()  # of every run: divisions, increments, work of friction
+
+    @property
+    def error(self) -> float:
+        return max(self.dissipation_error, self.force_error)
+
+
+class NotAccurate(RuntimeError):
+    """The finest mesh and smallest increments do not suffice; has the best run as ``found``."""
+
+    def __init__(self, message: str, found: Found):
+        super().__init__(message)
+        self.found = found
+
+
+def mesh_options(divisions: int) -> dict:
+    """A mesh of second order: twice as many layers, cells at rim and plane as wide and high as the square of their number says."""
+    return dict(divisions=divisions, layers=2 * divisions, order=2, rim=divisions**-2)
+
+
+def accurate(parameters: Parameters, accuracy: float, shown=(), comm=None) -> Found:
+    """Run the programme on finer and finer meshes, with smaller and smaller increments, until it is accurate.  Collective.
+
+    Args:
+        parameters: Of the punch; its increments are the largest that are tried. ``refine`` and ``lowest`` are not used.
+        accuracy: Relative, of the work of friction and of forces.
+        shown: Increments of the programme after which the disc is kept to be drawn, by name.
+
+    Raises:
+        NotAccurate: the estimate stayed above ``accuracy``.
+    """
+    if not 0 < accuracy < 1:
+        raise ValueError(f"accuracy must be between 0 and 1, got {accuracy!r}.")
+    runs: dict[tuple[int, int], Found] = {}
+
+    def at(level: int, halvings: int) -> Found:
+        if (level, halvings) not in runs:
+            runs[level, halvings] = run(parameters, DIVISIONS[level], 2**halvings, shown, comm)
+        return runs[level, halvings]
+
+    level, halvings = 1, 0
+    while True:
+        coarse = at(level - 1, halvings)
+        increments = difference(coarse, at(level - 1, halvings + 1))
+        found = at(level, halvings)
+        mesh = difference(found, coarse)
+        found.dissipation_error, found.force_error = (
+            float(d + 2 * i) for d, i in zip(mesh, increments)
+        )
+        found.tried = tuple(
+            (DIVISIONS[tried], 2**k, of.dissipation) for (tried, k), of in sorted(runs.items())
+        )
+        if found.error <= accuracy:
+            return found
+        # the larger of both is reduced
+        if max(mesh) >= 2 * max(increments) and level + 1 < len(DIVISIONS):
+            level += 1
+        elif halvings < HALVINGS and 2 * max(increments) > 0.1 * accuracy:
+            halvings += 1
+        else:
+            raise NotAccurate(
+                f"the estimated error is {found.error:.1e}, of the mesh {max(mesh):.1e}, of the increments "
+                f"{2 * max(increments):.1e}: more than {accuracy:g}, and the finest mesh is reached.",
+                found,
+            )
+
+
+def run(parameters: Parameters, divisions: int, factor: int, shown=(), comm=None) -> Found:
+    """One run, with ``factor`` times as many increments."""
+    finer = dict(loading=factor * parameters.loading, unloading=factor * parameters.unloading)
+    lowest = parameters.height / (2 * divisions) ** 2
+    parameters = replace(parameters, refine=0, lowest=lowest, **finer)
+    given = {} if comm is None else {"comm": comm}
+    punch = Punch(parameters, solver=dc.CondensedNewton(), **given, **mesh_options(divisions))
+    records, maps = [], []
+    for index, displacement in enumerate(programme(parameters), start=1):
+        records.append(punch.press(displacement))
+        name = dict(shown).get(index // factor - 1) if index % factor == 0 else None
+        if name is not None:
+            maps.append((f"{name}, {displacement:g} mm", gather(punch)))
+    dissipation = punch.comm.allreduce(float(punch.contact.dissipation.sum()))
+    return Found(punch, records, maps, dissipation)
+
+
+def difference(one: Found, other: Found) -> tuple[float, float]:
+    """Relative differences of the work of friction, and of total normal and tangential forces at the steps of both.
+
+    Forces over the largest of the cycle: after unloading friction has turned round, and its sum is small.
+    """
+    work = abs(one.dissipation - other.dissipation) / max(one.dissipation, other.dissipation)
+    steps = min(len(one.records), len(other.records))
+    forces = 0.0
+    for name in ("normal_reaction", "tangential_reaction_sum"):
+        a, b = (
+            np.array(
+                [
+                    record[name]
+                    for record in of.records[
+                        len(of.records) // steps - 1 :: len(of.records) // steps
+                    ]
+                ]
+            )
+            for of in (one, other)
+        )
+        forces = max(forces, float(np.abs(a - b).max() / np.abs(a).max()))
+    return work, forces
