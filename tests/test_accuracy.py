@@ -103,7 +103,7 @@ def test_accuracy_that_is_asked_for():
 
 def test_what_cannot_be_reached_is_said(monkeypatch):
     """With the finest mesh used up the best run comes with the failure."""
-    monkeypatch.setattr("studies.punch.accuracy.DIVISIONS", (1, 2))
+    monkeypatch.setattr("studies.punch.accuracy.DIVISIONS", (2, 3))
     monkeypatch.setattr("studies.punch.accuracy.HALVINGS", 0)
     few = Parameters(case="A", tol=1e-8, loading=1, unloading=1)
     with pytest.raises(NotAccurate, match="more than 0.001") as caught:

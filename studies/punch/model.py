@@ -63,7 +63,7 @@ class Parameters:
 class Punch:
     """Body, plane, friction and supports; ``press`` computes one load step after another.
 
-    ``solver`` as in ``dc.ContactProblem``; ``friction``: arguments of ``dc.Friction`` in place of the case's;
+    ``solver``, ``petsc_options`` as in ``dc.ContactProblem``; ``friction``: arguments of ``dc.Friction`` in place of the case's;
     ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.
     """
 
@@ -73,6 +73,7 @@ class Punch:
         comm=MPI.COMM_WORLD,
         solver=None,
         friction=None,
+        petsc_options=None,
         **mesh_options,
     ):
         self.parameters, self.comm = parameters, comm
@@ -95,8 +96,8 @@ class Punch:
         friction = dc.Friction(**self.friction)
         self.contact = dc.Contact(self.V, punch.facet_tags.find(CONTACT), plane, friction)
         self.problem = dc.ContactProblem(
-            self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol
-        )
+            self.F, self.u, [self.contact], bcs=self.bcs, solver=solver, tol=parameters.tol, petsc_options=petsc_options
+        )  # fmt: skip
         x = np.concatenate(comm.allgather(self.contact.x))
         self.tracked = np.linalg.norm(x[:, :2] - parameters.target, axis=1).argmin()  # P
 
