@@ -255,6 +255,15 @@ def test_boundary_values_that_were_not_reached_are_no_solution():
         scene.problem.solve()
 
 
+def test_no_contact_at_all():
+    """A rubber block that hangs from its top goes with it, as far as one likes in one step."""
+    scene = block(cells=(4, 3), held=True)
+    problem = dc.ContactProblem(scene.F, scene.u, [], bcs=scene.problem.body.bcs)
+    move(scene, 3.0, -2.0)
+    problem.solve()
+    np.testing.assert_allclose(scene.u.x.array.reshape(-1, 2) - [3.0, -2.0], 0.0, atol=1e-9)
+
+
 def test_linear_forms_are_recognised():
     """A linear form, written as an energy, too, has the elastic body: assembled once, factorised once."""
 

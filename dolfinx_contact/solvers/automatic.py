@@ -42,8 +42,7 @@ class BoundAutomatic:
             self._choose_linear()
 
     def _choose_nonlinear(self) -> None:
-        body, contacts, *_ = self._arguments
-        self._components = components(contacts)
+        body, self._components = self._arguments[0], None
         self._solvers, self._why = [Linearised(FixedPoint())], "F is not linear in u"
         if body.factorised and not any(contact.plane.free for contact in contacts):
             self._solvers.insert(0, SparseNewton())
@@ -77,6 +76,8 @@ class BoundAutomatic:
         for solver in list(self._bound):
             if not self._bound[solver].renew_law():
                 self._bound.pop(solver).destroy()
+        if self._components is None:  # nothing was chosen by it
+            return True
         return components(self._arguments[1]) == self._components
 
     def solve(self, step) -> SolverResult:
