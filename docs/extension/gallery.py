@@ -46,6 +46,7 @@ def run(name: str, folder: Path) -> dict:
 
         raise ExtensionError(f"{name} failed: {done.stdout[-500:]}\n{done.stderr[-3000:]}")
     printed = re.sub(r"^(numbers|ParaView|picture) .*\n?", "", done.stdout, flags=re.MULTILINE)
+    drawn = drawn if drawn and (folder / drawn).exists() else None
     return {"printed": printed.strip("\n"), "picture": drawn}
 
 
