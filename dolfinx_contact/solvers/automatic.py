@@ -44,7 +44,7 @@ class BoundAutomatic:
     def _choose_nonlinear(self) -> None:
         body, self._components = self._arguments[0], None
         self._solvers, self._why = [Linearised(FixedPoint())], "F is not linear in u"
-        if body.factorised and not any(contact.plane.free for contact in contacts):
+        if body.factorised and not any(c.plane.free for c in self._arguments[1]):
             self._solvers.insert(0, SparseNewton())
 
     def _choose_linear(self) -> None:
