@@ -116,7 +116,7 @@ def test_a_shear_force_below_friction_sticks(dim):
     assert at[1] > 0
 
 
-@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("solver", [None, pytest.param(dc.FixedPoint(), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_no_state_beyond_gross_sliding(dim, solver):
     """More than mu N is refused, whether N is given or found; the last state stays, and the run goes on from it."""
@@ -267,6 +267,7 @@ def test_ranks_do_not_change_the_motion():
         assert found[0] == pytest.approx(found[1], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_body_on_soft_springs():
     """A body on soft springs, with its anchors or its motions balanced apart: weight on the plane, and a shear force."""
     for spring in (1e-2, 1e-4):

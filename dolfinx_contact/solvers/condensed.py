@@ -221,8 +221,10 @@ class CondensedBody:
         starts = [last[1]]
         if len(past) > 1:
             starts.append(2 * last[1] - past[-2][1])
-        scale = np.abs(q).max()
-        distances = [np.abs(other[0] - q).max() for other in past]
+        if self._planes.tied and last[0][-1] > 0.0 < q[-1]:  # in balance with the new weight
+            starts.append(q[-1] / last[0][-1] * last[1])
+        scale = np.abs(q[: q.size - self._planes.tied]).max()
+        distances = [self._planes.distance(other[0], q) for other in past]
         similar = int(np.argmin(distances))
         if distances[similar] < 0.1 * scale:
             starts.append(past[similar][1])

@@ -71,6 +71,15 @@ class CondensedPlanes:
             moved[stiff] = -(reactions @ self._axes[:, stiff]) / self._springs[stiff]
             step.planes.move_to(self._at_first + moved)
 
+    def distance(self, other: np.ndarray, q: np.ndarray) -> float:
+        """How far two steps are apart, length units; forces that drive planes count by their part of the largest."""
+        apart = np.abs(other - q)
+        if self.tied:
+            lengths, forces = q[: -self.tied], q[-self.tied :]
+            largest = np.abs(forces).max() or 1.0
+            apart[-self.tied :] *= np.abs(lengths).max() / largest
+        return float(apart.max())
+
     def driving(self, step) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
         return np.zeros(0) if step.planes is None else step.planes.driving()[~self._stiff]
