@@ -14,8 +14,8 @@
 
 RANKS = 1 2 3
 # tests of plain arrays, the same on every rank: make test has them on one, make test-all on three
-arrays = bipotential condensed_errors condensed_newton condensed_tied element_height friction friction_cone judge \
-	return_map
+arrays = bipotential condensed_errors condensed_kernel condensed_newton condensed_tied element_height friction \
+	friction_cone judge return_map
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 

@@ -127,4 +127,14 @@ PYBIND11_MODULE(_kernel, m) {
         "The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: "
         "associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).");
     bind_condensed(m);
+    m.def(
+        "has_avx2",
+        [] {
+#if defined(__x86_64__)
+            return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+            return false;
+#endif
+        },
+        "Whether this processor can run _kernel_avx2.");
 }

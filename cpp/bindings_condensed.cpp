@@ -106,15 +106,16 @@ py::array_t<double> per_contact(const Solution &s, const VectorXd &v) {
 }
 } // namespace
 
+/// The classes are local to the module: there are two modules that have them.
 void bind_condensed(py::module_ &m) {
-    py::class_<Attempt>(m, "CondensedAttempt")
+    py::class_<Attempt>(m, "CondensedAttempt", py::module_local())
         .def_readonly("branch", &Attempt::branch)
         .def_readonly("converged", &Attempt::converged)
         .def_readonly("iterations", &Attempt::iterations)
         .def_readonly("seconds", &Attempt::seconds)
         .def_readonly("error", &Attempt::error)
         .def_readonly("slip_error", &Attempt::slip_error);
-    py::class_<Solution>(m, "CondensedSolution")
+    py::class_<Solution>(m, "CondensedSolution", py::module_local())
         .def_property_readonly("reaction",
                                [](const Solution &s) { return per_contact(s, s.reaction); })
         .def_property_readonly("displacement",
@@ -145,7 +146,7 @@ void bind_condensed(py::module_ &m) {
         .def_readonly("converged", &Solution::converged)
         .def_readonly("branch", &Solution::branch)
         .def_readonly("tried", &Solution::tried);
-    py::class_<Operator>(m, "CondensedOperator")
+    py::class_<Operator>(m, "CondensedOperator", py::module_local())
         .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0)
         .def_property_readonly("dim", &Operator::dim)
         .def_property_readonly("nodes", &Operator::nodes)

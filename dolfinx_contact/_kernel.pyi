@@ -18,6 +18,7 @@ __all__: list[str] = [
     "CondensedSolution",
     "Law2D",
     "Law3D",
+    "has_avx2",
     "make_law",
 ]
 
@@ -356,6 +357,11 @@ class CondensedOperator:
     def nodes(self) -> int: ...
     @property
     def tied(self) -> int: ...
+
+def has_avx2() -> bool:
+    """
+    Whether this processor can run _kernel_avx2.
+    """
 
 def make_law(
     mu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],

@@ -10,6 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
+_MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
 
 
 class Rows:
@@ -119,6 +120,10 @@ def block_solver(ksp):
     mumps = ksp.getType() == "preonly" and ksp.getPC().getType() == "lu"
     mumps = mumps and ksp.getPC().getFactorSolverType() == "mumps"
 
+    factors = ksp.getPC().getFactorMatrix() if mumps else None
+    if mumps and factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen
+        factors.setMumpsIcntl(*_MUMPS_BLOCK)
+
     def by_block(columns, values):
         count = len(columns)
         # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
@@ -136,7 +141,7 @@ def block_solver(ksp):
         answer = PETSc.Mat().createDense(((owned, size), (None, count)), comm=comm)
         answer.setUp()
         answer.assemble()
-        ksp.getPC().getFactorMatrix().matSolve(rhs, answer)
+        factors.matSolve(rhs, answer)
         result = answer.getDenseArray().copy()
         for matrix in (rhs, transposed, answer):
             matrix.destroy()

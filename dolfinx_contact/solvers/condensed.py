@@ -10,13 +10,13 @@ from collections import deque
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact import _kernel
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
 from dolfinx_contact.solvers.condensed_input import principal_axes
+from dolfinx_contact.solvers.condensed_kernel import CondensedOperator
 from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 
@@ -71,7 +71,7 @@ class CondensedBody:
                 last = range(size, len(W))
                 W[last, last] -= 1 / a
                 W = self._planes.border(W, size)
-                self.operator = _kernel.CondensedOperator(W, self.dim, self._tied)
+                self.operator = CondensedOperator(W, self.dim, self._tied)
                 del W  # copied
                 self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]
@@ -218,15 +218,14 @@ class CondensedBody:
         if not past:
             return []
         last = past[-1]
-        starts = [last[1]]
-        if len(past) > 1:
-            starts.append(2 * last[1] - past[-2][1])
+        before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
+        starts = [last[1], 2 * last[1] - before]
         if self._planes.tied and last[0][-1] > 0.0 < q[-1]:  # in balance with the new weight
             starts.append(q[-1] / last[0][-1] * last[1])
         scale = np.abs(q[: q.size - self._planes.tied]).max()
         distances = [self._planes.distance(other[0], q) for other in past]
         similar = int(np.argmin(distances))
-        if distances[similar] < 0.1 * scale:
+        if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
             starts.append(past[similar][1])
             if similar > 0:
                 starts.append(last[1] + past[similar][1] - past[similar - 1][1])

@@ -15,10 +15,14 @@ template <int T> class Direction {
 
     explicit Direction(const System<T> &system) : system_(system) {}
 
-    /// Newton's step by the smaller of the two eliminations, if there is a choice.
-    /// The last one, with the factors of the one before where they still fit, leaves out dw.
-    void find(const State<T> &state, const VectorXd &r, const VectorXd &w, VectorXd &dr,
-              VectorXd &dw, bool last = false) {
+    /// Which factors: of the present Jacobian; of the last one, if its nodes had the same states
+    /// and elimination; the same for a step that is not taken, which leaves out dw.
+    enum class Factors { present, last, last_for_change };
+
+    /// Newton's step by the smaller of the two eliminations, if there is a choice. Whether it was
+    /// with the last factors.
+    bool find(const State<T> &state, const VectorXd &r, const VectorXd &w, VectorXd &dr,
+              VectorXd &dw, Factors factors = Factors::present) {
         Index compliance = system_.tied, stiffness = 0;
         for (Index i = 0; i < system_.nodes; ++i) {
             const auto &point = state.points[static_cast<std::size_t>(i)];
@@ -39,7 +43,7 @@ template <int T> class Direction {
             unknowns += steps_.back().m;
             branches.push_back(point.branch);
         }
-        same_factors_ = last && stiff == stiff_ && branches == branches_;
+        same_factors_ = factors != Factors::present && stiff == stiff_ && branches == branches_;
         stiff_ = stiff;
         branches_ = std::move(branches);
         const VectorXd left = -w.tail(system_.tied); // of tied rows
@@ -51,10 +55,13 @@ template <int T> class Direction {
         } else {
             tied_ = system_.tied;
             dr = eliminate(*system_.W, system_.left, system_.right, unknowns + tied_, left);
-            if (!last)
+            if (factors != Factors::last_for_change)
                 dw = system_.change(dr);
         }
+        return same_factors_;
     }
+    /// Whether another step with the last factors costs far less than one with factors of its own.
+    bool worth_keeping() const { return linear_.in_single(); }
 
   private:
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }

@@ -42,6 +42,9 @@ class LinearSolver {
         return y.allFinite();
     }
 
+    /// Whether there are factors in single precision, which many unknowns have.
+    bool in_single() const { return kind_ == Kind::in_single && single_.rows() > 0; }
+
     /// With the factors of the last matrix; those in single precision are not refined.
     VectorXd again(const VectorXd &rhs) const {
         if (kind_ == Kind::in_double)

@@ -52,7 +52,10 @@ template <int T> class Newton {
     /// once the residual is below `target`, relative to the largest reaction or to one.
     template <class Certify>
     End solve(VectorXd &r, double target, Budget &budget, int max_iterations, Certify certified) {
-        VectorXd w = system_.displacement(r), best = r;
+        VectorXd &w = w_;
+        VectorXd best = r;
+        w = system_.displacement(r);
+        at_.resize(0);
         state_.evaluate(system_, r, w);
         std::deque<double> memory{state_.merit};
         double smallest = state_.merit;
@@ -64,8 +67,14 @@ template <int T> class Newton {
             }
             budget.tell(state_, r);
             const double size = std::max(1.0, r.template lpNorm<Eigen::Infinity>());
-            if (std::sqrt(2.0 * state_.merit) <= target * size && certified(state_.mapped()))
-                return End::converged;
+            if (std::sqrt(2.0 * state_.merit) <= target * size) {
+                if (certified(state_.mapped())) {
+                    at_ = r;
+                    return End::converged;
+                }
+                w = system_.displacement(r); // without the rounding of steps
+                state_.evaluate(system_, r, w);
+            }
             if (iteration == max_iterations || budget.spent()) {
                 r = best;
                 return iteration < max_iterations && budget.late() ? End::seconds : End::iterations;
@@ -75,15 +84,9 @@ template <int T> class Newton {
                 return End::stalled;
             }
             ++budget.iterations;
-            VectorXd dr, dw;
-            direction_.find(state_, r, w, dr, dw);
-            if (!line_search(r, w, dr, dw, *std::max_element(memory.begin(), memory.end()))) {
+            if (!advance(r, w, *std::max_element(memory.begin(), memory.end()))) {
                 r = best;
                 return End::line_search;
-            }
-            if (std::sqrt(2.0 * state_.merit) <= target * size) { // without the rounding of steps
-                w = system_.displacement(r);
-                state_.evaluate(system_, r, w);
             }
             memory.push_back(state_.merit);
             if (memory.size() > 8)
@@ -100,34 +103,59 @@ template <int T> class Newton {
     /// with the factors of the last step where they still fit, which then costs no more than
     /// products with W.
     VectorXd next_change(const VectorXd &r) {
-        const VectorXd w = system_.displacement(r);
-        state_.evaluate(system_, r, w);
+        if (at_.size() == 0 || at_ != r) {
+            w_ = system_.displacement(r);
+            state_.evaluate(system_, r, w_);
+        }
         VectorXd dr, dw;
-        direction_.find(state_, r, w, dr, dw, true);
+        direction_.find(state_, r, w_, dr, dw, Direction<T>::Factors::last_for_change);
         return r + dr - state_.mapped();
     }
 
   private:
+    /// A step with the last factors, if they are those of a state nearby and leave a tenth of the
+    /// residual at most: it costs two products with W. Else one with factors of the present
+    /// Jacobian, along which is searched.
+    bool advance(VectorXd &r, VectorXd &w, double reference) {
+        using Factors = typename Direction<T>::Factors;
+        constexpr double enough = 1e-2; // of the merit
+        const bool near = direction_.worth_keeping() && state_.merit <= enough * factored_at_;
+        VectorXd dr, dw;
+        if (direction_.find(state_, r, w, dr, dw, near ? Factors::last : Factors::present)) {
+            if (try_step(r, w, dr, dw, 1.0, enough * state_.merit))
+                return true;
+            direction_.find(state_, r, w, dr, dw);
+        }
+        factored_at_ = state_.merit;
+        return line_search(r, w, dr, dw, reference);
+    }
+    /// Takes the step if its merit is no larger than `most`.
+    bool try_step(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw, double length,
+                  double most) {
+        const VectorXd r_trial = r + length * dr, w_trial = w + length * dw;
+        trial_.evaluate(system_, r_trial, w_trial);
+        if (!(trial_.merit <= most))
+            return false;
+        r = r_trial;
+        w = w_trial;
+        std::swap(state_, trial_);
+        return true;
+    }
+
     bool line_search(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw,
                      double reference) {
         constexpr double decrease = 1e-4, shortest = 1e-5;
         const double slope = 2.0 * state_.merit;
-        State<T> trial;
-        for (double length = 1.0; length >= shortest; length *= 0.5) {
-            const VectorXd r_trial = r + length * dr, w_trial = w + length * dw;
-            trial.evaluate(system_, r_trial, w_trial);
-            if (trial.merit <= reference - decrease * length * slope) {
-                r = r_trial;
-                w = w_trial;
-                std::swap(state_, trial);
+        for (double length = 1.0; length >= shortest; length *= 0.5)
+            if (try_step(r, w, dr, dw, length, reference - decrease * length * slope))
                 return true;
-            }
-        }
         return false;
     }
 
     const System<T> &system_;
-    State<T> state_;
+    State<T> state_, trial_;
+    VectorXd at_, w_;          // reactions of the state after convergence, and displacement
+    double factored_at_ = 0.0; // merit of the state that the last factors are of
     Direction<T> direction_;
 };
 } // namespace dolfinx_contact::condensed

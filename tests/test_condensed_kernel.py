@@ -1,0 +1,87 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The condensed solver for processors with AVX2, and factors that serve several iterations."""
+
+import warnings
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dolfinx_contact import Friction, RoundingWarning, _kernel
+from dolfinx_contact.solvers import condensed_kernel
+from dolfinx_contact.solvers.condensed_newton import CondensedNewton
+from mechanics import judge
+
+TOL = 1e-10
+
+
+def modules():
+    """What is compiled, and runs here."""
+    return {module.__name__: module for module in (_kernel, condensed_kernel.fastest())}.values()
+
+
+def body(rng, nodes):
+    """W of nodes on a plane patch of an elastic half-space, nearly: 1 / distance, and q of a slide."""
+    x = rng.uniform(size=(nodes, 2)) * np.sqrt(nodes)
+    distance = np.linalg.norm(x[:, None] - x[None], axis=2)
+    couple = 1 / np.sqrt(1 + distance**2)
+    W = np.kron(couple, np.diag([1.0, 1.2, 0.9]))
+    q = np.column_stack((0.3 * rng.normal(size=(nodes, 2)) + (0.5, 0.2), -np.ones(nodes)))
+    return (W + W.T) / 2, q
+
+
+def test_every_compiled_solver_gives_the_same_answer():
+    """Reactions of small and large problems agree to the tolerance, and the judge accepts each."""
+    law = Friction(mu=(0.3, 0.15), p=(0.05, 0.2))
+    for nodes in (5, 40, 120):  # beyond 43 factors in single precision
+        W, q = body(np.random.default_rng(nodes), nodes)
+        found = []
+        for module in modules():
+            operator = module.CondensedOperator(W, 3)
+            assert operator.prepare()
+            found.append(CondensedNewton().solve_condensed(operator, law, q, TOL).reaction)
+            assert judge.condensed(W, q, law.mu, law.p, found[-1], TOL).error <= judge.DEFECT * TOL
+        for r in found:
+            assert np.abs(r - found[0]).max() <= 1e4 * TOL * np.abs(r).max()
+
+
+def test_processor_decides(monkeypatch):
+    """Without AVX2 the module that every processor can run is taken."""
+    monkeypatch.setattr(_kernel, "has_avx2", lambda: False)
+    assert condensed_kernel.fastest() is _kernel
+
+
+def test_last_factors_solve_what_new_ones_solve():
+    """From starts near the solution and far from it, of many unknowns: the same solution."""
+    rng = np.random.default_rng(7)
+    law = Friction(mu=(0.3, 0.15), p=(0.05, 0.2))
+    W, q = body(rng, 100)
+    operator, solver = condensed_kernel.CondensedOperator(W, 3), CondensedNewton()
+    first = solver.solve_condensed(operator, law, q, TOL)
+    for size in (1e-12, 1e-6, 1e-3, 0.1):
+        start = first.reaction.ravel() * (1 + size * rng.normal(size=q.size))
+        again = solver.solve_condensed(operator, law, q, TOL, [start])
+        assert again.branch == "newton" and again.change <= 1e2 * TOL
+        difference = np.abs(again.reaction - first.reaction).max()
+        assert difference <= 1e4 * TOL * np.abs(first.reaction).max()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_compensated_sums_stay_compensated(seed):
+    """Where slip and gap are the rounding of what cancels, they are exact ones, whatever instructions the compiler uses."""
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(12, 12))
+    W = B @ B.T
+    W = (W + W.T) / 2
+    q = -W @ (np.tile([0.1, 0.05, 1.0], 4) * rng.uniform(0.5, 1, size=12))
+    for module in modules():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RoundingWarning)
+            operator = module.CondensedOperator(W, 3)
+            found = CondensedNewton().solve_condensed(operator, Friction(0.5), q, 1e-14)
+        assert (found.status == 1).all()
+        for row, given, w in zip(W, q, found.displacement.ravel()):
+            terms = map(lambda a, b: Fraction(a) * Fraction(b), row, found.reaction.ravel())
+            exact = Fraction(given) + sum(terms)
+            assert abs(Fraction(w) - exact) <= 1e-14 * abs(exact) + 1e-28 * abs(given)
