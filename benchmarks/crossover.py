@@ -24,7 +24,6 @@ from studies.punch import Parameters, Punch, programme
 
 SOLVERS = dict(condensed=dc.CondensedNewton, fixed_point=dc.FixedPoint)
 KEYS = ("body", "friction", "divisions")
-RULE = 40.0  # contact nodes squared over unknowns, see solvers/automatic.py
 
 
 def measure(body: str, friction: bool, divisions: int) -> dict:
@@ -93,7 +92,6 @@ def main(argv=None) -> None:
     for table in (chosen(rows, titles), crossings(rows)):
         for row in table:
             print(row)
-    print(f"the rule: the condensed solver up to {RULE:g}")
 
 
 if __name__ == "__main__":
