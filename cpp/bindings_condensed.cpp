@@ -28,6 +28,10 @@ VectorXd vector(const Array &array, Index size, const char *name) {
 }
 
 std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied) {
+#ifdef THREE_COMPONENTS_ONLY
+    if (dim != 3)
+        throw py::value_error("this module has systems of three components alone");
+#endif
     if (dim < 1 || dim > 3)
         throw py::value_error("dim must be 1, 2 or 3, not " + std::to_string(dim));
     if (W.ndim() != 2 || W.shape(0) != W.shape(1) || tied < 0 || W.shape(0) < tied ||
@@ -81,6 +85,7 @@ Solution solve_any(const Operator &op, const Array &mu, const std::optional<Arra
     std::vector<VectorXd> from;
     for (const Array &start : starts)
         from.push_back(vector(start, size, "a start"));
+#ifndef THREE_COMPONENTS_ONLY // else other systems are refused when they are made
     if (op.dim() == 1) {
         const AnyLaw<0> any = Uniform<Frictionless>{};
         const py::gil_scoped_release release;
@@ -91,6 +96,7 @@ Solution solve_any(const Operator &op, const Array &mu, const std::optional<Arra
         const py::gil_scoped_release release;
         return solve<1>(op, any, free, from, options);
     }
+#endif
     const auto any = law<2>(mu, p, op.nodes());
     const py::gil_scoped_release release;
     return solve<2>(op, any, free, from, options);

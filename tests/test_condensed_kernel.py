@@ -18,7 +18,7 @@ TOL = 1e-10
 
 def modules():
     """What is compiled, and runs here."""
-    return {module.__name__: module for module in (_kernel, condensed_kernel.fastest())}.values()
+    return {module.__name__: module for module in (_kernel, condensed_kernel.fastest(3))}.values()
 
 
 def body(rng, nodes):
@@ -47,9 +47,10 @@ def test_every_compiled_solver_gives_the_same_answer():
 
 
 def test_processor_decides(monkeypatch):
-    """Without AVX2 the module that every processor can run is taken."""
+    """Without AVX2, and for other than three components, the module that every processor can run is taken."""
+    assert condensed_kernel.fastest(1) is condensed_kernel.fastest(2) is _kernel
     monkeypatch.setattr(_kernel, "has_avx2", lambda: False)
-    assert condensed_kernel.fastest() is _kernel
+    assert condensed_kernel.fastest(3) is _kernel
 
 
 def test_last_factors_solve_what_new_ones_solve():
@@ -57,7 +58,7 @@ def test_last_factors_solve_what_new_ones_solve():
     rng = np.random.default_rng(7)
     law = Friction(mu=(0.3, 0.15), p=(0.05, 0.2))
     W, q = body(rng, 100)
-    operator, solver = condensed_kernel.CondensedOperator(W, 3), CondensedNewton()
+    operator, solver = condensed_kernel.condensed_operator(W, 3), CondensedNewton()
     first = solver.solve_condensed(operator, law, q, TOL)
     for size in (1e-12, 1e-6, 1e-3, 0.1):
         start = first.reaction.ravel() * (1 + size * rng.normal(size=q.size))

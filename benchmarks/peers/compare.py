@@ -19,7 +19,7 @@ from benchmarks.peers import by_calculix, by_getfem, by_siconos
 from benchmarks.report.drawing import OURS, THEIRS, bars, column
 from benchmarks.tables import chosen
 from dolfinx_contact.solvers.base import SolverResult
-from dolfinx_contact.solvers.condensed_kernel import CondensedOperator
+from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from mechanics import judge
 from studies.punch import CASES, Parameters, Punch, programme
 
@@ -195,7 +195,7 @@ def condensed_problems() -> dict:
 
 def by_newton(problems: dict) -> dict:
     """Seconds of all problems by CondensedNewton, each from the solution of the step before."""
-    operator = CondensedOperator(problems["W"], 3)
+    operator = condensed_operator(problems["W"], 3)
     operator.prepare()
     solver, seconds = dc.CondensedNewton(), {}
     for case in CASES:

@@ -16,7 +16,7 @@ from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
 from dolfinx_contact.solvers.condensed_input import principal_axes
-from dolfinx_contact.solvers.condensed_kernel import CondensedOperator
+from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 
@@ -71,7 +71,7 @@ class CondensedBody:
                 last = range(size, len(W))
                 W[last, last] -= 1 / a
                 W = self._planes.border(W, size)
-                self.operator = CondensedOperator(W, self.dim, self._tied)
+                self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
                 self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]

@@ -10,9 +10,9 @@ from typing import Any
 from dolfinx_contact import _kernel
 
 
-def fastest() -> Any:
-    """The module for this processor; it has ``CondensedOperator``.  Answers of two differ by rounding."""
-    if _kernel.has_avx2():
+def fastest(dim: int) -> Any:
+    """The module with ``CondensedOperator`` for so many components.  Answers of two modules differ by rounding."""
+    if dim == 3 and _kernel.has_avx2():
         try:
             return importlib.import_module("dolfinx_contact._kernel_avx2")
         except ImportError:  # not built on this platform
@@ -20,4 +20,6 @@ def fastest() -> Any:
     return _kernel
 
 
-CondensedOperator = fastest().CondensedOperator
+def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
+    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones."""
+    return fastest(dim).CondensedOperator(W, dim, tied)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.condensed_input import checked_problem, principal_axes
-from dolfinx_contact.solvers.condensed_kernel import CondensedOperator
+from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import BoundSolver
@@ -249,7 +249,7 @@ def solve_condensed(
         blocks = W.reshape(len(q), dim, len(q), dim)
         W = np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
         q = np.einsum("nij,nj->ni", turns, q)
-    operator = CondensedOperator(W, dim)
+    operator = condensed_operator(W, dim)
     try:
         found = solver.solve_condensed(operator, friction, q, tol, starts)
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
