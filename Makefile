@@ -6,7 +6,7 @@
 # make test-all all tests: make test, the slow ones, 3 ranks, and the C++ ones
 # make stress   every solver on some 640 scenes, each answer judged from the mechanics in NumPy; resumable
 # make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
-# make report   error against run time: every solver, the peers beside it, the price of every ingredient;
+# make report   error against run time: every solver, and the peers beside it;
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 

@@ -41,11 +41,11 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.results.record import NotConverged as NotConverged
     from dolfinx_contact.results.record import Step as Step
     from dolfinx_contact.solvers.condensed_newton import CondensedNewton as CondensedNewton
-    from dolfinx_contact.solvers.condensed_newton import (
+    from dolfinx_contact.solvers.condensed_newton import solve_condensed as solve_condensed
+    from dolfinx_contact.solvers.condensed_result import (
         CondensedNotConverged as CondensedNotConverged,
     )
-    from dolfinx_contact.solvers.condensed_newton import CondensedResult as CondensedResult
-    from dolfinx_contact.solvers.condensed_newton import solve_condensed as solve_condensed
+    from dolfinx_contact.solvers.condensed_result import CondensedResult as CondensedResult
     from dolfinx_contact.solvers.fixed_point import FixedPoint as FixedPoint
     from dolfinx_contact.solvers.sparse_newton import SparseNewton as SparseNewton
 
@@ -53,8 +53,8 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
 
 _HOME = {  # the module of every name
     "CondensedNewton": "solvers.condensed_newton",
-    "CondensedNotConverged": "solvers.condensed_newton",
-    "CondensedResult": "solvers.condensed_newton",
+    "CondensedNotConverged": "solvers.condensed_result",
+    "CondensedResult": "solvers.condensed_result",
     "Contact": "contact.contact",
     "ContactProblem": "problem",
     "Counts": "results.record",

@@ -228,6 +228,9 @@ class LoadStep:
             supports: What the supports carry, at fixed degrees of freedom.
         """
         left, acting = self.free(left), np.abs(self.external)
+        missing = np.zeros_like(x)  # to the boundary values, as forces
+        missing[self.body.fixed] = self.b[self.body.fixed] - x[self.body.fixed]
+        left += self.body.cancelling(missing)
         columns = [[np.zeros(0)] for _ in range(5)]
         for contact, stiffness in zip(self.contacts, self.stiffness):
             contact.points.add_magnitudes(contact.reaction, acting)

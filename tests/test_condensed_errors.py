@@ -11,7 +11,8 @@ from condensed_scenes import judge
 
 from dolfinx_contact import CondensedNewton, Friction, _kernel
 from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged, solve_condensed
+from dolfinx_contact.solvers.condensed_newton import solve_condensed
+from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 from mechanics.condensed import random_problem
 
 TOL = 1e-8

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.solvers.base import SolverResult
 
 SOLVERS = {"default": lambda: None, "fixed point": dc.FixedPoint, "condensed": dc.CondensedNewton}
 every_solver = pytest.mark.parametrize("solver", SOLVERS)
@@ -199,3 +200,27 @@ def test_unloaded_to_next_to_nothing(solver):
         each.problem.solve()
     r, expected = scene.contact.reaction, other.contact.reaction
     assert np.linalg.norm(r - expected) <= 1e-6 * np.linalg.norm(expected)
+
+
+class Nothing:
+    """A solver that moves nothing."""
+
+    def bind(self, body, contacts, stiffness, memory):
+        self._size = body.size
+        return self
+
+    def destroy(self):
+        pass
+
+    def solve(self, step):
+        return SolverResult(np.zeros(self._size), 0, 0.0, "nothing")
+
+
+def test_supports_that_are_not_where_they_should_be_are_an_error():
+    """A displacement without the boundary values is no solution, however well its forces are in balance."""
+    scene = scenes.block()
+    scene.move_top(0, 0, -0.01)
+    scene.problem.solver = Nothing()
+    with pytest.raises(dc.NotConverged) as caught:
+        scene.problem.solve()
+    assert caught.value.step.error > 0.1

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """A long run through everything that goes wrong in one ends where an undisturbed run does.
 
-``SOAK_STEPS=100000 tools/mpitest .venv 2 -s tests/test_soak.py`` takes hours; 300 steps meet every disturbance.
+``SOAK_STEPS=100000 tools/mpitest .venv 2 -s tests/test_soak.py`` takes an hour; 300 steps meet every disturbance.
 """
 
 import math
@@ -51,9 +51,11 @@ class Run:
             self.exchange(k)
 
     def exchange(self, k):
+        # Slip rules not far from the cone's shape: with p = (0.0375, 0.15) beside mu = (0.3, 0.15) step 20,283 has two
+        # solutions, both to the last digit and from the same history, and rounding decides which is found.
         x = self.scene.contact.x
         mu = np.column_stack((0.3 + 0.1 * x[:, 0], 0.2 + 0.1 * x[:, 1]))
-        laws = (((0.3, 0.15), (0.05, 0.2)), (0.25, None), (mu, None), (0.0, None))
+        laws = (((0.3, 0.15), (0.25, 0.15)), (0.25, None), (mu, None), (0.0, None))
         self.scene.contact.friction = dc.Friction(*laws[k // 10 % len(laws)])
 
     def disturb(self, random):

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Error against run time: every solver, the peers beside it, the price of every ingredient.
+"""Error against run time: every solver, and the peers beside it.
 
     make report              # half an hour and more; docs/report.html, docs/report/
     make report QUICK=1      # minutes; results/report-quick/

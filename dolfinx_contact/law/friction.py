@@ -21,6 +21,23 @@ Field = Callable[[Any], Any]  # or a DOLFINx Function, which this module does no
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
 
+def _cone(given: ArrayLike) -> np.ndarray:
+    """``mu``, checked, ``shape=(2,)`` or ``(n, 2)``."""
+    mu = _coefficients("mu", given)
+    if np.any(mu < 0):
+        raise ValueError(f"mu must not be negative, but is {given!r}")
+    if mu.ndim == 0:
+        mu = np.full(2, mu)
+    if np.any((mu == 0).any(axis=-1) != (mu == 0).all(axis=-1)):
+        raise ValueError(
+            f"mu must be positive in both directions or zero in both, not {given!r}; "
+            "for almost no friction in one direction give a small coefficient"
+        )
+    if np.any((mu > 0) & ((mu < _SMALLEST) | (mu > _LARGEST))):
+        raise ValueError(f"mu must be zero or between {_SMALLEST} and {_LARGEST}, not {given!r}")
+    return mu
+
+
 def _coefficients(name: str, value) -> np.ndarray:
     """``value`` as a finite float64 array of shape (), (2,) or (n, 2), or a ``ValueError``."""
     try:
@@ -101,23 +118,8 @@ class Friction:
                 raise ValueError("give p or k, not both")
             return
         given = f"mu={mu!r}, p={p!r}, k={k!r}"
-        mu_given = mu
-        mu = _coefficients("mu", mu)
-        if np.any(mu < 0):
-            raise ValueError(f"mu must not be negative, but is {mu_given!r}")
-        if mu.ndim == 0:
-            mu = np.full(2, mu)
-        if np.any((mu == 0).any(axis=-1) != (mu == 0).all(axis=-1)):
-            raise ValueError(
-                f"mu must be positive in both directions or zero in both, not {mu_given!r}; "
-                "for almost no friction in one direction give a small coefficient"
-            )
+        mu = _cone(mu)
         positive = mu > 0
-        if np.any(positive & ((mu < _SMALLEST) | (mu > _LARGEST))):
-            raise ValueError(
-                f"mu must be zero or between {_SMALLEST} and {_LARGEST}, not {mu_given!r}"
-            )
-
         if p is not None and k is not None:
             raise ValueError(f"give p or k, not both ({given})")
         if k is not None:

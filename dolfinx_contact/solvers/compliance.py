@@ -104,6 +104,14 @@ def check_memory(comm, needed: int) -> None:
         )
 
 
+def _mumps_factors(ksp):
+    """The factors, which then take many right-hand sides at once, unless the user has chosen how many."""
+    factors = ksp.getPC().getFactorMatrix()
+    if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:
+        factors.setMumpsIcntl(*_MUMPS_BLOCK)
+    return factors
+
+
 def block_solver(ksp):
     """A function that solves for blocks of sparse right-hand sides with the solver of ``ksp``.
 
@@ -119,10 +127,6 @@ def block_solver(ksp):
     ksp.setUp()
     mumps = ksp.getType() == "preonly" and ksp.getPC().getType() == "lu"
     mumps = mumps and ksp.getPC().getFactorSolverType() == "mumps"
-
-    factors = ksp.getPC().getFactorMatrix() if mumps else None
-    if mumps and factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen
-        factors.setMumpsIcntl(*_MUMPS_BLOCK)
 
     def by_block(columns, values):
         count = len(columns)
@@ -141,7 +145,7 @@ def block_solver(ksp):
         answer = PETSc.Mat().createDense(((owned, size), (None, count)), comm=comm)
         answer.setUp()
         answer.assemble()
-        factors.matSolve(rhs, answer)
+        _mumps_factors(ksp).matSolve(rhs, answer)
         result = answer.getDenseArray().copy()
         for matrix in (rhs, transposed, answer):
             matrix.destroy()

@@ -17,8 +17,8 @@ from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
 from dolfinx_contact.solvers.condensed_input import principal_axes
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
-from dolfinx_contact.solvers.condensed_newton import CondensedNotConverged
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
+from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 
 KEPT = 64  # earlier steps: more than a cycle has
 

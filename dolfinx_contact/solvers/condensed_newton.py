@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,86 +16,14 @@ from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.condensed_input import checked_problem, principal_axes
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
+from dolfinx_contact.solvers.condensed_result import (
+    Attempt,
+    CondensedNotConverged,
+    CondensedResult,
+)
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import BoundSolver
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One method that was tried, and the smallest errors found until its end."""
-
-    branch: str
-    converged: bool
-    iterations: int
-    seconds: float
-    error: float
-    slip_error: float
-
-
-@dataclass(frozen=True)
-class CondensedResult:
-    """Solution of ``solve_condensed``; ``n`` contacts, in three dimensions (in two, one column less).
-
-    Attributes:
-        reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
-        displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
-        status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
-        error: ``|r - proj(r - kappa w)|`` over the forces that act, see ``solve_condensed``.
-        slip_error: Defect of the slip rule, as a force, over the same.
-        rounding: What double precision leaves of the errors; an error above ``tol`` is below it.
-        change: How much Newton's next step would still move the reactions, over the same forces:
-            an estimate of what is missing to the solution nearby, which where W is ill conditioned
-            is far more than the error.  It knows nothing of other solutions.
-        iterations: Of all methods tried.
-        seconds: Wall time of all methods tried.
-        branch: The method of the cascade that gave the answer.
-        tried: All that were tried, in order.
-        tied: Forces of the tied rows of a kernel operator, if it has any.
-        unsolvable: Of a failure: it is proved that there is no solution, by trying every state of a
-            few contacts in two dimensions.
-    """
-
-    reaction: np.ndarray
-    displacement: np.ndarray
-    status: np.ndarray
-    error: float
-    slip_error: float
-    rounding: float
-    change: float
-    iterations: int
-    seconds: float
-    branch: str
-    tried: tuple[Attempt, ...] = field(repr=False)
-    tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
-    unsolvable: bool = False
-
-
-class CondensedNotConverged(RuntimeError):
-    """No method reached the tolerance.
-
-    Attributes:
-        best: The ``CondensedResult`` of the smallest errors found; not a solution.
-        tried: What was tried, a tuple of ``Attempt``.
-    """
-
-    def __init__(self, best: CondensedResult) -> None:
-        self.best, self.tried = best, best.tried
-        methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
-        advice = (
-            "There is no solution: none of the states of the contacts is one."
-            if best.unsolvable
-            else "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
-            "few degrees of freedom may have no solution at all."
-        )
-        super().__init__(
-            f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
-            f"{best.iterations} iterations and {best.seconds:.3g} s. Tried (iterations): {methods}. "
-            + advice
-        )
-
-    def __reduce__(self) -> tuple:
-        return type(self), (self.best,)
 
 
 class CondensedNewton:
@@ -241,15 +169,12 @@ def solve_condensed(
             That is also the answer to a problem without solution.
     """
     q, W, friction, r0 = checked_problem(q, W, friction, r0)
-    dim = q.shape[1]
     solver, tol = _checked_options(solver, tol, max_seconds)
-    turns = principal_axes(friction, len(q), dim)
-    starts = () if r0 is None else [np.einsum("nij,nj->ni", turns, r0.reshape(q.shape))]
+    turns = principal_axes(friction, *q.shape)
+    starts = () if r0 is None else [_turned(r0.reshape(q.shape), turns)]
     if friction.axes is not None:
-        blocks = W.reshape(len(q), dim, len(q), dim)
-        W = np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
-        q = np.einsum("nij,nj->ni", turns, q)
-    operator = condensed_operator(W, dim)
+        W, q = _turned_matrix(W, turns), _turned(q, turns)
+    operator = condensed_operator(W, q.shape[1])
     try:
         found = solver.solve_condensed(operator, friction, q, tol, starts)
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
@@ -288,6 +213,18 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
         except CondensedNotConverged:
             break
     return found
+
+
+def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Vectors of contacts along the principal axes, ``shape=(n, dim)``."""
+    return np.einsum("nij,nj->ni", turns, vectors)
+
+
+def _turned_matrix(W: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """``W`` along the principal axes."""
+    n, dim, _ = turns.shape
+    blocks = W.reshape(n, dim, n, dim)
+    return np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
 
 
 def _turned_back(result: CondensedResult, turns: np.ndarray) -> CondensedResult:

@@ -1,0 +1,86 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What the solution of a condensed problem returns, or raises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One method that was tried, and the smallest errors found until its end."""
+
+    branch: str
+    converged: bool
+    iterations: int
+    seconds: float
+    error: float
+    slip_error: float
+
+
+@dataclass(frozen=True)
+class CondensedResult:
+    """Solution of ``solve_condensed``; ``n`` contacts, in three dimensions (in two, one column less).
+
+    Attributes:
+        reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
+        displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
+        status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
+        error: ``|r - proj(r - kappa w)|`` over the forces that act, see ``solve_condensed``.
+        slip_error: Defect of the slip rule, as a force, over the same.
+        rounding: What double precision leaves of the errors; an error above ``tol`` is below it.
+        change: How much Newton's next step would still move the reactions, over the same forces:
+            an estimate of what is missing to the solution nearby, which where W is ill conditioned
+            is far more than the error.  It knows nothing of other solutions.
+        iterations: Of all methods tried.
+        seconds: Wall time of all methods tried.
+        branch: The method of the cascade that gave the answer.
+        tried: All that were tried, in order.
+        tied: Forces of the tied rows of a kernel operator, if it has any.
+        unsolvable: Of a failure: it is proved that there is no solution, by trying every state of a
+            few contacts in two dimensions.
+    """
+
+    reaction: np.ndarray
+    displacement: np.ndarray
+    status: np.ndarray
+    error: float
+    slip_error: float
+    rounding: float
+    change: float
+    iterations: int
+    seconds: float
+    branch: str
+    tried: tuple[Attempt, ...] = field(repr=False)
+    tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    unsolvable: bool = False
+
+
+class CondensedNotConverged(RuntimeError):
+    """No method reached the tolerance.
+
+    Attributes:
+        best: The ``CondensedResult`` of the smallest errors found; not a solution.
+        tried: What was tried, a tuple of ``Attempt``.
+    """
+
+    def __init__(self, best: CondensedResult) -> None:
+        self.best, self.tried = best, best.tried
+        methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
+        advice = (
+            "There is no solution: none of the states of the contacts is one."
+            if best.unsolvable
+            else "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
+            "few degrees of freedom may have no solution at all."
+        )
+        super().__init__(
+            f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
+            f"{best.iterations} iterations and {best.seconds:.3g} s. Tried (iterations): {methods}. "
+            + advice
+        )
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self.best,)
