@@ -42,7 +42,7 @@ test: .venv/ready
 # what make test leaves out; it needs make test to come first
 test-rest: test-cpp
 	for n in 1 2; do tools/mpitest .venv $$n -m slow || exit 1; done
-	tools/mpitest .venv 3
+	tools/mpitest .venv 3 -m "not slow" $(arrays:%=--ignore=tests/test_%.py)
 
 test-all: test
 	$(MAKE) test-rest
@@ -53,9 +53,12 @@ test-cpp: .venv/ready
 test-python: .venv/ready
 	for n in $(RANKS); do tools/mpitest .venv $$n $(ARGS) || exit 1; done
 
-# the same Python tests on the newest DOLFINx on PyPI
+# the same Python tests on the newest DOLFINx on PyPI, the slow ones on one rank
 test-wheel: .venv-wheel/ready
-	for n in $(RANKS); do tools/mpitest .venv-wheel $$n $(ARGS) || exit 1; done
+	tools/mpitest .venv-wheel 1 $(ARGS)
+	for n in 2 3; do \
+		tools/mpitest .venv-wheel $$n -m "not slow" $(arrays:%=--ignore=tests/test_%.py) $(ARGS) || exit 1; \
+	done
 
 format: .venv/ready
 	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')

@@ -154,7 +154,7 @@ def original_nodes(V):
             own = layout.entity_dofs(dim, entity)
             if len(own) > 1:
                 raise ValueError("nodes are named by their mesh for spaces of degree 1 and 2 only.")
-            if len(own) == 1:
+            if len(own) == 1 and len(nodes) > 0:  # a rank may have no cells
                 corners = [k for k in layout.entity_closure_dofs(dim, entity) if k < count]
                 original[nodes[:, own[0]]] = _name_of(vertices[:, corners])
     return original[: index_map.size_local]
