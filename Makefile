@@ -13,7 +13,7 @@
 .PHONY: punch study stress report docs test test-rest test-all test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
-# tests of plain arrays, the same on every rank: make test has them on one, make test-all on three
+# tests of plain arrays, the same on every rank: they run on one alone
 arrays = bipotential condensed_errors condensed_kernel condensed_newton condensed_tied element_height friction \
 	friction_cone judge return_map
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \

@@ -25,9 +25,7 @@ class NonlinearStep(LoadStep):
         for guess in self._starts:
             if any(self.body.same(guess, other) for other in different):
                 continue
-            motion = np.zeros_like(guess)
-            motion[self.body.fixed] = self.b[self.body.fixed] - guess[self.body.fixed]
-            left = self.out_of_balance(guess, maps) - self.body.carried(motion)
+            left = self.out_of_balance(guess, maps) - self.body.carried(self.missing(guess))
             sizes.append(self.size(left))
             different.append(guess)
         return different[int(np.argmin(np.nan_to_num(sizes, nan=np.inf)))]
@@ -52,8 +50,7 @@ class NonlinearStep(LoadStep):
 
     def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
         super()._judge(x, forces)
-        missing = self.b[self.body.fixed] - x[self.body.fixed]
-        if self.body.largest(np.abs(missing)) > 0.0:
+        if not self.held(x):
             self.errors = self.errors._replace(error=np.inf)
 
 

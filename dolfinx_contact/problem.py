@@ -171,7 +171,7 @@ class ContactProblem(ProblemStates):
                     found.x,
                     [contact.reaction for contact in self.contacts],
                 )
-            (self.body.put if self.body.nonlinear else self._show)(found.x)
+            self.body.put(found.x)
             self._variables.advance(self.u)
         except BaseException as failure:
             self._log(f"step failed: {type(failure).__name__}: {failure}")

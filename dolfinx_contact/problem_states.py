@@ -116,12 +116,8 @@ class ProblemStates(ProblemOptions):
         self._restore()
         self._keep()
 
-    def _show(self, x: np.ndarray) -> None:
-        self.u.x.array[: self.body.size] = x
-        self.u.x.scatter_forward()
-
     def _restore(self) -> None:
-        self._show(self._states[0])
+        self.body.show(self._states[0])
         self._variables.restore()
         for contact in self.contacts:
             contact.restore()

@@ -96,6 +96,16 @@ class LoadStep:
         forces[self.body.fixed] = 0.0
         return forces
 
+    def missing(self, x: np.ndarray) -> np.ndarray:
+        """What is missing to the boundary values at a displacement, zero at free degrees of freedom."""
+        missing, fixed = np.zeros_like(x), self.body.fixed
+        missing[fixed] = self.b[fixed] - x[fixed]
+        return missing
+
+    def held(self, x: np.ndarray) -> bool:
+        """Whether ``x`` has the boundary values.  Collective."""
+        return self.body.largest(np.abs(self.missing(x))) == 0.0
+
     def size(self, forces: np.ndarray) -> float:
         """Norm of forces at free degrees of freedom."""
         return self.body.norm(self.free(forces))
@@ -228,9 +238,7 @@ class LoadStep:
             supports: What the supports carry, at fixed degrees of freedom.
         """
         left, acting = self.free(left), np.abs(self.external)
-        missing = np.zeros_like(x)  # to the boundary values, as forces
-        missing[self.body.fixed] = self.b[self.body.fixed] - x[self.body.fixed]
-        left += self.body.cancelling(missing)
+        left += self.body.cancelling(self.missing(x))
         columns = [[np.zeros(0)] for _ in range(5)]
         for contact, stiffness in zip(self.contacts, self.stiffness):
             contact.points.add_magnitudes(contact.reaction, acting)

@@ -59,7 +59,8 @@ class Plasticity:
         stress = bulk * np.outer(strain[:, :3].sum(axis=1), one) + trial
         stress -= 2 * SHEAR * self._gamma[:, None] * self._normal
         kept = 1 - 2 * SHEAR * self._gamma / np.maximum(size, 1e-300)
-        yields = above > 0
+        # A state on the yield surface, as after a step, has two tangents: the elastic one, not the one rounding picks.
+        yields = above > 1e-9 * YIELD
         slope = np.where(yields, 2 * SHEAR / (1 + HARDENING / (3 * SHEAR)) - 2 * SHEAR * (1 - kept), 0.0)  # fmt: skip
         normals = self._normal[:, :, None] * self._normal[:, None, :]
         tangent = bulk * np.outer(one, one) + kept[:, None, None] * deviator

@@ -72,3 +72,11 @@ def warn_of_unread(options: list[str]) -> None:
             "preconditioner. `-help` lists those there are.",
             stacklevel=2,
         )
+
+
+def check_finite(arrays: dict, comm) -> None:
+    """Raise a ``ValueError`` on all ranks if one of the arrays, by their names, is not finite.  Collective."""
+    with raised_together(comm):
+        for name, values in arrays.items():
+            if not np.isfinite(values).all():
+                raise ValueError(f"the {name} contain NaN or infinity: nothing was solved.")

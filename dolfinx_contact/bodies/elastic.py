@@ -1,7 +1,4 @@
-"""The elastic body: what DOLFINx assembles and PETSc solves, without a word of contact.
-
-All vectors are NumPy arrays of the degrees of freedom that this rank owns.
-"""
+"""The elastic body: what DOLFINx assembles and PETSc solves; vectors are arrays of the degrees of freedom of this rank."""
 
 from __future__ import annotations
 
@@ -13,14 +10,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies import rigid_motion
+from dolfinx_contact.bodies import checks, rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
-from dolfinx_contact.bodies.checks import (
-    agree_on_values,
-    check_diagonal,
-    check_dilation,
-    warn_of_unread,
-)
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.collective import OverRanks, raised_together
@@ -41,7 +32,6 @@ class ElasticBody(OverRanks):
         petsc_options: Options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
         petsc_options_prefix: Their prefix.
-
     """
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
@@ -79,15 +69,15 @@ class ElasticBody(OverRanks):
             How often it was assembled so far: a number that changes with the matrix.
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
-        agree_on_values(given, self.comm)
+        checks.agree_on_values(given, self.comm)
         digest = digest_of(self._parameters)
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
         self._assemble()
         with raised_together(self.comm):
-            check_diagonal(self.diagonal(), self.V)
-        check_dilation(self)
+            checks.check_diagonal(self.diagonal(), self.V)
+        checks.check_dilation(self)
         self._hold()
         self.soft = rigid_motion.soft_motions(self)
         self._digest = digest
@@ -152,6 +142,15 @@ class ElasticBody(OverRanks):
         if not getattr(self, "closed", True) and compat.may_free_alone(self.comm):
             self.close()
 
+    def show(self, values: np.ndarray) -> None:
+        """Let ``u`` be a displacement; its owned or all local entries.  Collective."""
+        self.u.x.array[: values.size] = values
+        self.u.x.scatter_forward()
+
+    def put(self, values: np.ndarray) -> None:
+        """As ``show``, and let what the user makes of ``u`` follow, see ``NonlinearBody``.  Collective."""
+        self.show(values)
+
     # -- loads and residuals -------------------------------------------------------------------
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:
@@ -171,16 +170,19 @@ class ElasticBody(OverRanks):
             self._external = -self.internal_force(np.zeros_like(lift))
             self._load_digest = digest
         external = self._external.copy()
-        self._lift.array_w[:] = lift[self.fixed]
-        self._coupling.mult(self._lift, self._lifted)
-        b = external - self._lifted.array_r
-        with raised_together(self.comm):
-            for name, values in (("boundary values", lift), ("loads", external), ("loads", b)):
-                if not np.isfinite(values).all():
-                    raise ValueError(f"the {name} contain NaN or infinity: nothing was solved.")
+        b = external - self.carried(lift)
+        checks.check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)
         external[self.fixed] = 0.0
         b[self.fixed] = lift[self.fixed]
         return b, external
+
+    def carried(self, motion: np.ndarray) -> np.ndarray:
+        """``K d`` of a motion of supports alone, zero at fixed degrees of freedom."""
+        self._lift.array_w[:] = motion[self.fixed]
+        self._coupling.mult(self._lift, self._lifted)
+        forces = self._lifted.array_r.copy()
+        forces[self.fixed] = 0.0
+        return forces
 
     def support_forces(self, x: np.ndarray) -> np.ndarray:
         """What the supports carry at ``x``, at fixed degrees of freedom, contact reactions left out.
@@ -199,8 +201,7 @@ class ElasticBody(OverRanks):
         """F assembled by DOLFINx at a displacement, owned entries; ``u`` itself is left as it was."""
         kept = self.u.x.array.copy()
         try:
-            self.u.x.array[: values.size] = values
-            self.u.x.scatter_forward()
+            self.put(values)
             compat.assemble_into(self._work.x, self._residual_form)
         finally:
             self.u.x.array[:] = kept
@@ -229,7 +230,7 @@ class ElasticBody(OverRanks):
             self._elastic = self.solver(self.K)
             if self.options is not None and not self._said:
                 self._said = True
-                warn_of_unread(self._elastic.unread)
+                checks.warn_of_unread(self._elastic.unread)
         return self._elastic
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:

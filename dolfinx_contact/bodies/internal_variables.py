@@ -41,10 +41,6 @@ class InternalVariables:
     def _values(self) -> list[np.ndarray]:
         return [function.x.array.copy() for function in self._functions]
 
-    def _take(self, values) -> None:
-        for function, array in zip(self._functions, values):
-            function.x.array[:] = array
-
     def reset(self) -> None:
         """Back to what they were when the problem was made."""
         self.go_back(self._first)
@@ -56,7 +52,8 @@ class InternalVariables:
 
     def restore(self) -> None:
         """Back to the last converged state."""
-        self._take(self.last)
+        for function, values in zip(self._functions, self.last):
+            function.x.array[:] = values
 
     def advance(self, u: fem.Function) -> None:
         """Let the user move them on with the converged displacement.  Collective."""

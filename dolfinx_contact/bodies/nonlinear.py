@@ -8,7 +8,7 @@ import numpy as np
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
-from dolfinx_contact.bodies.checks import agree_on_values, check_diagonal
+from dolfinx_contact.bodies.checks import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.forms import derivative_of
 from dolfinx_contact.collective import raised_together
@@ -60,21 +60,10 @@ class NonlinearBody(ElasticBody):
 
     def put(self, values: np.ndarray) -> None:
         """Let ``u`` and what the user makes of it be those of a displacement; its owned or all local entries.  Collective."""
-        self.u.x.array[: values.size] = values
-        self.u.x.scatter_forward()
+        self.show(values)
         if self._before is not None:
             with raised_together(self.comm):
                 self._before(self.u)
-
-    def internal_force(self, values: np.ndarray) -> np.ndarray:
-        """See ``ElasticBody``."""
-        kept = self.u.x.array.copy()
-        try:
-            self.put(values)
-            compat.assemble_into(self._work.x, self._residual_form)
-        finally:
-            self.u.x.array[:] = kept
-        return self._work.x.array[: self.size].copy()
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """See ``ElasticBody``; not finite where an element is turned inside out."""
@@ -126,21 +115,10 @@ class NonlinearBody(ElasticBody):
         values[self.fixed] = local[self.fixed]
         external = -self.internal_force(np.zeros_like(local))
         external[self.fixed] = 0.0
-        with raised_together(self.comm):
-            for name, array in (("boundary values", values), ("loads, F at u = 0,", external)):
-                if not np.isfinite(array).all():
-                    raise ValueError(f"the {name} contain NaN or infinity: nothing was solved.")
+        check_finite({"boundary values": values, "loads, F at u = 0,": external}, self.comm)
         return values, external
 
     # -- the linearised body -------------------------------------------------------------------
-
-    def carried(self, motion: np.ndarray) -> np.ndarray:
-        """``K d`` of a motion of supports alone, zero at fixed degrees of freedom."""
-        self._lift.array_w[:] = motion[self.fixed]
-        self._coupling.mult(self._lift, self._lifted)
-        forces = self._lifted.array_r.copy()
-        forces[self.fixed] = 0.0
-        return forces
 
     def linear_load(self, values: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """``b`` of the linearised body, see ``ElasticBody.load``.
@@ -153,10 +131,8 @@ class NonlinearBody(ElasticBody):
         motion = np.where(self._is_fixed(), values - x, 0.0)
         free = np.where(self._is_fixed(), 0.0, x)
         b = self.multiply(free) - residual - self.carried(motion)
-        self._right.array_w[:] = x
-        self._coupling.multTranspose(self._right, self._lift)
         self._external = np.zeros(self.size)
-        self._external[self.fixed] = self._lift.array_r - residual[self.fixed]
+        self._external[self.fixed] = self.support_forces(x) - residual[self.fixed]
         b[self.fixed] = values[self.fixed]
         return b
 

@@ -91,6 +91,20 @@ class ContactPoints:
         return NodalStiffness(local[:, -1, -1].copy(), local[:, :-1, :-1])
 
 
+def assembled(points, derivatives, size: int) -> tuple:
+    """``B^T R_r B`` and ``B^T R_u B`` of all contacts, sparse, owned rows and columns.
+
+    Args:
+        points: ``ContactPoints`` of each contact.
+        derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
+        size: Number of owned degrees of freedom.
+    """
+    sums = [sparse.csr_matrix((size, size))] * 2
+    for of, parts in zip(points, derivatives):
+        sums = [one + of.matrix(part) for one, part in zip(sums, parts)]
+    return tuple(sums)
+
+
 def add_to(K, values) -> None:
     """Add a sparse matrix of owned rows and columns to an assembled PETSc matrix.  Collective."""
     first = K.getOwnershipRange()[0]

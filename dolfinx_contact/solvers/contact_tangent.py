@@ -8,6 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from dolfinx_contact.contact.interface import assembled
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
 
@@ -51,12 +52,7 @@ class ContactTangent:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
         K, size = self._body.K, self._body.size
-        nothing = sparse.csr_matrix((size, size))
-        # B^T R_r B and B^T R_u B; supports take what is left at fixed degrees of freedom
-        self._by_forces, self._by_motion = (
-            sum((of.matrix(part) for of, part in zip(self._points, parts)), nothing)
-            for parts in (zip(*derivatives) if derivatives else ((), ()))
-        )
+        self._by_forces, self._by_motion = assembled(self._points, derivatives, size)
         with stage("contact: tangent"):
             if self._A is None:
                 self._A = K.copy()

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
+from petsc4py import PETSc
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
 STEPS, LEFT = 50, 1e-6
@@ -29,7 +30,7 @@ class PlaneBorder:
 
     def __init__(self, body, planes, A, stiffened, springs):
         self._body, C = body, planes.columns(springs)
-        self._follow = np.array([_solved(body, A, stiffened, column) for column in C.T]).T
+        self._follow = _solved(body, A, stiffened, C)
         pairs = zip(planes.axes, springs)
         stiffness = sum(np.einsum("nim,ni,nik->mk", axes, S, axes) for axes, S in pairs)
         stiffness, coupling = body.total([stiffness, C.T @ self._follow])
@@ -41,24 +42,30 @@ class PlaneBorder:
         return self._follow @ np.linalg.solve(self._left, pushed)
 
 
-def _solved(body, A, stiffened, b: np.ndarray) -> np.ndarray:
-    """A^-1 b by conjugate gradients with a preconditioner."""
-    right, left = A.createVecs()
-    x, r = np.zeros_like(b), b.copy()
-    z = stiffened.apply(r)
-    p, size = z.copy(), body.total([r @ z])[0]
-    goal = LEFT**2 * size
-    for _ in range(STEPS):
-        if size <= goal:
-            break
-        right.array_w[:] = p
-        A.mult(right, left)
-        Ap = left.array_r.copy()
-        length = size / body.total([p @ Ap])[0]
-        x, r = x + length * p, r - length * Ap
-        z, before = stiffened.apply(r), size
-        size = body.total([r @ z])[0]
-        p = z + size / before * p
-    for vector in (right, left):
-        vector.destroy()
-    return x
+class _Preconditioner:
+    """What applies a preconditioner, as PETSc wants it."""
+
+    def __init__(self, stiffened):
+        self._stiffened = stiffened
+
+    def apply(self, _, x, y) -> None:
+        y.array_w[:] = self._stiffened.apply(x.array_r)
+
+
+def _solved(body, A, stiffened, C: np.ndarray) -> np.ndarray:
+    """A^-1 C, ``shape=(owned dofs, m)``, by conjugate gradients with a preconditioner."""
+    ksp = PETSc.KSP().create(body.comm)
+    ksp.setOperators(A)
+    ksp.setType("cg")
+    ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+    ksp.setTolerances(rtol=LEFT, atol=0.0, max_it=STEPS)
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(_Preconditioner(stiffened))
+    (x, b), found = A.createVecs(), np.empty_like(C)
+    for k, column in enumerate(C.T):
+        b.array_w[:] = column
+        ksp.solve(b, x)
+        found[:, k] = x.array_r
+    for part in (x, b, ksp):
+        part.destroy()
+    return found

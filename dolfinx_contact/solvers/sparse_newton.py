@@ -103,7 +103,7 @@ class BoundSparseNewton:
         """Steps with the same maps until the search ends or one gets short."""
         descent.begin(maps)
         while True:
-            if descent.held(x):
+            if search.step.held(x):
                 x, _ = search.residual(x, maps)
                 if not search.goes_on:
                     return x
@@ -128,16 +128,6 @@ class _Descent:
         """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
         self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
 
-    def held(self, x: np.ndarray) -> bool:
-        """Whether ``x`` has the boundary values.  Collective."""
-        return self._body.largest(np.abs(self._missing(x))) == 0.0
-
-    def _missing(self, x: np.ndarray) -> np.ndarray:
-        """What is missing to the boundary values, zero elsewhere."""
-        fixed, missing = self._body.fixed, np.zeros_like(x)
-        missing[fixed] = self._step.b[fixed] - x[fixed]
-        return missing
-
     def advance(self, x: np.ndarray, chord: bool) -> tuple[np.ndarray, float]:
         """The next iterate, and the part of the step that leads to it: 0 if none helps.
 
@@ -153,8 +143,8 @@ class _Descent:
             maps = self._closing(x) if self._free else self._maps
             self._tangent.linearise(step.derivatives(x, maps))
         left, carried = step.free(step.out_of_balance(x, self._maps)), np.zeros_like(x)
-        missing = self._missing(x)
-        if not self.held(x):
+        missing = step.missing(x)
+        if not step.held(x):
             carried = self._tangent.multiply(missing, self._body.carried(missing))
         dx = self._tangent.solve(left - carried)
         dx[self._body.fixed] = missing[self._body.fixed]

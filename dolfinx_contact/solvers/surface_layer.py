@@ -9,6 +9,7 @@ from scipy import sparse
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.driven import driven_planes
+from dolfinx_contact.contact.interface import assembled
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
@@ -65,10 +66,7 @@ class SurfaceLayer:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
         points = [contact.points for contact in self._contacts]
-        # B^T R_r B and B^T R_u B on owned degrees of freedom
-        self._by_forces, self._by_motion = (
-            sum(of.matrix(part) for of, part in zip(points, parts)) for parts in zip(*derivatives)
-        )
+        self._by_forces, self._by_motion = assembled(points, derivatives, self._body.size)
         if self._planes is not None:
             self._pushed = self._by_motion @ self._pushing
             self._resisting = self._planes.tangent(derivatives)

@@ -120,6 +120,11 @@ def run(parameters: Parameters, divisions: int, factor: int, shown=(), comm=None
     return Found(punch, records, maps, dissipation)
 
 
+def column(records: list, name: str, every: int) -> np.ndarray:
+    """A value of every so many records, the last one among them."""
+    return np.array([record[name] for record in records[every - 1 :: every]])
+
+
 def difference(one: Found, other: Found) -> tuple[float, float]:
     """Relative differences of the work of friction, and of total normal and tangential forces at the steps of both.
 
@@ -129,16 +134,6 @@ def difference(one: Found, other: Found) -> tuple[float, float]:
     steps = min(len(one.records), len(other.records))
     forces = 0.0
     for name in ("normal_reaction", "tangential_reaction_sum"):
-        a, b = (
-            np.array(
-                [
-                    record[name]
-                    for record in of.records[
-                        len(of.records) // steps - 1 :: len(of.records) // steps
-                    ]
-                ]
-            )
-            for of in (one, other)
-        )
+        a, b = (column(of.records, name, len(of.records) // steps) for of in (one, other))
         forces = max(forces, float(np.abs(a - b).max() / np.abs(a).max()))
     return work, forces
