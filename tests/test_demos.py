@@ -28,8 +28,6 @@ def test_notebooks_are_found():
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_demo(name, capsys):
     """The demo's own assertions hold; rank 0 prints a result, the others nothing."""
-    if name == "demo_dead_weight" and MPI.COMM_WORLD.size > 1:
-        pytest.skip("a known defect: on several ranks a step of it is sometimes not solved")
     importlib.import_module(name).main()
     printed = capsys.readouterr().out
     assert bool(printed) == (MPI.COMM_WORLD.rank == 0)

@@ -334,10 +334,13 @@ def test_planes_that_are_driven_differently_on_ranks_are_refused():
         scene.push(0, 0, E * 1e-3 * (1 + COMM.rank))
 
 
-def test_a_plane_beyond_the_body_comes_to_it():
-    """A dead weight that starts far from the body presses it all the same."""
-    scene = free_block(("n",), mu=0.3, p=None, nu=0.0)
-    for far in (-3.0, 0.02):
+@pytest.mark.parametrize("free", [("n",), ("t1", "n")])
+@pytest.mark.parametrize("solver", [dc.CondensedNewton(), dc.FixedPoint()])
+def test_a_plane_beyond_the_body_comes_to_it(solver, free):
+    """A dead weight that starts far from the body, or just touches it, presses it all the same."""
+    scene = free_block(free, mu=0.3, p=None, nu=0.0, solver=solver)
+    for far in (-3.0, -1e-18, 0.0, 0.02):
+        scene.problem.reset()
         scene.plane.displacement = (0, 0, far)
         scene.push(0, 0, E * 1e-3)
         assert scene.force()[2] == pytest.approx(E * 1e-3, rel=1e-9)

@@ -9,6 +9,7 @@ its plane by ``B u - D c``, local components, and planes are in equilibrium wher
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.plane_balance import PlaneBalance
@@ -87,6 +88,23 @@ class DrivenPlanes:
         self.moved = moved
         for plane, home, part in zip(self._planes, self._home, self._parts):
             plane.displacement = home + moved[part] @ plane.free_axes
+
+    def touch(self, x: np.ndarray) -> None:
+        """Move planes that no node touches at a displacement to where one node alone would carry the force.  Collective.
+
+        From further away nothing tells how the forces on the plane change with its motion.
+        """
+        driving = self.driving()
+        for motion in self.normal_motions:
+            ways = [np.full((2, 1), np.inf)]  # to the first node; to where it carries the force
+            for contact, axes in zip(self._contacts, self.axes):
+                contact.move(x)
+                gap = np.array([contact.gap, contact.gap + driving[motion] / contact.rho])
+                ways.append(gap[:, axes[:, -1, motion] > 0])
+            first, far = np.concatenate(ways, axis=1).min(axis=1)
+            first, far = (self._body.comm.allreduce(float(way), op=MPI.MIN) for way in (first, far))
+            if driving[motion] > 0.0 <= first < np.inf:
+                self.move_to(self.moved + far * np.eye(self.count)[motion])
 
     def at_rest(self, softest: float = 0.0) -> np.ndarray:
         """The motions at which springs hold the planes without reactions.

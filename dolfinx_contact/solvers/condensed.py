@@ -102,7 +102,7 @@ class CondensedBody:
         held, first = self._held_by.solve, self.dim * self.nodes
         free = held(step.b) if self._anchored else self._body.free_state(step.b)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
-        self._planes.begin(step)
+        self._planes.begin(step, free)
         q = self._motion(step, free)
         starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it

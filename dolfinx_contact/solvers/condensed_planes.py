@@ -55,12 +55,17 @@ class CondensedPlanes:
         bordered[size:, size:] = -np.diag(self._springs[loose])
         return bordered
 
-    def begin(self, step) -> None:
-        """Planes begin where they were; where springs are not stretched if these are eliminated."""
+    def begin(self, step, free: np.ndarray) -> None:
+        """Planes begin where they were; where springs are not stretched if these are eliminated; all near the body.
+
+        Args:
+            free: Displacement of owned degrees of freedom without reactions.
+        """
         if step.planes is not None:
             step.planes.move_to(np.zeros(step.planes.count))
-            self._at_first = step.planes.at_rest(self._stiffest)
-            step.planes.move_to(self._at_first)
+            step.planes.move_to(step.planes.at_rest(self._stiffest))
+            step.planes.touch(free)
+            self._at_first = step.planes.moved
 
     def move(self, step, force: np.ndarray) -> None:
         """Move the planes where forces of all rows have them, the tied rows' last."""

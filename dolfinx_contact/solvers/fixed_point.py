@@ -22,8 +22,9 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
 # and easy steps are nearly over. Where that does not converge it is tried SOONER: the second number. If the error
-# then grows by more than GROWTH, it was too early.
-EVERY, SOONER, GROWTH = 20, 10, 100.0
+# then grows by more than GROWTH, it was too early; if it is still more than USELESS of what it was when the next one is due,
+# the iterations until then do without.
+EVERY, SOONER, GROWTH, USELESS = 20, 10, 100.0, 0.9
 
 # Corrections that grow by this mislead.
 ASTRAY = 1e3
@@ -39,7 +40,7 @@ class FixedPoint:
     stiffness plus springs at the contact nodes.  The zero of the residual
     does not depend on the augmentation parameter rho.  Anderson's method accelerates the sequence.  Every twenty
     iterations the contact is linearised, and the layers next to the plane are then corrected with that
-    tangent before the back-solve, see ``SurfaceLayer``.
+    tangent before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
 
     If the error does not fall any more, Newton's method on the same residual is tried, see ``search_by_newton``: an
     iteration is then one of GMRES with the same correction.  If that fails, too, the fixed point goes on with another rho.
@@ -152,6 +153,13 @@ class BoundFixedPoint:
         self.preconditioner.forget_tangent()
         return maps
 
+    def _set_tangent(self, derivatives) -> None:
+        """Correct with the contact linearised, see ``LoadStep.derivatives``; None is without."""
+        if derivatives is None:
+            self.preconditioner.forget_tangent()
+        else:
+            self.preconditioner.linearise(derivatives)
+
     def _accelerate(self, search, maps, x: np.ndarray, every: int) -> None:
         """Anderson's method from ``x``, until the search ends or a tangent misleads."""
         step, tangent = search.step, np.inf  # error at the last tangent
@@ -163,12 +171,14 @@ class BoundFixedPoint:
             if not search.goes_on or search.error > GROWTH * tangent:
                 return
             if search.left <= due:
+                due = search.left - every
+                useless = search.error > USELESS * tangent
                 # not where the end is as near as the last tangent is behind
-                if tangent == np.inf or search.error**2 > step.tol * tangent:
-                    self.preconditioner.linearise(step.derivatives(x, maps))
+                if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
+                    self._set_tangent(None if useless else step.derivatives(x, maps))
                     anderson.restart()
                     smallest = np.inf
-                tangent, due = search.error, search.left - every
+                tangent = np.inf if useless else search.error
             following, norm = anderson.step(x, self.preconditioner.correct(residual))
             search.count(1)
             if norm > ASTRAY * smallest:  # the differences mislead: start again from the best

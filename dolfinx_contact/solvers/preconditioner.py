@@ -35,11 +35,8 @@ class ContactPreconditioner:
         with stage("contact: set-up of springs"):
             S, A = self._springs(), body.K.copy()
             A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            modes = [body.rigid_modes()]
-            if body.exact:  # else the motions of contacts are found when they are needed
-                modes.append(patch_motions(body, contacts))
-            self.rigid = RigidBalance(body, contacts, A, np.concatenate(modes, axis=1))
-            self._patched = body.exact
+            self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
+            self._softened = False
             self.stiffened = body.stiffened(A, S)
         self._A = A
         planes = driven_planes(body, contacts)
@@ -48,9 +45,9 @@ class ContactPreconditioner:
 
     def soften(self) -> bool:
         """Look for more soft motions, of a step that does not converge; whether there are any new ones.  Collective."""
-        if self._patched:
+        if self._softened:
             return False
-        self._patched, known = True, len(self.rigid)
+        self._softened, known = True, len(self.rigid)
         modes = (self._body.rigid_modes(), patch_motions(self._body, self._contacts))
         rigid = RigidBalance(self._body, self._contacts, self._A, np.concatenate(modes, axis=1))
         self.rigid = rigid if len(rigid) > known else self.rigid

@@ -68,9 +68,9 @@ class Square {
 
     /// |A| |x|: the size of what is added up in a product.
     VectorXd magnitudes(const VectorXd &x) const {
-        const VectorXd size_of_x = x.cwiseAbs();
         if (x.isZero(0.0))
-            return size_of_x;
+            return VectorXd::Zero(size());
+        const VectorXd size_of_x = x.cwiseAbs();
         if (sparse_ != nullptr)
             return sparse_->cwiseAbs() * size_of_x;
         VectorXd y = VectorXd::Zero(size());
