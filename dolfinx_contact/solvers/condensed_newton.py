@@ -202,7 +202,7 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     most = min(
         solver.max_iterations, 100 * solver.newton_iterations
     )  # no second search of all methods
-    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "max_iterations": most})
+    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "fallbacks": False})
     for factor in (1e-2, 1e-4):
         if found.change <= tol or found.error <= found.rounding:
             break

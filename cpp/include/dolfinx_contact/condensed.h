@@ -46,6 +46,9 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
+        if (InteriorPoint<T>::applies(scaling_.make()) &&
+            attempt("interior point", [this] { this->interior(); }))
+            return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
             for (int k = 0; k < count && !best_.converged && !budget_.spent(); ++k)

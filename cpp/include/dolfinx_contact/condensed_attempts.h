@@ -4,6 +4,7 @@
 /// The methods of the cascade, each ended by the judge, and the best state that they found.
 #pragma once
 
+#include "condensed_interior.h"
 #include "condensed_judge.h"
 #include "condensed_plane.h"
 #include "condensed_proximal.h"
@@ -78,6 +79,12 @@ template <int T, int P> class Attempts {
     void newton(VectorXd r) {
         System<T> system = scaling_.make();
         finish(system, r);
+    }
+
+    /// Newton's method from the end of the interior point method.
+    void interior() {
+        const System<T> system = scaling_.make();
+        newton(InteriorPoint<T>(system).run(budget_));
     }
 
     /// Newton's method from where sweeps come to from r, and the proximal point method from there.
