@@ -35,8 +35,12 @@ def frame(normal):
     return np.array([t1, np.cross(normal, t1), normal])
 
 
-def assemble(masses, inertias, contacts, positions, velocity):
-    """W, sparse, and q of contacts (body, other body or -1, point, normal towards the first)."""
+def assemble(masses, inertias, contacts, positions, velocity, uneven=0.0, rng=None):
+    """W, sparse, and q of contacts (body, other body or -1, point, normal towards the first).
+
+    With ``uneven`` reactions act on bodies by entries of ``H`` that are off by up to so much of them: W is not
+    symmetric, as from programs that measure the arms of forces and of motion differently.
+    """
     H = np.zeros((len(contacts), 3, len(masses), 6))
     for row, (*pair, point, normal) in zip(H, contacts):
         R = frame(normal)
@@ -48,7 +52,10 @@ def assemble(masses, inertias, contacts, positions, velocity):
     inverse = np.column_stack([np.repeat(1 / masses[:, None], 3, 1), 1 / inertias]).ravel()
     free = velocity.copy()
     free[:, :3] += STEP * GRAVITY
-    return (H @ sp.diags(inverse) @ H.T).tocsr(), (H @ free.ravel()).reshape(-1, 3)
+    acting = H.copy()
+    if uneven > 0:
+        acting.data *= 1 + uneven * rng.uniform(-1, 1, size=acting.nnz)
+    return (H @ sp.diags(inverse) @ acting.T).tocsr(), (H @ free.ravel()).reshape(-1, 3)
 
 
 def tower(rng, n):
@@ -126,8 +133,8 @@ def rocks(rng, n):
 KINDS = dict(tower=tower, wall=wall, spheres=spheres, capsules=capsules, rocks=rocks)
 
 
-def problem(kind, n, seed, mu=None, spread=1.0, motion=0.1):
-    """A problem of about ``n`` bodies; masses over ``spread`` powers of ten, velocities of ``motion``."""
+def problem(kind, n, seed, mu=None, spread=1.0, motion=0.1, uneven=0.0):
+    """A problem of about ``n`` bodies; masses over ``spread`` powers of ten, velocities of ``motion``; see ``assemble``."""
     rng = np.random.default_rng([seed, n, sorted(KINDS).index(kind)])
     positions, contacts = KINDS[kind](rng, n)
     count = len(positions)
@@ -136,16 +143,18 @@ def problem(kind, n, seed, mu=None, spread=1.0, motion=0.1):
         0.1, 0.3, size=(count, 3)
     )  # of bodies about one in size
     velocity = motion * rng.normal(size=(count, 6))
-    W, q = assemble(masses, inertias, contacts, positions, velocity)
+    W, q = assemble(masses, inertias, contacts, positions, velocity, uneven, rng)
     mu = float(rng.choice([0.3, 0.5, 0.7, 1.0])) if mu is None else mu
     return SimpleNamespace(W=W, q=q, mu=mu, kind=kind, bodies=count, seed=seed)
 
 
 def scenes(largest):
-    """The family: every kind, sizes to ``largest`` contacts, at rest and moving, masses alike or not."""
-    motions = (0.0, 0.0), (0.1, 0.5), (1.0, 2.0)
-    for kind, n, seed in product(KINDS, (1, 2, 4, 8, 16, 32, 64, 128, 250), range(3)):
-        scene = problem(kind, n, seed, motion=motions[seed][0], spread=motions[seed][1])
+    """The family: every kind, sizes to ``largest`` contacts, at rest and moving, masses alike or not, W symmetric or not."""
+    motions = (0.0, 0.0, 0.0), (0.1, 0.5, 0.0), (1.0, 2.0, 0.0), (0.1, 0.5, 3e-3)
+    sizes = (1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 142, 250)
+    for kind, n, seed in product(KINDS, sizes, range(len(motions))):
+        motion, spread, uneven = motions[seed]
+        scene = problem(kind, n, seed, motion=motion, spread=spread, uneven=uneven)
         if len(scene.q) <= largest:
             yield scene
 
@@ -153,11 +162,14 @@ def scenes(largest):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--smallest", type=int, default=1)
     parser.add_argument("--largest", type=int, default=1000)
     options = parser.parse_args()
     warnings.simplefilter("ignore", dc.RoundingWarning)
     failed = 0
     for s in scenes(options.largest):
+        if len(s.q) < options.smallest:
+            continue
         start = time.perf_counter()
         try:
             found = dc.solve_condensed(s.W, s.q, dc.Friction(s.mu), max_seconds=options.seconds)

@@ -34,6 +34,35 @@ def test_piles_and_towers(kind):
             check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=20)
 
 
+LARGE = [  # more than 150 contacts; all were refused, or took 5 to 50 s, before there was the interior point method
+    ("tower", 142, 1.0, 2.0, 0.0), ("tower", 142, 0.1, 0.5, 3e-3), ("capsules", 48, 0.1, 0.5, 3e-3),
+    ("capsules", 48, 1.0, 2.0, 0.0), ("spheres", 64, 0.1, 0.5, 0.0), ("rocks", 32, 1.0, 2.0, 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind,n,motion,spread,uneven", LARGE)
+def test_piles_of_hundreds(kind, n, motion, spread, uneven):
+    """Up to 568 contacts, W of rank well below 3n, symmetric or not: solved, mu 0.3 to 1."""
+    for mu in (0.3, 0.7, 1.0):
+        scene = problem(kind, n, 100, mu, spread, motion, uneven)
+        check(scene.W, scene.q, Friction(mu), mu, max_seconds=100)
+
+
+@pytest.mark.parametrize("kind", ["wall", "rocks", "capsules"])
+def test_the_interior_point_method_is_a_start(kind):
+    """Moving piles of some fifty contacts and rank-deficient W, none of which one attempt of Newton's
+    method solves: solved, some of them by the interior point method."""
+    branches = []
+    for seed in range(100, 112):
+        scene = problem(
+            kind, 8 if kind != "capsules" else 16, seed, motion=1.0, spread=1.0, uneven=3e-3
+        )
+        found = check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=20)
+        branches += [attempt.branch for attempt in found.tried if attempt.converged]
+    assert "interior point" in branches
+
+
 def test_sparse_and_dense_storage():
     """A W of many zeros gives the same contact forces' sum and velocities whether its zeros are used
     or hidden by entries too small to matter."""

@@ -14,7 +14,9 @@ from dolfinx_contact.solvers.fixed_point import FixedPoint
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.solvers.sparse_newton import SparseNewton
 
-CROSSOVER = 400  # contact nodes, see docs/solvers.md
+# The most contact nodes for which the condensed solver is tried first, see docs/solvers.md
+CROSSOVER = 600
+WITHOUT_FRICTION = 800
 
 
 class Automatic:
@@ -53,9 +55,10 @@ class BoundAutomatic:
         self._components = components(contacts)
         enough = fits(body.comm, nodes, self._components, body.K.getSize()[0])
         self._solvers = [CondensedNewton(), FixedPoint()]
-        self._why = f"{nodes} contact nodes, at most {CROSSOVER}"
-        if nodes > CROSSOVER:
-            self._why = f"{nodes} contact nodes, more than {CROSSOVER}"
+        most = WITHOUT_FRICTION if self._components == 1 else CROSSOVER
+        self._why = f"{nodes} contact nodes, at most {most}"
+        if nodes > most:
+            self._why = f"{nodes} contact nodes, more than {most}"
             self._solvers.reverse()
         elif body.ksp.getPC().getType() not in ("lu", "cholesky"):
             self._why = "without a factorisation the condensed operator would cost too many solves"

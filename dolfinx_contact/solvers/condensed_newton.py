@@ -197,12 +197,13 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
     """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
 
-    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off.
+    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off.  Large problems are
+    not searched by all methods again: where W is rank deficient reactions stay open anyway.
     """
-    most = min(
-        solver.max_iterations, 100 * solver.newton_iterations
-    )  # no second search of all methods
-    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "fallbacks": False})
+    cheap = solver.fallbacks and q.size <= 100
+    most = min(solver.max_iterations, 100 * solver.newton_iterations)
+    options = {"slip_tol": None, "max_iterations": most, "fallbacks": cheap}
+    finer = CondensedNewton(**vars(solver) | options)
     for factor in (1e-2, 1e-4):
         if found.change <= tol or found.error <= found.rounding:
             break

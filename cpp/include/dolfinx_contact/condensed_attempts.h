@@ -81,10 +81,14 @@ template <int T, int P> class Attempts {
         finish(system, r);
     }
 
-    /// Newton's method from the end of the interior point method.
+    /// Newton's method from the end of the interior point method, and the proximal point method
+    /// from there.
     void interior() {
         const System<T> system = scaling_.make();
-        newton(InteriorPoint<T>(system).run(budget_));
+        const VectorXd r = InteriorPoint<T>(system).run(budget_);
+        newton(r);
+        if (!best_.converged)
+            proximal_from(r);
     }
 
     /// Newton's method from where sweeps come to from r, and the proximal point method from there.

@@ -19,7 +19,8 @@ template <int T> class InteriorPoint {
     using Node = Eigen::Matrix<double, D, 1>;
     using Block = Eigen::Matrix<double, D, D>;
 
-    explicit InteriorPoint(const System<T> &system) : system_(system) {}
+    explicit InteriorPoint(const System<T> &system)
+        : system_(system), dense_(system.pattern == nullptr) {}
 
     /// Whether there are no tied rows and no contacts without friction beside others with it.
     static bool applies(const System<T> &system) {
@@ -171,7 +172,7 @@ template <int T> class InteriorPoint {
         std::vector<Block> diagonal(n);
         for (std::size_t k = 0; k < n; ++k)
             diagonal[k] = E_[k] * P_[k] * P_[k];
-        if (system_.pattern == nullptr) {
+        if (dense_) {
             MatrixXd J =
                 system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();
             for (Index i = 0; i < system_.nodes; ++i)
@@ -193,12 +194,15 @@ template <int T> class InteriorPoint {
         }
         Eigen::SparseMatrix<double> J(system_.size(), system_.size());
         J.setFromTriplets(entries.begin(), entries.end());
-        return linear_.solve(J, rhs, dr);
+        const bool solved = linear_.solve(J, rhs, dr);
+        dense_ = linear_.filled();
+        return solved;
     }
 
     const System<T> &system_;
     VectorXd r_, y_, rest_;
     std::vector<Block> P_, inverse_, E_;
     LinearSolver linear_;
+    bool dense_; // factors would be
 };
 } // namespace dolfinx_contact::condensed

@@ -42,6 +42,13 @@ class LinearSolver {
         return y.allFinite();
     }
 
+    /// Whether sparse factors have so many entries that dense ones are sooner made.
+    bool filled() const {
+        constexpr Index few = 4; // one of so many entries of dense factors
+        const auto n = sparse_.rows();
+        return kind_ == Kind::sparse && few * (sparse_.nnzL() + sparse_.nnzU()) > n * n;
+    }
+
     /// Whether there are factors in single precision, which many unknowns have.
     bool in_single() const { return kind_ == Kind::in_single && single_.rows() > 0; }
 
