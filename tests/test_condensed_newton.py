@@ -60,13 +60,13 @@ def outcomes(scenes, **options):
 
 
 def test_random_problems_of_every_rank():
-    """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: all are solved, a third by paths from easier problems.
+    """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: all are solved, a fifth by other methods than Newton's.
 
     A solution exists in all of them; the worst have more contacts than degrees of freedom, mu above 5
     and a slip rule at right angles to friction.
     """
     branches = Counter(check(random_problem(seed)).branch for seed in range(150))
-    assert branches["continuation"] > 25
+    assert branches["interior point"] > 20 and branches["continuation"] > 2
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def test_piles_and_towers(kind):
             check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=20)
 
 
-LARGE = [  # more than 150 contacts; all were refused, or took 5 to 50 s, before there was the interior point method
+LARGE = [  # more than 150 contacts
     ("tower", 142, 1.0, 2.0, 0.0), ("tower", 142, 0.1, 0.5, 3e-3), ("capsules", 48, 0.1, 0.5, 3e-3),
     ("capsules", 48, 1.0, 2.0, 0.0), ("spheres", 64, 0.1, 0.5, 0.0), ("rocks", 32, 1.0, 2.0, 0.0),
 ]  # fmt: skip
@@ -43,8 +43,8 @@ LARGE = [  # more than 150 contacts; all were refused, or took 5 to 50 s, before
 @pytest.mark.slow
 @pytest.mark.parametrize("kind,n,motion,spread,uneven", LARGE)
 def test_piles_of_hundreds(kind, n, motion, spread, uneven):
-    """Up to 568 contacts, W of rank well below 3n, symmetric or not: solved, mu 0.3 to 1."""
-    for mu in (0.3, 0.7, 1.0):
+    """Up to 568 contacts, W of rank well below 3n, symmetric or not: solved, mu 0.3 and 0.7."""
+    for mu in (0.3, 0.7):
         scene = problem(kind, n, 100, mu, spread, motion, uneven)
         check(scene.W, scene.q, Friction(mu), mu, max_seconds=100)
 
