@@ -26,6 +26,8 @@ except ImportError as error:
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
     from dolfinx_contact.checks import RoundingWarning as RoundingWarning
     from dolfinx_contact.contact.contact import Contact as Contact
+    from dolfinx_contact.contact.curved import RigidCylinder as RigidCylinder
+    from dolfinx_contact.contact.curved import RigidSphere as RigidSphere
     from dolfinx_contact.contact.history import Status as Status
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
     from dolfinx_contact.increments import advance as advance
@@ -63,7 +65,9 @@ _HOME = {  # the module of every name
     "History": "results.history",
     "LinearSolverError": "petsc.linear_solver",
     "NotConverged": "results.record",
+    "RigidCylinder": "contact.curved",
     "RigidPlane": "contact.plane",
+    "RigidSphere": "contact.curved",
     "RoundingWarning": "checks",
     "SparseNewton": "solvers.sparse_newton",
     "Status": "contact.history",

@@ -28,6 +28,7 @@ from dolfinx_contact.problem_input import (
     checked_conditions,
     checked_contacts,
     checked_options,
+    follow,
     hold,
 )
 from dolfinx_contact.problem_states import ProblemStates
@@ -119,6 +120,7 @@ class ContactProblem(ProblemStates):
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual)
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
+        self._points = [contact.points for contact in self.contacts]
         self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
@@ -200,9 +202,10 @@ class ContactProblem(ProblemStates):
         """
         body = self.body
         assembled = body.refresh(self._states[0])
-        if assembled != self._assembled:
+        turned = follow(self.contacts, body, self._states[0], self._points)
+        if turned or assembled != self._assembled:
             self._assembled = assembled
-            if not body.nonlinear:  # else its stiffness is new in every iteration
+            if turned or not body.nonlinear:  # else its stiffness is new in every iteration
                 self._unbind()
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         b, external = body.load()

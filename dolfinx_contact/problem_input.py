@@ -154,12 +154,32 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple[np.ndarray, n
     return (left[:, :-1] < 0.5) | closed[:, None], closed
 
 
+def follow(contacts, body, u: np.ndarray, known: list) -> bool:
+    """Let frames and gaps of contacts follow their nodes and surfaces; whether frames changed.  Collective.
+
+    Args:
+        contacts: The contacts.
+        body: The body.
+        u: Last converged displacement, owned degrees of freedom.
+        known: ``ContactPoints`` for which everything is set up, renewed here.
+    """
+    with raised_together(body.comm):
+        for contact in contacts:
+            if contact.follows:
+                contact.follow(u)
+    changed = [c for c, points in zip(contacts, known) if c.points is not points]
+    known[:] = [contact.points for contact in contacts]
+    if changed:
+        hold(changed, body)
+    return bool(changed)
+
+
 def check_planes(contacts, body) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
         plane, gdim = contact.plane, contact.points.dim
         x = body.V.tabulate_dof_coordinates()[:, :gdim]
-        height = (x - plane.point - plane.displacement) @ plane.normal
+        height = plane.distance(plane.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.gap)
         if highest < DEEP * deepest:

@@ -20,7 +20,7 @@ class Kept(NamedTuple):
 
     states: list  # the last displacement and the one before
     contacts: list  # histories
-    planes: list  # displacements
+    planes: list  # displacements and rotations
     known: Any  # the body's free state
     past: tuple  # steps of the condensed solver
     variables: list  # values of internal variables
@@ -49,7 +49,7 @@ class ProblemStates(ProblemOptions):
         self._states, self.body.known = kept.states, kept.known
         for contact, history, where in zip(self.contacts, kept.contacts, kept.planes):
             contact.go_back(history)
-            contact.plane.displacement = where
+            contact.plane.displacement, contact.plane.rotation = where
         self._remember(kept.past)
         self._variables.go_back(kept.variables)
         self._restore()
@@ -61,7 +61,7 @@ class ProblemStates(ProblemOptions):
         self._kept = Kept(
             self._states,
             [contact.history() for contact in self.contacts],
-            [contact.plane.displacement for contact in self.contacts],
+            [(contact.plane.displacement, contact.plane.rotation) for contact in self.contacts],
             self.body.known,
             tuple(self._memory.get("past", ())),
             self._variables.last,

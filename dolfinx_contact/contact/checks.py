@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact import compat
-from dolfinx_contact.contact.plane import RigidPlane
+from dolfinx_contact.contact.surface import RigidSurface
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
 
@@ -60,8 +60,10 @@ def checked_facets(facets, index_map, boundary) -> np.ndarray:
 
 def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
     """``directed``: directions of friction are given in space."""
-    if not isinstance(plane, RigidPlane):
-        raise ValueError(f"plane must be a RigidPlane, got {type(plane).__name__}: {plane!r}.")
+    if not isinstance(plane, RigidSurface):
+        raise ValueError(
+            f"plane must be a RigidPlane or another rigid surface, got {type(plane).__name__}: {plane!r}."
+        )
     if not isinstance(friction, Friction):
         raise ValueError(
             f"friction must be a Friction, got {type(friction).__name__}: {friction!r}."
@@ -73,8 +75,8 @@ def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
     friction.law(gdim)  # refuses what has no meaning in two dimensions
     if gdim == 3 and plane.axis is None and not friction.isotropic and not directed:
         raise ValueError(
-            f"plane.axis is None, but {friction} depends on the direction: give RigidPlane the first "
-            "principal friction direction, axis=(...)."
+            f"plane.axis is None, but {friction} depends on the direction: give {type(plane).__name__} the "
+            "first principal friction direction, axis=(...)."
         )
 
 

@@ -1,4 +1,4 @@
-"""The contact of boundary nodes with a rigid plane: kinematics, reactions and their history."""
+"""The contact of boundary nodes with a rigid surface: reactions and their history."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from dolfinx_contact.contact.checks import (
     checked_facets,
 )
 from dolfinx_contact.contact.fields import contact_nodes
-from dolfinx_contact.contact.history import State, Status
-from dolfinx_contact.contact.interface import ContactPoints, add_to
-from dolfinx_contact.contact.plane import RigidPlane
-from dolfinx_contact.contact.results import ContactResults
-from dolfinx_contact.error import EPSILON, NodalStiffness
+from dolfinx_contact.contact.history import Status
+from dolfinx_contact.contact.interface import add_to
+from dolfinx_contact.contact.kinematics import ContactKinematics
+from dolfinx_contact.contact.surface import RigidSurface
+from dolfinx_contact.error import NodalStiffness
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
@@ -36,17 +36,17 @@ from dolfinx_contact.law.wear import Wear
 CLEAR = 1e-9
 
 
-class Contact(ContactResults):
-    """Nodes of boundary facets that may touch a rigid plane.
+class Contact(ContactKinematics):
+    """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
 
     Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The
     local frame is (t1, t2, n), in two dimensions (t, n): the plane's axis, the direction across
-    it, and the normal.
+    it, and the normal.  On a curved surface every node has its own, see docs/surfaces.md.
 
     Args:
         V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2.
         facets: Local indices of boundary facets, integers; a rank may have none.
-        plane: The rigid plane.
+        plane: The ``RigidPlane``, ``RigidSphere`` or ``RigidCylinder``.
         friction: The friction law, the same on all ranks; or on all of them one with coefficients
             per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
@@ -60,7 +60,6 @@ class Contact(ContactResults):
             vertices of tetrahedra of second order, on which an even pressure makes no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
-        points: The ``ContactPoints``: motion as a sparse operator, directions that supports hold.
         friction, wear: The laws; another one may be assigned between steps, on all ranks.
     """
 
@@ -71,7 +70,7 @@ class Contact(ContactResults):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: RigidPlane, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: RigidSurface, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
@@ -84,9 +83,11 @@ class Contact(ContactResults):
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             check_law(plane, friction, gdim)
             check_wear(wear)
-        self.V, self.comm, self.plane, self.frame = V, mesh.comm, plane, frozen(plane.frame)
+        self.V, self.comm, self.plane = V, mesh.comm, plane
         self.nodes = frozen(contact_nodes(V, facets))
         self.x = frozen(V.tabulate_dof_coordinates()[self.nodes])
+        with raised_together(mesh.comm):
+            self.place()
         self.friction, self.wear, self.rho = friction, wear, None
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
         described = mesh.comm.bcast(self.described(), root=0)
@@ -96,31 +97,12 @@ class Contact(ContactResults):
                 raise ValueError("facets is empty on all ranks: name the facets that may touch.")
         self.facets, self._geometry, self._owner = frozen(facets), self._digest(), None
         self._apart = CLEAR * np.abs(mesh.geometry.x).max(initial=0.0)
-        self._flat = (self.x[:, :gdim] - plane.point) @ plane.normal
-        dofs = gdim * self.nodes[:, None] + np.arange(gdim)
-        frames = np.tile(self.frame, (self.nodes.size, 1, 1))
-        self.points = ContactPoints(dofs, frames, gdim * V.dofmap.index_map.size_local)
         self.reset()
         self._made = True
 
     def __repr__(self) -> str:
         friction = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         return f"<Contact of {self.nodes.size} nodes on this rank, {self.plane!r}, {friction}, wear={self.wear!r}>"
-
-    def reset(self) -> None:
-        """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
-        n, gdim = self.points.count, self.points.dim
-        self._settled_by = None
-        moved = self.frame @ self.plane.displacement
-        self.begin(
-            State(
-                np.tile(-moved, (n, 1)),
-                np.zeros((n, gdim)),
-                self._flat - moved[-1],
-                np.zeros((n, gdim - 1)),
-                np.full(n, Status.OPEN, dtype=np.uint8),
-            )
-        )
 
     def belong_to(self, problem) -> None:
         """From now on ``problem`` makes this contact's history."""
@@ -175,42 +157,6 @@ class Contact(ContactResults):
             springs: Stiffnesses, ``shape=(n, gdim)``, local frame, force per length.
         """
         add_to(K, self.points.matrix(springs[:, :, None] * np.eye(self.points.dim)))
-
-    def move(self, u: fem.Function | np.ndarray) -> None:
-        """Gaps and slip increments for a displacement, from the last converged step on.
-
-        Args:
-            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
-        """
-        values = u.x.array if hasattr(u, "x") else u
-        moved = self.frame @ self.plane.displacement
-        displacement = self.points.motion(values[: self.points.size]) - moved
-        gap = self._flat + self.wear_depth + displacement[:, -1]
-        slip = (displacement - self.last.displacement)[:, :-1]
-        slip[self.points.held] = 0.0
-        closed = self.points.closed
-        gap[closed] = np.maximum(gap[closed], self._apart)
-        self.take(displacement=displacement, gap=gap, slip_increment=slip)
-
-    def gap_rounding(self, u: np.ndarray) -> float:
-        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
-        lengths = (self.x, self.plane.point, self.plane.displacement, self.points.motion(u))
-        return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
-
-    def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
-
-        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
-
-        Args:
-            u: Displacement of owned degrees of freedom, for which gaps and slips were computed.
-        """
-        terms = self.points.magnitudes(u) + np.abs(self.frame) @ np.abs(self.plane.displacement)
-        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.plane.point))
-        gap = terms[:, -1] + coordinates + self.wear_depth
-        slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
-        slip[self.points.held] = 0.0
-        return EPSILON * gap, EPSILON * slip
 
     def update(self, u: fem.Function | np.ndarray, map: str = "bipotential") -> None:
         """One predictor and corrector for all nodes, with the augmentation parameter ``rho``.

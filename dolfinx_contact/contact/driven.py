@@ -225,7 +225,7 @@ class DrivenPlanes:
         if given:
             largest = self._body.largest(np.concatenate([c.friction.mu.ravel() for c in contacts]))
             known = plane.free[-1] == "n" and plane.springs[-1] == 0
-            return largest * float(_force(plane) @ plane.normal) if known else np.inf
+            return largest * float(_force(plane) @ plane.frame[-1]) if known else np.inf
         carried = [(c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c in contacts]
         return float(self._body.total([sum(carried)])[0])
 

@@ -46,13 +46,18 @@ def _coefficients(contact, name: str, given):
 def _axes(contact, given):
     if not is_field(given):
         return given
-    values, (n, gdim) = _values(contact, "axes", given), (contact.nodes.size, len(contact.frame))
+    values, (n, gdim) = _values(contact, "axes", given), (contact.nodes.size, contact.points.dim)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
-    along = values if len(values) == 2 else contact.frame[:2] @ values
+    if len(values) == 2:
+        along = values
+    elif contact.plane.curved:
+        along = np.einsum("nij,jn->in", contact.frame[:, :2], values)
+    else:
+        along = contact.frame[:2] @ values
     length, full = np.linalg.norm(along, axis=0), np.linalg.norm(values, axis=0)
     if not (length > ALONG * full).all():
         node = int(np.argmin(length - ALONG * full))

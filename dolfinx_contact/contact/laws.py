@@ -55,8 +55,8 @@ class ContactLaws(ContactHistory):
         """Plane and laws, but coefficients per node, in words: the same on all ranks."""
         driven = self.plane.driven() if self.plane.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
-        moved = repr(self.plane.displacement.tolist())
-        return {"plane": repr(self.plane), "plane.displacement": moved, "plane.free": driven, "friction": law, "wear": repr(self.wear)}  # fmt: skip
+        moved, turned = (repr(v.tolist()) for v in (self.plane.displacement, self.plane.rotation))
+        return {"plane": repr(self.plane), "plane.displacement": moved, "plane.rotation": turned, "plane.free": driven, "friction": law, "wear": repr(self.wear)}  # fmt: skip
 
     def check(self, first: dict[str, str]) -> None:
         """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""
@@ -76,7 +76,7 @@ class ContactLaws(ContactHistory):
         """Raise a ``ValueError`` if an array is missing or of another size, or another law or plane was saved."""
         super().check_saved(saved)
         for name, array in self._laws().items():
-            if name in saved and not np.allclose(saved[name], array, 1e-12, 0.0, equal_nan=True):
+            if name in saved and not _alike(saved[name], array):
                 what = {"laws": "friction", "rigid_plane": "plane or wear"}[name]
                 raise ValueError(
                     f"checkpoint: it was written with another {what}: here {self.friction}, {self.plane}, "
@@ -94,5 +94,9 @@ class ContactLaws(ContactHistory):
         rows = (self.friction.mu, self.friction.p, axes)
         laws = np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
         wear = np.nan if self.wear is None else self.wear.coefficient
-        parts = (self.plane.point, self.frame.ravel(), np.broadcast_to(wear, 2))
+        parts = (self.plane.described(), np.broadcast_to(wear, 2))
         return {"laws": laws, "rigid_plane": np.concatenate(parts)}
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    return one.shape == other.shape and np.allclose(one, other, 1e-12, 0.0, equal_nan=True)

@@ -2,39 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import finite
+from dolfinx_contact.contact.surface import RigidSurface, unit, vector
 
 
-def _vector(name: str, value, size: int | None = None) -> np.ndarray:
-    try:
-        array = np.asarray(value)
-        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
-    except ValueError:  # ragged nesting
-        real = False
-    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
-        wanted = "2 or 3" if size is None else str(size)
-        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {value!r}.")
-    return array.astype(np.float64)
-
-
-def _unit(name: str, value, size: int) -> np.ndarray:
-    vector = _vector(name, value, size)
-    largest = np.abs(vector).max()
-    if largest == 0.0:
-        raise ValueError(f"{name} must not be zero: only its direction counts, got {value!r}.")
-    vector /= largest  # first to order one, so that no square under- or overflows
-    return vector / np.linalg.norm(vector)
-
-
-class RigidPlane(Guarded):
+class RigidPlane(RigidSurface):
     """A rigid plane on which bodies press and slide, driven by displacement or by force.
 
     Along the directions in ``free`` the plane moves until its forces are in equilibrium, see docs/force.md:
@@ -47,6 +25,8 @@ class RigidPlane(Guarded):
             unit length.
         axis: First principal friction direction, ``shape=(gdim,)``; made orthogonal to the normal.
             Needed unless friction is isotropic or the body two-dimensional.
+        height: None, or a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the plane: the
+            waviness of its face, ``shape=(n,)``, length units, whose slopes are neglected.
 
     Raises:
         ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
@@ -56,6 +36,8 @@ class RigidPlane(Guarded):
         displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global
             frame, length units; zero at first, a read-only array.  Assign another one between steps: the plane
             moves, and slip is relative to it.  Along free directions a step finds it.
+        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.
+            Assigned between steps: normal and axis turn with the plane, and slip is relative to it.
         free: Directions of the frame along which a force drives the plane, a tuple of "t1", "t2" and "n", in two
             dimensions of "t" and "n"; none at first.
         force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Its components along
@@ -65,20 +47,27 @@ class RigidPlane(Guarded):
         drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
     """
 
-    _settable = ("displacement", "free", "force", "stiffness", "drive")
-    _remedy = "make a new RigidPlane and a new Contact; plane.displacement = ... moves a plane."
+    _remedy = "make a new RigidPlane and a new Contact; plane.displacement and plane.rotation move a plane."
 
-    def __init__(self, point: ArrayLike, normal: ArrayLike, axis: ArrayLike | None = None) -> None:
-        self.point = frozen(_vector("point", point))
+    def __init__(
+        self,
+        point: ArrayLike,
+        normal: ArrayLike,
+        axis: ArrayLike | None = None,
+        height: Callable[[np.ndarray], ArrayLike] | None = None,
+    ) -> None:
+        super().__init__(point)
         size = self.point.size
-        self.normal = frozen(_unit("normal", normal, size))
-        self.axis: np.ndarray | None = None
-        self._displacement = self._drive = frozen(np.zeros(size))
+        if not (height is None or callable(height)):
+            raise ValueError(f"height must be a function of positions, got {height!r}.")
+        self.height, self.varies = height, height is not None
+        self.normal = frozen(unit("normal", normal, size))
+        self._drive = frozen(np.zeros(size))
         self._free: tuple[str, ...] = ()
         self._force: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
         if axis is not None:
-            along = _unit("axis", axis, size)
+            along = unit("axis", axis, size)
             across = along - (along @ self.normal) * self.normal
             if np.linalg.norm(across) < 1e-8:  # half of the digits: the direction would be noise
                 raise ValueError(
@@ -89,14 +78,6 @@ class RigidPlane(Guarded):
             across -= (across @ self.normal) * self.normal  # once more, for a nearly parallel axis
             self.axis = frozen(across / np.linalg.norm(across))
         self._made = True
-
-    @property
-    def displacement(self) -> np.ndarray:
-        return self._displacement
-
-    @displacement.setter
-    def displacement(self, value: ArrayLike) -> None:
-        self._displacement = frozen(_vector("plane.displacement", value, self.point.size))
 
     @property
     def directions(self) -> tuple[str, ...]:
@@ -123,7 +104,7 @@ class RigidPlane(Guarded):
     @force.setter
     def force(self, value: ArrayLike | None) -> None:
         size = self.point.size
-        self._force = None if value is None else frozen(_vector("plane.force", value, size))
+        self._force = None if value is None else frozen(vector("plane.force", value, size))
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -145,7 +126,7 @@ class RigidPlane(Guarded):
 
     @drive.setter
     def drive(self, value: ArrayLike) -> None:
-        self._drive = frozen(_vector("plane.drive", value, self.point.size))
+        self._drive = frozen(vector("plane.drive", value, self.point.size))
 
     @property
     def free_axes(self) -> np.ndarray:
@@ -175,7 +156,7 @@ class RigidPlane(Guarded):
                 f"plane.free is {self._free}, but neither plane.force nor plane.stiffness drives all of them: set "
                 "plane.force."
             )
-        pressing = float(self._force @ self.normal)
+        pressing = float(self._force @ self.frame[-1])
         if self._free[-1] == "n" and self.springs[-1] == 0 and pressing <= 0:
             raise ValueError(
                 f"plane.force {self._force.tolist()} does not press the plane on the body: its component along the "
@@ -188,8 +169,12 @@ class RigidPlane(Guarded):
         """Rows (t1, t2, n) in three dimensions, (t, n) in two; global components, orthonormal.
 
         Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal.
-        In two dimensions t is the normal turned by -90 degrees.
+        In two dimensions t is the normal turned by -90 degrees.  They turn with the plane.
         """
+        return self.turned(self._frame())
+
+    def _frame(self) -> np.ndarray:
+        """The frame as long as the plane is not turned."""
         n = self.normal
         if n.size == 2:
             return np.array([[n[1], -n[0]], n])
@@ -200,8 +185,28 @@ class RigidPlane(Guarded):
             t1 /= np.linalg.norm(t1)
         return np.array([t1, np.cross(n, t1), n])
 
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """The same frame at all positions, ``shape=(gdim, gdim)``."""
+        return self._frame()
+
+    def distance(self, y: np.ndarray) -> np.ndarray:
+        """Distance to the plane, ``shape=(n,)``, less the height of its face."""
+        flat = (y - self.point) @ self.normal
+        if self.height is None or not len(y):
+            return flat
+        height = finite("the values of plane.height", self.height(y.T.copy()))
+        if height.shape not in ((), flat.shape):
+            raise ValueError(
+                f"plane.height must give one value per point, shape {flat.shape}, for y of shape {y.T.shape}, not "
+                f"{height.shape}."
+            )
+        return flat - height
+
+    def described(self) -> np.ndarray:
+        """Point and frame."""
+        return np.concatenate((self.point, self._frame().ravel()))
+
     def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()
-        return (
-            f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis})"
-        )
+        height = "" if self.height is None else ", height=..."
+        return f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis}{height})"

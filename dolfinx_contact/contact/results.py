@@ -51,6 +51,8 @@ class ContactResults(ContactLaws):
 
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
+        if self.plane.curved:
+            return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
 
     @property

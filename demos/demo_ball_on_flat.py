@@ -1,0 +1,147 @@
+# %% [markdown]
+# # A rigid ball on an elastic flat
+#
+# The other half of `demo_hertz.py`: there the body is round and the counterface flat, here a rigid sphere is pressed on
+# a block in three dimensions. `dc.RigidSphere` takes the place of `dc.RigidPlane`.
+#
+# ## Notation
+#
+# $(x, y, z)$, $z$ up, the block is below $z = 0$; $u$ displacement, $E$, $\nu$ elastic constants, $E^* = E / (1 - \nu^2)$;
+# $c$, $R$ centre and radius of the sphere, $\delta$ its way down; $a$ contact radius, $p$ pressure, $F$ force, $r = \sqrt{x^2 +
+# y^2}$. Units: mm, N, MPa.
+#
+# ## Strong form
+#
+# $$ -\operatorname{div} \sigma(u) = 0, \qquad
+#    g = |x + u - c| - R \ge 0, \quad p \ge 0, \quad g\, p = 0 \quad \text{on the top}, $$
+#
+# without friction. The gap is that to the plane which touches the sphere below each node, [docs/surfaces.md](../docs/surfaces.md).
+# The **closed form** [H. Hertz 1881; K. L. Johnson, Contact Mechanics, 1985, Section 4.2] is
+#
+# $$ a = \sqrt{R \delta}, \qquad F = \tfrac{4}{3} E^* \sqrt{R}\, \delta^{3/2}, \qquad
+#    p(r) = p_0 \sqrt{1 - r^2/a^2}, \quad p_0 = \frac{2 E^* a}{\pi R}. $$
+#
+# It takes the sphere for a paraboloid, which neglects $(a/R)^2$, here $10^{-4}$. The block ends at $L = 8 a$. There it is given the
+# displacement of a half space under a point force $F$ [J. Boussinesq 1885], as `demo_hertz.py` explains; what is left is of
+# the order $(a/L)^3$.
+#
+# ## Weak form
+#
+# $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r_i \cdot v_i . $$
+#
+# ## Code
+#
+# A quarter of the block, its cells fine at the contact. On the two planes of symmetry the normal displacement is zero:
+# supports that fix a tangential direction of contact nodes, along which `axis` and what is across it lie.
+
+# %%
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact.compat import functionspace
+
+# isort: split
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+from helpers import COMM, everywhere, hooke, picture, say
+
+E, NU = 210e3, 0.3
+E_STAR = E / (1 - NU**2)
+R, A = 10.0, 0.1  # radius of the sphere and of the contact
+SIZE = 8 * A
+DELTA = A**2 / R
+FORCE = 4 / 3 * E_STAR * np.sqrt(R) * DELTA**1.5
+P0 = 2 * E_STAR * A / (np.pi * R)
+
+
+def quarter_block(cells: int):
+    """The mesh; facets of the top within 1.5 A; facets at x = 0, y = 0, and far away."""
+    domain = mesh.create_unit_cube(COMM, cells, cells, cells, mesh.CellType.hexahedron)
+    x, n = domain.geometry.x, 2.2  # widths of cells grow like cosh
+
+    def graded(s):
+        return SIZE * np.sinh(n * s) / np.sinh(n)
+
+    x[:, :2], x[:, 2] = graded(x[:, :2]), -graded(1 - x[:, 2])
+
+    def near(y):
+        return np.isclose(y[2], 0.0) & (np.maximum(y[0], y[1]) < 1.5 * A)
+
+    def far(y):
+        return np.isclose(y[0], SIZE) | np.isclose(y[1], SIZE) | np.isclose(y[2], -SIZE)
+
+    places = (near, lambda y: np.isclose(y[0], 0.0), lambda y: np.isclose(y[1], 0.0), far)
+    return domain, *(mesh.locate_entities_boundary(domain, 2, where) for where in places)
+
+
+def far_field(x):
+    """Displacement of a half space z < 0 under a point force down at the origin, ``shape=(3, points)``."""
+    r, z = np.hypot(x[0], x[1]), -x[2]
+    rho = np.hypot(r, z)
+    rho[rho == 0] = 1.0  # inside the contact, where the value is not used
+    b = FORCE * (1 + NU) / (2 * np.pi * E * rho)
+    outwards = b * (z / rho**2 - (1 - 2 * NU) / (rho + z))
+    return np.array([outwards * x[0], outwards * x[1], -b * (2 * (1 - NU) + z**2 / rho**2)])
+
+
+def press(cells: int):
+    """Press the ball on the block; the contact."""
+    domain, top, left, front, far = quarter_block(cells)
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, NU), ufl.grad(v)) * ufl.dx
+    held, zero = fem.Function(V), fem.Constant(domain, 0.0)
+    held.interpolate(far_field)
+    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, far))]
+    for k, facets in enumerate((left, front)):
+        dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
+        bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
+    ball = dc.RigidSphere(centre=(0, 0, R), radius=R, axis=(1, 0, 0))
+    contact = dc.Contact(V, top, ball, dc.Friction(mu=0.0))
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
+    ball.displacement = (0, 0, -DELTA)
+    problem.solve()
+    return contact
+
+
+# %% [markdown]
+# ## Result
+#
+# 1. The force is that of Hertz to 1 %; a quarter of it acts on the quarter of the block.
+# 2. The radius, from the second moment of the reactions, which is $\frac{2}{5} a^2$ in closed form, is right to 1 %.
+# 3. The largest pressure is right to 1 %; the root mean square error of that of the nodes in contact is below 5 % of it,
+#    most of it in the cells at the edge.
+# 4. The reaction of every node is along the normal of the sphere there: the force along $x$ on the quarter is
+#    $\sum r_n x / R$, to $(a/R)^2$.
+
+
+# %%
+def main(cells: int = 20):
+    """Solve, print and assert what is claimed above; radius and pressure of the nodes."""
+    contact = press(cells)
+    force = contact.force()
+    x, normal, pressure = everywhere(contact.x, contact.reaction[:, 2], contact.pressure)
+    r = np.hypot(x[:, 0], x[:, 1])
+    off = -4 * force[2] / FORCE - 1
+    radius = np.sqrt(2.5 * (normal @ r**2) / normal.sum()) / A - 1
+    expected = P0 * np.sqrt(np.maximum(1 - (r / A) ** 2, 0))
+    peak = pressure.max() / P0 - 1
+    within = np.sqrt(((pressure - expected) ** 2)[r < A].mean()) / P0
+    say(f"force {-4 * force[2]:.3f} N, of Hertz {FORCE:.3f} ({100 * off:+.2f} %); radius {100 * radius:+.2f} %; "
+        f"largest pressure {100 * peak:+.2f} %, root mean square error of all {100 * within:.2f} % of it")  # fmt: skip
+    assert abs(off) < 0.01 and abs(radius) < 0.01
+    assert abs(peak) < 0.01 and within < 0.05
+    assert np.allclose(force[:2], normal @ x[:, :2] / R, rtol=1e-3)
+    return r / A, pressure / P0
+
+
+def draw(figure, r, pressure) -> None:
+    """Pressure of the nodes and of the closed form."""
+    axes, line = figure.subplots(), np.linspace(0, 1, 400)
+    axes.plot(line, np.sqrt(1 - line**2), color="black", label="Hertz")
+    axes.plot(r, pressure, "o", color="#0072b2", label="nodes")
+    axes.set(xlabel="r / a", ylabel="pressure / p0")
+    axes.legend()
+
+
+if __name__ == "__main__":
+    picture(draw, *main())

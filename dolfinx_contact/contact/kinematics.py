@@ -1,0 +1,242 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Where contact nodes stand relative to their rigid surface: frames, gaps and slips.
+
+A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose material point at ``x`` has moved by ``s``,
+in components of its frame ``F``.  On planes gaps are linear in this motion.  On other surfaces frame and gap are taken
+for the surface as it stands in the step and the node as the last step has left it, and in the step the surface is its
+tangent plane there, see docs/surfaces.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact.attributes import frozen
+from dolfinx_contact.contact.history import State, Status
+from dolfinx_contact.contact.interface import ContactPoints
+from dolfinx_contact.contact.results import ContactResults
+from dolfinx_contact.error import EPSILON
+
+
+class Placed(NamedTuple):
+    """Frames and gaps of the nodes, and what they were taken for."""
+
+    home: np.ndarray  # positions relative to the surface, (n, gdim)
+    rotation: np.ndarray  # of the surface
+    own: np.ndarray  # frames in the surface's axes: (gdim, gdim) for all, or (n, gdim, gdim)
+    frame: np.ndarray  # the same in global components
+    flat: np.ndarray  # gap less the displacement along the normal, (n,)
+    points: ContactPoints
+
+
+class ContactKinematics(ContactResults):
+    """Motion of the nodes of a ``Contact``, which has ``V``, ``nodes``, ``x`` and ``plane``."""
+
+    _placed: Any = None  # ``Placed``
+    _settled: Any = None  # the same and the last state, at the end of the last step
+
+    @property
+    def frame(self) -> np.ndarray:
+        """Rows (t1, t2, n), in 2-D (t, n), of the last step: ``shape=(gdim, gdim)``; on curved surfaces ``(n, gdim, gdim)``."""
+        return self._placed.frame
+
+    @property
+    def points(self) -> ContactPoints:
+        """The ``ContactPoints``: motion as a sparse operator, directions that supports hold."""
+        return self._placed.points
+
+    @property
+    def _at(self) -> np.ndarray:
+        return self.x[:, : self.V.mesh.geometry.dim]
+
+    # -- frames --------------------------------------------------------------------------------
+
+    def place(self, home: np.ndarray | None = None) -> None:
+        """Take frames and gaps at positions relative to the surface; None is where the undeformed body stands."""
+        plane, x = self.plane, self._at
+        if home is None:
+            home = plane.relative(x) if plane.varies else x
+        own = plane.frames(home)
+        frame, flat = plane.turned(own), plane.distance(home)
+        if home is not x:
+            flat = flat - _times(own, home - x)[:, -1]
+        before = self._placed
+        if before and not plane.curved and np.array_equal(before.rotation, plane.rotation):
+            points = before.points
+        else:
+            points = self._points_of(frame)
+        home, own, frame, flat = map(frozen, (home, own, frame, flat))
+        self._placed = Placed(home, plane.rotation, own, frame, flat, points)
+
+    def _points_of(self, frame: np.ndarray) -> ContactPoints:
+        n, gdim = self._at.shape
+        dofs = gdim * self.nodes[:, None] + np.arange(gdim)
+        frames = np.broadcast_to(frame, (n, gdim, gdim)).copy()
+        return ContactPoints(dofs, frames, gdim * self.V.dofmap.index_map.size_local)
+
+    @property
+    def follows(self) -> bool:
+        """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
+        return self.plane.varies or not np.array_equal(self.plane.rotation, self._placed.rotation)
+
+    def follow(self, u: np.ndarray) -> None:
+        """Take frames and gaps for the next step, where the surface is at present.
+
+        Directions held by supports are not known for the new frames.
+
+        Args:
+            u: Displacement of owned degrees of freedom with which nodes stand there, that of the last step.
+        """
+        (placed, last), plane = self._settled, self.plane
+        if not plane.varies:
+            self.place(placed.home)
+        else:
+            self.place(plane.relative(self._at + u[self.points.dofs]))
+        if plane.curved:
+            moved = _turned_back(placed.own, last.displacement)
+            last = last._replace(
+                displacement=frozen(_times(self._placed.own, moved)),
+                reaction=frozen(_carried(last.reaction, placed.own, self._placed.own)),
+            )
+        self._last = last
+        super().restore()
+
+    # -- motion --------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget the history: undeformed, unworn body, no reactions, the plane where it is now."""
+        self._settled_by = self._settled = None
+        if self.follows:
+            self.place()
+        n, gdim = self.points.count, self.points.dim
+        moved = np.broadcast_to(self._moved(), (n, gdim))
+        self.begin(
+            State(
+                -moved,
+                np.zeros((n, gdim)),
+                self._placed.flat - moved[:, -1],
+                np.zeros((n, gdim - 1)),
+                np.full(n, Status.OPEN, dtype=np.uint8),
+            )
+        )
+        self._settle_here()
+
+    def _moved(self) -> np.ndarray:
+        """Motion of the surface at the nodes, local frame: ``shape=(gdim,)`` if it is the same for all."""
+        motion = self.plane.motion(self._at)
+        return self.frame @ motion if motion.ndim == 1 else _times(self.frame, motion)
+
+    def move(self, u: fem.Function | np.ndarray) -> None:
+        """Gaps and slip increments for a displacement, from the last converged step on.
+
+        Args:
+            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+        """
+        values = u.x.array if hasattr(u, "x") else u
+        displacement = self.points.motion(values[: self.points.size]) - self._moved()
+        gap = self._placed.flat + self.wear_depth + displacement[:, -1]
+        slip = (displacement - self.last.displacement)[:, :-1]
+        slip[self.points.held] = 0.0
+        closed = self.points.closed
+        gap[closed] = np.maximum(gap[closed], self._apart)
+        self.take(displacement=displacement, gap=gap, slip_increment=slip)
+
+    def gap_rounding(self, u: np.ndarray) -> float:
+        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        lengths = (self.x, self.plane.point, self.plane.displacement, self.points.motion(u))
+        return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
+
+    def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
+
+        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
+
+        Args:
+            u: Displacement of owned degrees of freedom, for which gaps and slips were computed.
+        """
+        motion = np.abs(self.plane.motion(self._at))
+        felt = (
+            np.abs(self.frame) @ motion if motion.ndim == 1 else _times(np.abs(self.frame), motion)
+        )
+        terms = self.points.magnitudes(u) + felt
+        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.plane.point))
+        gap = terms[:, -1] + coordinates + self.wear_depth
+        slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
+        slip[self.points.held] = 0.0
+        return EPSILON * gap, EPSILON * slip
+
+    # -- history -------------------------------------------------------------------------------
+
+    def _settle_here(self) -> None:
+        self._settled = self._placed, self._last
+
+    def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
+        """See ``ContactHistory``."""
+        super().settle(work, path, depth)
+        self._settle_here()
+
+    def restore(self) -> None:
+        """Return to the last converged state and its frames."""
+        if self._settled is not None:
+            self._placed, self._last = self._settled
+        super().restore()
+
+    def save(self) -> dict[str, np.ndarray]:
+        """See ``ContactLaws``; with what the frames were taken for."""
+        saved, placed = super().save(), self._placed
+        if self.plane.varies:
+            saved["home"] = placed.home
+        if placed.rotation.any():
+            saved["rotation_of_plane"] = placed.rotation
+        return saved
+
+    def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
+        """See ``ContactLaws``."""
+        super().check_saved(saved)
+        if self.plane.varies and "home" not in saved:
+            raise ValueError(f"checkpoint: it was written with another plane: here {self.plane}.")
+
+    def load(self, saved: Mapping[str, np.ndarray]) -> None:
+        """See ``ContactLaws``."""
+        plane, self._settled = self.plane, None
+        plane.rotation = saved.get("rotation_of_plane", np.zeros_like(plane.rotation))
+        if self.follows:
+            self.place(np.array(saved["home"]) if plane.varies else self._placed.home)
+        super().load(saved)
+        self._settle_here()
+
+    def history(self) -> tuple:
+        """See ``ContactHistory``; with the frames."""
+        return self._placed, super().history()
+
+    def go_back(self, history: tuple) -> None:
+        """Take back what ``history`` returned."""
+        self._settled, (self._placed, rest) = None, history
+        super().go_back(rest)
+        self._settle_here()
+
+
+def _times(frame: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Components of ``vectors``, ``shape=(n, gdim)``, in one frame or a frame each."""
+    return (frame @ vectors[:, :, None])[:, :, 0]
+
+
+def _turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
+    """Vectors of these components, ``shape=(n, gdim)``, in one frame or a frame each."""
+    return (components[:, None, :] @ frame)[:, 0]
+
+
+def _carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Reactions carried along with the node to its next frame: the normal one is kept, and the length of friction."""
+    carried, tangential = reaction.copy(), reaction.copy()
+    tangential[:, -1] = 0.0
+    along = _times(after, _turned_back(before, tangential))[:, :-1]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    kept = np.linalg.norm(tangential, axis=1, keepdims=True)
+    carried[:, :-1] = np.divide(kept, length, np.zeros_like(length), where=length > 0) * along
+    return carried

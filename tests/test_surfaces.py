@@ -1,0 +1,357 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Curved, wavy and turning rigid surfaces: exact distances, rigid motions that change nothing, closed forms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scenes
+import ufl
+from dolfinx import fem, mesh
+from scipy.spatial.transform import Rotation
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
+from mechanics.material import elasticity
+
+COMM = scenes.COMM
+E = 1000.0
+
+
+def block(surface, mu=0.0, p=None, edge=1.0, cells=None, **options):
+    """A block on [-edge/2, edge/2]^(d-1) x [0, edge] whose top is held and moved, and whose foot meets a surface."""
+    d = surface.point.size
+    corners = [np.append(np.full(d - 1, -edge / 2), 0.0), np.append(np.full(d - 1, edge / 2), edge)]
+    create, kind = (
+        (mesh.create_box, mesh.CellType.hexahedron)
+        if d == 3
+        else (mesh.create_rectangle, mesh.CellType.quadrilateral)
+    )
+    domain = create(COMM, corners, cells or [2] * d, kind)
+    foot, top = (
+        mesh.locate_entities_boundary(domain, d - 1, lambda x, z=z: np.isclose(x[d - 1], z))
+        for z in (0.0, edge)
+    )
+    V = functionspace(domain, ("Lagrange", 1, (d,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    held = fem.Constant(domain, np.zeros(d))
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)
+    contact = dc.Contact(V, foot, surface, dc.Friction(mu, p))
+    F = elasticity(u, v, E, 0.0)
+    problem = dc.ContactProblem(F, u, [contact], bcs=[bc], tol=1e-10, **options)
+
+    def step(*where):
+        held.value = np.array(where, dtype=float)
+        return problem.solve()
+
+    return SimpleNamespace(contact=contact, problem=problem, step=step, u=u, V=V, surface=surface)
+
+
+def surfaces(d):
+    """Of each kind; the body's foot is near the origin."""
+    below = np.append(np.zeros(d - 1), -2.0)
+    found = [dc.RigidSphere(below, 2.0), dc.RigidSphere(-2 * below, 4.0, inside=True)]
+    if d == 3:
+        slanted = (1.0, 0.5, 0.02)
+        found += [
+            dc.RigidSphere(below, 2.0, axis=slanted),
+            dc.RigidCylinder(below, slanted, 2.0),
+            dc.RigidCylinder(-2 * below, slanted, 4.0, inside=True),
+            dc.RigidPlane((0.1, 0.2, -0.05), (0.05, 0.1, 1.0), slanted),
+        ]
+    return found
+
+
+def rotation(surface):
+    """Its matrix, by SciPy."""
+    d = surface.point.size
+    turn = surface.rotation.copy() if d == 3 else np.append([0, 0], surface.rotation)
+    return Rotation.from_rotvec(turn).as_matrix()[:d, :d]
+
+
+def distance(surface, x):
+    """Signed distances of points, one by one, from where the surface is."""
+    R = rotation(surface)
+    arms = x - surface.point - surface.displacement
+    if isinstance(surface, dc.RigidPlane):
+        return arms @ (R @ surface.normal)
+    if isinstance(surface, dc.RigidCylinder):
+        return _signed(surface, np.linalg.norm(np.cross(R @ surface.axis, arms), axis=1))
+    return _signed(surface, np.sqrt((arms**2).sum(axis=1)))
+
+
+def _signed(surface, from_centre):
+    return (surface.radius - from_centre) * (1 if surface.inside else -1)
+
+
+def given(contact, displacements):
+    """Array of owned degrees of freedom with these displacements of the contact nodes."""
+    values = np.zeros(contact.points.size)
+    values[contact.points.dofs] = displacements
+    return values
+
+
+@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(6))])
+def test_gaps_are_distances_at_the_start_of_every_step(d, k):
+    """However far nodes and surface have moved and turned before; normals are gradients of the distance."""
+    rng, surface = np.random.default_rng(k), surfaces(d)[k]
+    contact = block(surface).contact
+    x = contact.x[:, :d]
+    where = np.zeros_like(x)
+    for _ in range(4):
+        surface.displacement = 0.1 * rng.normal(size=d)
+        surface.rotation = rng.normal(size=surface.rotation.size)
+        contact.follow(given(contact, where))
+        contact.move(given(contact, where))
+        assert contact.gap == pytest.approx(distance(surface, x + where), abs=1e-13)
+        frames = np.broadcast_to(contact.frame, (len(x), d, d))
+        assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(d), atol=1e-14)
+        for j, shift in enumerate(1e-6 * np.eye(d)):
+            slope = distance(surface, x + where + shift) - distance(surface, x + where - shift)
+            assert slope / 2e-6 == pytest.approx(frames[:, -1, j], abs=1e-9)
+        where = where + 0.1 * rng.normal(size=x.shape)
+        contact.move(given(contact, where))
+        contact.advance()
+
+
+@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(6))])
+def test_a_rigid_motion_of_all_changes_nothing(d, k):
+    """Body and surface move and turn together, by finite angles: gaps stay, nothing slips, frames turn, too."""
+    rng, surface = np.random.default_rng(k), surfaces(d)[k]
+    contact = block(surface).contact
+    x = contact.x[:, :d]
+    contact.move(given(contact, 0.0 * x))
+    contact.advance()
+    gap, frame = contact.gap, contact.frame
+    for _ in range(3):
+        surface.rotation = rng.normal(size=surface.rotation.size)
+        surface.displacement = rng.normal(size=d)
+        R = rotation(surface)
+        moved = surface.point + surface.displacement + (x - surface.point) @ R.T - x
+        contact.follow(given(contact, moved))
+        contact.move(given(contact, moved))
+        assert contact.gap == pytest.approx(gap, abs=1e-13)
+        assert np.abs(contact.slip_increment).max(initial=0) < 1e-13
+        assert contact.frame == pytest.approx(frame @ R.T, abs=1e-13)
+        contact.advance()
+
+
+def test_small_rotations_keep_their_digits():
+    """A turn of 1e-12 moves points by 1e-12 times their arm to ten digits, about a point far away."""
+    plane = dc.RigidPlane((1e3, 0, 0), (0, 0, 1))
+    plane.rotation = (0, 0, 1e-12)
+    assert plane.motion(np.array([[1e3, 2.0, 5.0]]))[0] == pytest.approx([-2e-12, 0, 0], rel=1e-10, abs=1e-23)  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_large_sphere_is_a_plane(d, solver):
+    """With a radius of 1e5 edges forces are those of a plane to 1e-4, with friction, up and down."""
+    foot = np.append(np.zeros(d - 1), -1e5)
+    axis = None if d == 2 else (1.0, 0, 0)
+    mu, p = (0.3, None) if d == 2 else ((0.3, 0.15), (0.05, 0.2))
+    flat = dc.RigidPlane(np.zeros(d), np.append(np.zeros(d - 1), 1.0), axis)
+    rows = [
+        block(surface, mu, p, solver=solver) for surface in (flat, dc.RigidSphere(foot, 1e5, axis))
+    ]
+    for slide, depth in ((0.0, 0.02), (0.003, 0.02), (0.02, 0.02), (0.01, 0.015)):
+        for scene in rows:
+            scene.step(slide, *np.zeros(d - 2), -depth)
+        on_plane, on_sphere = (scene.contact.force() for scene in rows)
+        assert on_sphere == pytest.approx(on_plane, abs=1e-4 * on_plane[-1])
+    assert np.abs(on_plane[0]) > 0.05 * on_plane[-1]
+
+
+def pulled_over(steps):
+    """A block without friction, pulled from 0.2 to 0.6 over a circle: errors of direction and depth of its force."""
+    scene = block(dc.RigidSphere((0.0, -1.0), 1.0), edge=0.1)
+    for slide in np.linspace(0.2, 0.6, steps + 1):
+        scene.step(slide, np.sqrt(1 - slide**2) - 1)
+    contact = scene.contact
+    touching = contact.reaction[:, 1] > 0
+    there = (contact.x[:, :2] + scene.u.x.array[contact.points.dofs])[touching]
+    normal = there - scene.surface.point
+    off = contact.frame[touching, 1] - normal / np.linalg.norm(normal, axis=1)[:, None]
+    errors = (np.linalg.norm(off, axis=1), np.abs(distance(scene.surface, there)))
+    assert COMM.allreduce(int(touching.sum())) > 0
+    assert contact.force() @ scene.surface.point < 0.0
+    return [COMM.allreduce(error.max(initial=0.0), op=scenes.MPI.MAX) for error in errors]
+
+
+def test_sliding_far_over_a_circle_converges_with_the_steps():
+    """Normals of a step are those of its start, first order; gaps miss the curvature of a step, second order."""
+    steps = np.array([8, 16, 32])
+    normal, gap = np.array([pulled_over(n) for n in steps]).T
+    length = 0.4 / steps / 0.8  # of the last step, along the circle at 0.6
+    assert normal == pytest.approx(length, rel=0.25)
+    assert gap == pytest.approx(length**2 / 2, rel=0.4)
+    assert normal[:-1] / normal[1:] == pytest.approx(2.0, abs=0.25)
+    assert gap[:-1] / gap[1:] == pytest.approx(4.0, abs=0.6)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_turning_roll_drags_by_mu_times_the_normal_force(d):
+    """In full sliding friction at every node is mu N against the motion, and the torque about the axis mu R sum N."""
+    roll = dc.RigidSphere((0, -2.0), 2.0) if d == 2 else dc.RigidCylinder((0, 0, -2.0), (0, 1, 0), 2.0)  # fmt: skip
+    scene, mu = block(roll, 0.3), 0.3
+    scene.step(*np.zeros(d - 1), -0.05)
+    for _ in range(3):
+        roll.rotation = roll.rotation + (0.05 if d == 2 else np.array([0, -0.05, 0]))
+        step = scene.step(*np.zeros(d - 1), -0.05)
+    contact = scene.contact
+    assert step.counts.slip > 0 == step.counts.stick
+    r, n = contact.reaction, contact.points.count
+    arms = contact.x[:, :d] + scene.u.x.array[contact.points.dofs] - roll.point
+    forces = np.einsum("ni,nij->nj", r, contact.frame)
+    torque = (arms[:, -1] * forces[:, 0] - arms[:, 0] * forces[:, -1]).sum() if n else 0.0
+    torque, normal = COMM.allreduce(np.array([torque, r[:, -1].sum() if n else 0.0]))
+    # turning the top of the roll to -x drags the body there: torque about y has the sign of z f_x
+    assert torque == pytest.approx(-mu * 2.0 * normal, rel=3e-3)
+    against = r[:, 0] if d == 2 else r[:, 1]
+    assert np.abs(against) == pytest.approx(mu * r[:, -1], rel=1e-6, abs=1e-9 * normal)
+
+
+def test_a_turned_plane_turns_its_axes():
+    """Friction that differs along and across grooves turns with them: forces of a turned scene are the turned forces."""
+    found = []
+    for angle in (0.0, 0.7):
+        plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), (np.cos(angle), -np.sin(angle), 0))
+        scene = block(plane, (0.4, 0.1))
+        scene.step(0, 0, -0.02)
+        plane.rotation = (0, 0, angle)
+        plane.displacement = (0.0, 0.0, 0.0)
+        scene.problem.reset()  # from here on nothing has slipped
+        scene.step(0, 0, -0.02)
+        scene.step(0.05, 0.03, -0.02)
+        found.append(scene.contact.force())
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+    assert abs(found[0][0]) > 1.5 * abs(found[0][1])
+
+
+def test_force_drives_a_turned_plane():
+    """A plane tilted by its rotation presses along its own normal with the force that is given."""
+    plane = dc.RigidPlane((0, 0, 0), (0, 0, 1))
+    plane.rotation = (0.1, 0, 0)
+    scene = block(plane)
+    plane.free, plane.force = ("n",), 20 * np.array([0, -np.sin(0.1), np.cos(0.1)])
+    scene.step(0, 0, 0)
+    assert scene.contact.force() == pytest.approx(plane.force, rel=1e-8)
+
+
+def test_waviness_is_a_gap():
+    """The gap to a wavy plane is the height over it where the node has slid to; a fitting block is pressed evenly."""
+    wave = lambda y: 1e-3 * np.sin(3 * y[0] + y[1])  # noqa: E731
+    plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), height=wave)
+    scene = block(plane, 0.3)
+    contact = scene.contact
+    plane.displacement = (0.02, 0, 0)
+    for slide in (0.0, 0.1, 0.3):
+        scene.step(slide, 0, -0.01)
+    contact.follow(scene.u.x.array[: contact.points.size])
+    u = scene.u.x.array[contact.points.dofs]
+    contact.move(scene.u)
+    there = contact.x + u - plane.displacement
+    assert contact.gap == pytest.approx(there[:, 2] - wave(there.T), abs=1e-14)
+    assert "height=..." in repr(plane)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "turning plane", "wavy plane"])
+def test_steps_back_and_files(kind, tmp_path):
+    """A step that failed or was taken back leaves nothing, and a checkpoint continues with the same bits on one rank."""
+
+    def make():
+        if kind == "sphere":
+            return dc.RigidSphere((0, 0, -3.0), 3.0, (1, 0, 0))
+        return dc.RigidPlane(
+            (0, 0, 0),
+            (0, 0, 1),
+            (1, 0, 0),
+            (lambda y: 1e-3 * y[0] ** 2) if kind[0] == "w" else None,
+        )
+
+    def stop(*_):
+        return 1 / 0
+
+    def go(scene, k):
+        if kind[0] == "t":
+            scene.surface.rotation = (0, 0.001 * k, 0.02 * k)
+        return scene.step(0.02 * k, 0.01 * k, -0.05)
+
+    plain, tried = (block(make(), (0.3, 0.15), (0.05, 0.2)) for _ in range(2))
+    for k in range(4):
+        go(plain, k)
+        if k == 2:
+            tried.surface.displacement = (0.01, 0, 0)
+            tried.step(0.1, 0, -0.03)
+            tried.problem.rewind()
+            tried.problem.monitor = stop
+            before = tried.contact.reaction, tried.contact.frame, tried.contact.gap
+            with pytest.raises(ZeroDivisionError):
+                tried.step(0.3, 0.2, -0.1)
+            after = tried.contact.reaction, tried.contact.frame, tried.contact.gap
+            assert all(map(np.array_equal, before, after))
+            tried.problem.monitor = None
+            tried.surface.displacement = (0, 0, 0)
+        go(tried, k)
+        if k == 2:
+            file = COMM.bcast(str(tmp_path / "state.npz"))
+            tried.problem.save(file)
+            tried = block(make(), (0.3, 0.15), (0.05, 0.2))
+            tried.problem.load(file)
+    for name in ("reaction", "displacement", "gap", "dissipation", "slip_path"):
+        found, expected = (getattr(scene.contact, name) for scene in (tried, plain))
+        scale = np.abs(expected).max(initial=0)
+        assert np.allclose(found, expected, rtol=0, atol=1e-9 * scale + (1e-12 if name == "gap" else 0))  # fmt: skip
+
+
+def test_a_checkpoint_of_another_surface_is_refused(tmp_path):
+    """Another radius, side, kind of surface, or a plane."""
+    file, below = COMM.bcast(str(tmp_path / "state.npz")), (0, 0, -3.0)
+    scene = block(dc.RigidSphere(below, 3.0))
+    scene.step(0, 0, -0.05)
+    scene.problem.save(file)
+    block(dc.RigidSphere(below, 3.0)).problem.load(file)
+    others = (
+        dc.RigidSphere(below, 2.9),
+        dc.RigidSphere((0, 0, 2.95), 3.0, inside=True),
+        dc.RigidCylinder(below, (1, 0, 0), 3.0),
+        dc.RigidPlane((0, 0, 0), (0, 0, 1)),
+    )
+    for other in others:
+        with pytest.raises(ValueError, match="another plane"):
+            block(other).problem.load(file)
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: dc.RigidSphere((0, 0, 0), 0.0), "radius must be a positive number"),
+        (lambda: dc.RigidSphere((0, 0, 0), -1.0), "radius must be a positive number"),
+        (lambda: dc.RigidSphere((0, 0, 0, 0), 1.0), "centre must be a vector"),
+        (lambda: dc.RigidSphere((0, 0), 1.0, inside=1), "inside must be True or False"),
+        (lambda: dc.RigidCylinder((0, 0), (1, 0), 1.0), "RigidCylinder needs three dimensions"),
+        (lambda: dc.RigidCylinder((0, 0, 0), (0, 0, 0), 1.0), "axis must not be zero"),
+        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "free", ("n",)), "force drives planes"),
+        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "force", (0, 1)), "force drives planes"),
+        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "rotation", (0, 1)), "one angle"),
+        (lambda: setattr(dc.RigidPlane((0, 0, 0), (0, 0, 1)), "rotation", 1.0), "vector of 3"),
+        (lambda: dc.RigidPlane((0, 0), (0, 1), height=1.0), "height must be a function"),
+        (lambda: block(dc.RigidSphere((0, 0, 0), 1.0)), "at the centre"),
+        (lambda: block(dc.RigidSphere((0, 0, -1), 1.0, axis=(0, 0, 1))), "along the normal"),
+        (lambda: block(dc.RigidSphere((0, 0, -1), 1.0), (0.3, 0.1)), "give RigidSphere the first"),
+        (lambda: block(dc.RigidPlane((0, 0, 0), (0, 0, 1), height=lambda y: y)), "one value per"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(make, message):
+    """On all ranks, with what is wrong."""
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_dimensions_have_to_agree():
+    """A circle under a block in three dimensions."""
+    V = block(dc.RigidPlane((0, 0, 0), (0, 0, 1))).V
+    facets = mesh.locate_entities_boundary(V.mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    with pytest.raises(ValueError, match="has 2 dimensions, the mesh 3"):
+        dc.Contact(V, facets, dc.RigidSphere((0, 0), 1.0), dc.Friction(0.0))
