@@ -163,9 +163,10 @@ def follow(contacts, body, u: np.ndarray, known: list) -> bool:
         u: Last converged displacement, owned degrees of freedom.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
-    with raised_together(body.comm):
-        for contact in contacts:
-            if contact.follows:
+    moving = [contact for contact in contacts if contact.follows]
+    if moving:
+        with raised_together(body.comm):
+            for contact in moving:
                 contact.follow(u)
     changed = [c for c, points in zip(contacts, known) if c.points is not points]
     known[:] = [contact.points for contact in contacts]

@@ -19,10 +19,15 @@ COMM = scenes.COMM
 E = 1000.0
 
 
-def block(surface, mu=0.0, p=None, edge=1.0, cells=None, **options):
-    """A block on [-edge/2, edge/2]^(d-1) x [0, edge] whose top is held and moved, and whose foot meets a surface."""
+def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, **options):
+    """A block on [-edge/2, edge/2]^(d-1) x [0, edge] whose top is held and moved, and whose foot meets a surface.
+
+    Of it the half y > 0 alone with ``half``, its displacement across y = 0 being zero.
+    """
     d = surface.point.size
     corners = [np.append(np.full(d - 1, -edge / 2), 0.0), np.append(np.full(d - 1, edge / 2), edge)]
+    if half:
+        corners[0][1] = 0.0
     create, kind = (
         (mesh.create_box, mesh.CellType.hexahedron)
         if d == 3
@@ -37,9 +42,14 @@ def block(surface, mu=0.0, p=None, edge=1.0, cells=None, **options):
     u, v = fem.Function(V), ufl.TestFunction(V)
     held = fem.Constant(domain, np.zeros(d))
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)
+    bcs, across = [bc], V.sub(1)
+    if half:
+        middle = mesh.locate_entities_boundary(domain, d - 1, lambda x: np.isclose(x[1], 0.0))
+        dofs, zero = fem.locate_dofs_topological(across, d - 1, middle), fem.Constant(domain, 0.0)
+        bcs.append(fem.dirichletbc(zero, dofs, across))
     contact = dc.Contact(V, foot, surface, dc.Friction(mu, p))
     F = elasticity(u, v, E, 0.0)
-    problem = dc.ContactProblem(F, u, [contact], bcs=[bc], tol=1e-10, **options)
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10, **options)
 
     def step(*where):
         held.value = np.array(where, dtype=float)
@@ -137,6 +147,40 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
         contact.advance()
 
 
+@pytest.mark.parametrize("k", range(3))
+def test_a_sphere_that_turns_about_its_centre_leaves_last_reactions(k):
+    """Neither normals nor what acted before change in space, whichever tangents the turned sphere has."""
+    rng, surface = np.random.default_rng(k), surfaces(3)[k]
+    contact = block(surface, 0.3).contact
+    reaction = rng.normal(size=(len(contact.x), 3))
+    contact.take(reaction=reaction)
+    contact.advance()
+    before = np.einsum("ni,nij->nj", reaction, contact.frame)
+    for _ in range(3):
+        surface.rotation = rng.normal(size=3)
+        contact.follow(np.zeros(contact.points.size))
+        after = np.einsum("ni,nij->nj", contact.last.reaction, contact.frame)
+        assert after == pytest.approx(before, abs=1e-13)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_half_a_block_carries_half_the_force(solver):
+    """A plane of symmetry holds a tangential direction of contact nodes, at every step anew."""
+    rows = [
+        block(dc.RigidSphere((0, 0, -3.0), 3.0, (1, 0, 0)), (0.3, 0.15), cells=cells, half=half, solver=solver)
+        for half, cells in ((False, [4, 4, 2]), (True, [4, 2, 2]))
+    ]  # fmt: skip
+    for slide in (0.0, 0.02, 0.1, 0.05):
+        for scene in rows:
+            scene.step(slide, 0, -0.08)
+        full, half = (scene.contact.force() for scene in rows)
+        assert 2 * half[[0, 2]] == pytest.approx(full[[0, 2]], rel=1e-8, abs=1e-8 * full[2])
+        slip = rows[1].contact.slip_increment[rows[1].contact.points.held]
+        assert (slip == 0).all()
+    held = COMM.allreduce(int(rows[1].contact.points.held[:, 1].sum()))
+    assert held == 5
+
+
 def test_small_rotations_keep_their_digits():
     """A turn of 1e-12 moves points by 1e-12 times their arm to ten digits, about a point far away."""
     plane = dc.RigidPlane((1e3, 0, 0), (0, 0, 1))
@@ -190,26 +234,43 @@ def test_sliding_far_over_a_circle_converges_with_the_steps():
     assert gap[:-1] / gap[1:] == pytest.approx(4.0, abs=0.6)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_a_turning_roll_drags_by_mu_times_the_normal_force(d):
-    """In full sliding friction at every node is mu N against the motion, and the torque about the axis mu R sum N."""
-    roll = dc.RigidSphere((0, -2.0), 2.0) if d == 2 else dc.RigidCylinder((0, 0, -2.0), (0, 1, 0), 2.0)  # fmt: skip
-    scene, mu = block(roll, 0.3), 0.3
+@pytest.mark.parametrize("kind", ["circle", "sphere", "cylinder"])
+def test_a_turning_roll_drags_by_mu_times_the_normal_force(kind):
+    """In full sliding friction is mu N against the motion at every node; torque mu R N, and its work, turn for turn."""
+    d, mu, turn = (2 if kind == "circle" else 3), 0.3, 0.05
+    centre = np.append(np.zeros(d - 1), -2.0)
+    roll = dc.RigidCylinder(centre, (0, 1, 0), 2.0) if kind == "cylinder" else dc.RigidSphere(centre, 2.0)  # fmt: skip
+    scene = block(roll, mu)
+    contact = scene.contact
     scene.step(*np.zeros(d - 1), -0.05)
     for _ in range(3):
-        roll.rotation = roll.rotation + (0.05 if d == 2 else np.array([0, -0.05, 0]))
+        before = contact.dissipation
+        roll.rotation = roll.rotation + (turn if d == 2 else np.array([0, -turn, 0]))
         step = scene.step(*np.zeros(d - 1), -0.05)
-    contact = scene.contact
     assert step.counts.slip > 0 == step.counts.stick
-    r, n = contact.reaction, contact.points.count
+    r = contact.reaction
     arms = contact.x[:, :d] + scene.u.x.array[contact.points.dofs] - roll.point
     forces = np.einsum("ni,nij->nj", r, contact.frame)
-    torque = (arms[:, -1] * forces[:, 0] - arms[:, 0] * forces[:, -1]).sum() if n else 0.0
-    torque, normal = COMM.allreduce(np.array([torque, r[:, -1].sum() if n else 0.0]))
-    # turning the top of the roll to -x drags the body there: torque about y has the sign of z f_x
-    assert torque == pytest.approx(-mu * 2.0 * normal, rel=3e-3)
-    against = r[:, 0] if d == 2 else r[:, 1]
-    assert np.abs(against) == pytest.approx(mu * r[:, -1], rel=1e-6, abs=1e-9 * normal)
+    torque = (arms[:, -1] * forces[:, 0] - arms[:, 0] * forces[:, -1]).sum()
+    work = (contact.dissipation - before).sum()
+    torque, normal, work = COMM.allreduce(np.array([torque, r[:, -1].sum(), work]))
+    assert torque == pytest.approx(-mu * 2.0 * normal, rel=3e-3)  # the top of the roll goes to -x
+    assert work == pytest.approx(-torque * turn, rel=3e-3)
+    friction = np.linalg.norm(r[:, :-1], axis=1)
+    assert friction == pytest.approx(mu * r[:, -1], rel=1e-6, abs=1e-9 * normal)
+
+
+def test_grooves_as_directions_in_space():
+    """Directions of friction given in space are projected on the tangent planes, as the axis of a sphere is."""
+    along, found = np.array([0.6, 0.8, 0.1]), []
+    for axis, axes in ((along, None), ((1, 0, 0), lambda x: np.outer(along, np.ones(x.shape[1])))):
+        scene = block(dc.RigidSphere((0, 0, -3.0), 3.0, axis), cells=[3, 3, 2])
+        scene.contact.friction = dc.Friction((0.4, 0.1), axes=axes)
+        for slide in (0.0, 0.1):
+            scene.step(slide, 0, -0.06)
+        found.append(scene.contact.force())
+    assert found[1] == pytest.approx(found[0], rel=3e-3)
+    assert abs(found[0][1]) > 0.02 * found[0][2]  # grooves turn friction aside
 
 
 def test_a_turned_plane_turns_its_axes():
@@ -283,8 +344,11 @@ def test_steps_back_and_files(kind, tmp_path):
         go(plain, k)
         if k == 2:
             tried.surface.displacement = (0.01, 0, 0)
+            turned = tried.surface.rotation
+            tried.surface.rotation = (0, 0, 1.0)
             tried.step(0.1, 0, -0.03)
             tried.problem.rewind()
+            assert (tried.surface.rotation == turned).all()
             tried.problem.monitor = stop
             before = tried.contact.reaction, tried.contact.frame, tried.contact.gap
             with pytest.raises(ZeroDivisionError):

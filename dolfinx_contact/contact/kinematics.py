@@ -97,12 +97,13 @@ class ContactKinematics(ContactResults):
             self.place(placed.home)
         else:
             self.place(plane.relative(self._at + u[self.points.dofs]))
+        now = self._placed
         if plane.curved:
             moved = _turned_back(placed.own, last.displacement)
-            last = last._replace(
-                displacement=frozen(_times(self._placed.own, moved)),
-                reaction=frozen(_carried(last.reaction, placed.own, self._placed.own)),
-            )
+            last = last._replace(displacement=frozen(_times(now.own, moved)))
+        if now.points is not placed.points:
+            carried = _carried(last.reaction, placed.frame, now.frame)
+            last = last._replace(reaction=frozen(carried))
         self._last = last
         super().restore()
 
@@ -232,7 +233,7 @@ def _turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
 
 
 def _carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Reactions carried along with the node to its next frame: the normal one is kept, and the length of friction."""
+    """Reactions in other frames: friction keeps its length and, as far as it can, its direction in space."""
     carried, tangential = reaction.copy(), reaction.copy()
     tangential[:, -1] = 0.0
     along = _times(after, _turned_back(before, tangential))[:, :-1]
