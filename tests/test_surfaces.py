@@ -19,7 +19,7 @@ COMM = scenes.COMM
 E = 1000.0
 
 
-def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, **options):
+def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, nonlinear=False, **options):
     """A block on [-edge/2, edge/2]^(d-1) x [0, edge] whose top is held and moved, and whose foot meets a surface.
 
     Of it the half y > 0 alone with ``half``, its displacement across y = 0 being zero.
@@ -49,6 +49,8 @@ def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, **options):
         bcs.append(fem.dirichletbc(zero, dofs, across))
     contact = dc.Contact(V, foot, surface, dc.Friction(mu, p))
     F = elasticity(u, v, E, 0.0)
+    if nonlinear:  # stiffer where it is stretched
+        F = F + E * ufl.inner(u, u) * ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10, **options)
 
     def step(*where):
@@ -188,7 +190,7 @@ def test_small_rotations_keep_their_digits():
     assert plane.motion(np.array([[1e3, 2.0, 5.0]]))[0] == pytest.approx([-2e-12, 0, 0], rel=1e-10, abs=1e-23)  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint(), dc.SparseNewton()])
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_large_sphere_is_a_plane(d, solver):
     """With a radius of 1e5 edges forces are those of a plane to 1e-4, with friction, up and down."""
@@ -221,6 +223,20 @@ def pulled_over(steps):
     assert COMM.allreduce(int(touching.sum())) > 0
     assert contact.force() @ scene.surface.point < 0.0
     return [COMM.allreduce(error.max(initial=0.0), op=scenes.MPI.MAX) for error in errors]
+
+
+@pytest.mark.parametrize("solver", [None, dc.SparseNewton()])
+def test_a_nonlinear_body_on_a_sphere(solver):
+    """Its forces are balanced at every step, and a sphere that goes to and fro comes back to the same state."""
+    ball = dc.RigidSphere((0, 0, -3.0), 3.0)
+    scene, found = block(ball, nonlinear=True, cells=[3, 3, 2], solver=solver), []
+    for slide in (0.0, 0.1, 0.2, 0.1, 0.0, 0.0):
+        ball.displacement = (slide, 0, 0.05)
+        step = scene.problem.solve()
+        assert max(step.error, step.slip_error) <= 1e-10
+        found.append(scene.contact.force())
+    assert found[-1] == pytest.approx(found[0], abs=1e-3 * found[0][2])
+    assert found[2][0] < -0.01 * found[2][2]
 
 
 def test_sliding_far_over_a_circle_converges_with_the_steps():
