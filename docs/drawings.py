@@ -17,6 +17,7 @@ from matplotlib import pyplot as plt
 FOLDER = Path(__file__).parent / "theory"
 INK, CONE, SLIP, FORCE = "#777777", "#2a78d6", "#e8710a", "#1a9850"
 MU, P = np.array([0.30, 0.15]), np.array([0.05, 0.20])
+SETTINGS = {"svg.hashsalt": "dolfinx_contact", "font.size": 10}
 ANGLE = np.linspace(0, 2 * np.pi, 400)
 
 
@@ -115,6 +116,6 @@ def projection() -> None:
 
 
 if __name__ == "__main__":
-    plt.rcParams |= {"svg.hashsalt": "dolfinx_contact", "font.size": 10}
+    plt.rcParams |= SETTINGS
     for draw in (cone, slip_rule, projection):
         draw()
