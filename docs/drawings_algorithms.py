@@ -83,7 +83,7 @@ def anderson() -> None:
         history = np.array(errors(kept))
         history = history[history > 1e-12 * history[0]]
         axes.semilogy(history / history[0], color=colour, lw=1.8)
-        axes.annotate(text, (len(history) - 1, history[-1] / history[0]), (-6, 8), ha="right",
+        axes.annotate(text, (len(history) - 1, history[-1] / history[0]), (0, 8 if kept == 0 else 46), ha="right",
                       textcoords="offset points", color=colour)  # fmt: skip
     for side in ("right", "top"):
         axes.spines[side].set_visible(False)

@@ -39,6 +39,7 @@ template <int T> class InteriorPoint {
         y_ = r_;
         for (int k = 0; k < max_iterations && !budget.spent(); ++k, ++budget.iterations) {
             linearise();
+            budget.tell(system_, r_);
             const double gap = r_.dot(y_) / n, size = r_.norm();
             if (rest_.norm() < accuracy * size &&
                 gap < accuracy * std::max(1.0, size / std::sqrt(n)))

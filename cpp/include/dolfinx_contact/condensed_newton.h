@@ -40,6 +40,13 @@ struct Budget {
                             std::max(1.0, r.template lpNorm<Eigen::Infinity>()),
                         counts);
     }
+    template <int T> void tell(const System<T> &system, const VectorXd &r) const {
+        if (!options.monitor)
+            return;
+        State<T> state;
+        state.evaluate(system, r, system.displacement(r));
+        tell(state, r);
+    }
 };
 
 /// Newton's method on the residual of a System with a nonmonotone line search

@@ -81,11 +81,7 @@ void sweep(const System<T> &system, VectorXd &r, double target, int max_sweeps, 
             change += (after - before).squaredNorm();
             size += after.squaredNorm();
         }
-        if (budget.options.monitor) {
-            State<T> state;
-            state.evaluate(system, r, system.displacement(r));
-            budget.tell(state, r);
-        }
+        budget.tell(system, r);
         if (!(change > target * target * size))
             return;
     }
