@@ -15,7 +15,7 @@
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad
 #    g = |x + u - c| - R \ge 0, \quad p \ge 0, \quad g\, p = 0 \quad \text{on the top}, $$
 #
-# without friction. The gap is that to the plane which touches the sphere below each node, [docs/surfaces.md](../docs/surfaces.md).
+# without friction. The gap is that to the plane which touches the sphere below each node, `docs/surfaces.md`.
 # The **closed form** [H. Hertz 1881; K. L. Johnson, Contact Mechanics, 1985, Section 4.2] is
 #
 # $$ a = \sqrt{R \delta}, \qquad F = \tfrac{4}{3} E^* \sqrt{R}\, \delta^{3/2}, \qquad
