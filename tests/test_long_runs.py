@@ -50,20 +50,9 @@ def memory() -> float:
         return int(file.read().split()[1]) * 4096 / 1e6
 
 
-@pytest.mark.parametrize(
-    "end, solver",
-    [
-        ("dropped", dc.CondensedNewton()),
-        *(
-            pytest.param(end, solver, marks=pytest.mark.slow)
-            for end, solver in (
-                ("dropped", dc.FixedPoint()),
-                ("closed", dc.CondensedNewton()),
-                ("closed", dc.FixedPoint()),
-            )
-        ),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", [dc.CondensedNewton(), dc.FixedPoint()])
+@pytest.mark.parametrize("end", ["dropped", "closed"])
 def test_problems_leave_nothing_behind(end, solver):
     """Problems of 735 unknowns, closed or just dropped, two hundred on one rank, take no more memory than one: 50 MB for
     a thousand."""
