@@ -44,7 +44,7 @@ def fixed_point() -> None:
     figure, axes = plt.subplots(figsize=(6.4, 2.8), layout="constrained")
     body(axes, (0, 0.25), 1.2)
     plane(axes, -0.1, 1.3, 0.2)
-    axes.text(0.6, 0.95, "body: $K\\,\\delta u = f - Ku + r$", color=INK, ha="center")
+    axes.text(0.6, 0.95, "body: $(K + S)\\,\\delta u = f - Ku + r$", color=INK, ha="center")
     corner = np.array([2.6, 0.25])
     axes.fill(*(corner + [[0, 0], [-0.4, 0.65], [0.4, 0.65]]).T, color=CONE, alpha=0.18, lw=0)
     axes.plot(*(corner + [[-0.4, 0.65], [0, 0], [0.4, 0.65]]).T, color=CONE)
@@ -79,11 +79,14 @@ def anderson() -> None:
         return found
 
     figure, axes = plt.subplots(figsize=(5.4, 3.0), layout="constrained")
-    for kept, colour, text in ((0, INK, "plain"), (memory, CONE, "Anderson, 12 kept")):
+    for kept, colour, text, aside in (
+        (0, INK, "plain", (-6, 8)),
+        (memory, CONE, "Anderson, 12 kept", (-70, 4)),
+    ):
         history = np.array(errors(kept))
         history = history[history > 1e-12 * history[0]]
         axes.semilogy(history / history[0], color=colour, lw=1.8)
-        axes.annotate(text, (len(history) - 1, history[-1] / history[0]), (0, 8 if kept == 0 else 46), ha="right",
+        axes.annotate(text, (len(history) - 1, history[-1] / history[0]), aside, ha="right",
                       textcoords="offset points", color=colour)  # fmt: skip
     for side in ("right", "top"):
         axes.spines[side].set_visible(False)
@@ -136,7 +139,8 @@ def sparse_newton() -> None:
 
 def multigrid() -> None:
     """Three levels of a body on springs, one cycle down and up."""
-    figure, axes = plt.subplots(figsize=(6.4, 2.7), layout="constrained")
+    figure, axes = plt.subplots(figsize=(6.4, 2.0), layout="constrained")
+    texts = ("$K + S$", "$P^TKP + P^TSP$", "the coarsest: solved")
     for level, (across, up) in enumerate(((9, 5), (5, 3), (3, 2))):
         x, y = np.meshgrid(np.linspace(0, 1, across), np.linspace(0, 0.5, up))
         x = x + 1.45 * level
@@ -145,15 +149,12 @@ def multigrid() -> None:
         axes.plot(x, y, "o", color=CONE, ms=3 + level)
         springs(axes, np.stack([x[0], y[0]], axis=1))
         plane(axes, 1.45 * level - 0.06, 1.45 * level + 1.06, -0.13)
-        axes.text(1.45 * level + 0.5, -0.27, ("$K$", "$P^TKP$", "")[level], color=INK, ha="center")
-    axes.text(3.4, -0.27, "the coarsest: solved", color=INK, ha="center", fontsize=9)
-    axes.texts[0].set_text("$K + S$")
-    axes.texts[1].set_text("$P^TKP + P^TSP$")
+        axes.text(1.45 * level + 0.5, -0.27, texts[level], color=INK, ha="center")
     for left in (1.1, 2.55):
         arrow(axes, (left, 0.36), (left + 0.26, 0.36), INK, "")
         arrow(axes, (left + 0.26, 0.14), (left, 0.14), FORCE, "")
-    axes.text(1.23, 0.62, "what is missing", color=INK, ha="center", fontsize=9)
-    axes.text(1.23, 0.0, "correction", color=FORCE, ha="center", fontsize=9, rotation=90, va="top")
+    axes.text(1.225, 0.6, "forces out of balance go down", color=INK, ha="center", fontsize=9)
+    axes.text(2.675, 0.6, "corrections come back", color=FORCE, ha="center", fontsize=9)
     blank(axes, (-0.1, 4.05), (-0.35, 0.75))
     save(figure, "multigrid.svg")
 
