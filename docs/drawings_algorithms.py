@@ -62,7 +62,7 @@ def fixed_point() -> None:
 
 
 def anderson() -> None:
-    """Errors of x <- x + b - A x, plain and mixed, on a small linear problem."""
+    """Sizes of the corrections of x <- x + b - A x, plain and mixed, on a small linear problem."""
     eigenvalues = np.linspace(0.03, 1.0, 40)
     memory, steps = 12, 60
 
@@ -93,7 +93,7 @@ def anderson() -> None:
     axes.spines[["left", "bottom"]].set_color(INK)
     axes.tick_params(colors=INK, which="both")
     axes.set_xlabel("iterations", color=INK)
-    axes.set_ylabel("error / first error", color=INK)
+    axes.set_ylabel("correction / first correction", color=INK)
     save(figure, "anderson.svg")
 
 
