@@ -18,6 +18,8 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 	friction friction_cone judge return_map
 # whole programs, whose parts have tests of their own: make test has them on one rank
 programs = accuracy demos report stress study
+no_arrays = $(arrays:%=--ignore=tests/test_%.py)
+no_programs = $(programs:%=--ignore=tests/test_%.py)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
@@ -38,14 +40,14 @@ docs: .venv/ready
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" $(ARGS)
-	tools/mpitest .venv 2 -m "not slow" $(patsubst %,--ignore=tests/test_%.py,$(arrays) $(programs)) $(ARGS)
+	tools/mpitest .venv 2 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
 	tools/ctest example
 
 # what make test leaves out; it needs make test to come first
 test-rest: test-cpp
 	tools/mpitest .venv 2 -m "not slow" $(programs:%=tests/test_%.py)
 	for n in 1 2; do tools/mpitest .venv $$n -m slow || exit 1; done
-	tools/mpitest .venv 3 -m "not slow" $(arrays:%=--ignore=tests/test_%.py)
+	tools/mpitest .venv 3 -m "not slow" $(no_arrays)
 
 test-all: test
 	$(MAKE) test-rest
@@ -59,7 +61,7 @@ test-python: .venv/ready
 # the same Python tests on the newest DOLFINx on PyPI
 test-wheel: .venv-wheel/ready
 	tools/mpitest .venv-wheel 1 -m "not slow" $(ARGS)
-	tools/mpitest .venv-wheel 3 -m "not slow" $(patsubst %,--ignore=tests/test_%.py,$(arrays) $(programs)) $(ARGS)
+	tools/mpitest .venv-wheel 3 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
 
 format: .venv/ready
 	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')
