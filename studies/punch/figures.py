@@ -15,7 +15,7 @@ from studies.punch.run import Run
 
 COLOURS = {"A": "#0072b2", "B": "#d55e00", "C": "#009e73"}  # Okabe and Ito: for all eyes
 NAMES = {"A": "A isotropic", "B": "B associated", "C": "C non-associated"}
-STYLE = {"font.size": 13, "hatch.linewidth": 0.6, "svg.hashsalt": "study"}
+STYLE = {"font.size": 13, "hatch.linewidth": 0.6, "svg.hashsalt": "study", "axes.grid": True, "grid.alpha": 0.3}  # fmt: skip
 
 
 def write_csv(file: Path, rows: list[dict]) -> None:
@@ -103,14 +103,13 @@ class Figures:
         steps = {heading(k): lambda run, k=k: run.loaded(cycle) + k for k in shown}
         self.zones(name, f"Load function $f$ during the unloading of cycle {cycle}", steps)
 
-    def lines(self, name, title, draw) -> None:
-        """One panel a case with common axes; ``draw(axes, run)`` draws one."""
+    def lines(self, name, title, draw, labels) -> None:
+        """One panel a case with common axes, which have ``labels``; ``draw(axes, run)`` draws one."""
         with self.drawn(name, (4.8 * len(self.runs) + 1.2, 4.2)) as figure:
             axes = figure.subplots(1, len(self.runs), sharex=True, sharey=True, squeeze=False)[0]
             for ax, (case, run) in zip(axes, self.runs.items()):
                 draw(ax, run)
-                ax.set_title(NAMES[case])
-                ax.grid(alpha=0.3)
+                ax.set(title=NAMES[case], xlabel=labels[0], ylabel=labels[1])
                 ax.label_outer()
             handles = axes[0].get_legend_handles_labels()
             figure.legend(*handles, loc="outside right center", frameon=False)
@@ -130,32 +129,23 @@ class Figures:
             return dict(cycles=np.arange(len(u_x)) / run.unloaded(1), u_x=1e3 * u_x, u_y=1e3 * u_y, r_tx=r_tx,
                         r_ty=r_ty, force=force(run), slip=1e3 * slip_of_point(run, node), sticks=sticks)  # fmt: skip
 
-        def trajectory(ax, run):
-            of = history(run)
-            self._by_cycle(ax, run, of["u_x"], of["u_y"])
-            ax.set(xlabel="$u_x$ [µm]", ylabel="$u_y$ [µm]")
+        def by_cycles(x, y, unit=1.0):
+            return lambda ax, run: self._by_cycle(ax, run, history(run)[x], unit * history(run)[y])
 
-        def friction(ax, run):
-            _by_time(ax, history(run), {"$r_{tx}$": "r_tx", "$r_{ty}$": "r_ty"})
-            ax.set(ylabel="friction force [N]")
+        def by_times(**columns):
+            return lambda ax, run: _by_time(ax, history(run), columns)
 
-        def slip(ax, run):
-            _by_time(ax, history(run), {"$u_x$": "u_x", "$u_y$": "u_y", "$|u_t|$": "slip"})
-            ax.set(ylabel="slip [µm]")
-
-        def curve(ax, run):
-            of = history(run)
-            self._by_cycle(ax, run, of["slip"], 1e-3 * of["force"])
-            ax.set(xlabel="$|u_t|$ [µm]", ylabel="applied force [kN]")
-
-        for number, title, draw in (
-            (4, f"Trajectory of {label}; {by_cycle}", trajectory),
-            (5, f"Friction at {label}; {by_time}", friction),
-            (6, f"Slip of {label}; {by_time}", slip),
-            (7, f"Applied force against slip of {label}; {by_cycle}", curve),
-        ):
+        for number, title, draw, labels in (
+            (4, f"Trajectory of {label}; {by_cycle}", by_cycles("u_x", "u_y"), ("$u_x$ [µm]", "$u_y$ [µm]")),
+            (5, f"Friction at {label}; {by_time}", by_times(r_tx="$r_{tx}$", r_ty="$r_{ty}$"),
+                ("cycles", "friction force [N]")),
+            (6, f"Slip of {label}; {by_time}", by_times(u_x="$u_x$", u_y="$u_y$", slip="$|u_t|$"),
+                ("cycles", "slip [µm]")),
+            (7, f"Applied force against slip of {label}; {by_cycle}", by_cycles("slip", "force", 1e-3),
+                ("$|u_t|$ [µm]", "applied force [kN]")),
+        ):  # fmt: skip
             name = f"fig{number}" + (f"_node{node}" if node else "")
-            self.lines(name, title, draw)
+            self.lines(name, title, draw, labels)
             self.write(name, lambda run: [history(run)])
 
     def _by_cycle(self, ax, run, horizontal, vertical) -> None:
@@ -170,10 +160,9 @@ class Figures:
 
 
 def _by_time(ax, history, columns) -> None:
-    """Columns by label against the programme in cycles, shaded where the node sticks."""
+    """Columns with their labels against the programme in cycles, shaded where the node sticks."""
     at, styles = history["cycles"], (("-", "black"), ("--", "#d55e00"), (":", "#555555"))
-    for (label, name), (style, colour) in zip(columns.items(), styles):
+    for (name, label), (style, colour) in zip(columns.items(), styles):
         ax.plot(at, history[name], style, color=colour, label=label)
     for k in np.flatnonzero(history["sticks"]):
         ax.axvspan(at[k - 1], at[k], color="#4a90c4", alpha=0.3, linewidth=0)
-    ax.set(xlabel="cycles")

@@ -40,7 +40,6 @@ def energy(figures: Figures) -> None:
             above.set(title=NAMES[case], ylabel="accumulated [N mm]", ylim=(1, None))
             below.set(xlabel="cycles", ylabel="|open balance| / largest term", ylim=(1e-17, 1e-7))
         for ax in axes.flat:
-            ax.grid(alpha=0.3)
             ax.label_outer()
         handles = axes[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
@@ -75,7 +74,6 @@ def cycles(figures: Figures, wear: float) -> list[dict]:
         drift.set(title="Largest drift of a node per cycle", ylabel="µm")
         for ax in (work, settled, drift):
             ax.set(xlabel="cycle", xticks=range(1, figures.cycles + 1))
-            ax.grid(alpha=0.3)
         work.legend()
     return rows
 
@@ -176,7 +174,6 @@ def convergence(figures: Figures, rows: list[dict]) -> None:
             ax.set_xticks(ticks, [str(size) for size in ticks])
             ax.minorticks_off()
             ax.set(xlabel=key.replace("_", " "))
-            ax.grid(alpha=0.3)
         axes[0].set(ylabel="work of friction, first cycle [N mm]", ylim=(0, None))
         axes[0].legend()
     write_csv(figures.directory / "convergence.csv", shown)
