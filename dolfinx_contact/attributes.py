@@ -34,3 +34,6 @@ class Guarded:
         near = get_close_matches(name, [known for known in dir(self) if known[0] != "_"], 1)
         meant = f", did you mean {near[0]!r}?" if near else "."
         raise AttributeError(f"{kind} has no attribute {name!r}{meant}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"{type(self).__name__}.{name} cannot be deleted.")

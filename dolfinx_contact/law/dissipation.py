@@ -47,14 +47,14 @@ def work_of_friction(
     """
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
-    way, e1 = _split(_along_axes(friction, slip_increment))
+    way, e1 = _split(friction.along_axes(slip_increment))
     _, s1 = _split(Q**2 * mu * e1)  # M^-1 P^2 e1
     per_way = mu * e1 * s1
 
     if law_before in (None, friction):
-        s0, e0 = _of_force(mu, Q, _along_axes(friction, before[:, :-1]))
+        s0, e0 = _of_force(mu, Q, friction.along_axes(before[:, :-1]))
     else:
-        e0 = _along_axes(friction, -law_before.against_slip(before[:, :-1]))
+        e0 = friction.along_axes(-law_before.against_slip(before[:, :-1]))
         _, s0 = _split(Q**2 * mu * e0)
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
     per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
@@ -70,14 +70,6 @@ def _of_force(mu, Q, force) -> tuple[np.ndarray, np.ndarray]:
     _, s = _split(np.where(slippery, 0.0, -force) / M)
     _, e = _split(s * M / P**2)
     return s, e
-
-
-def _along_axes(friction: Friction, t: np.ndarray) -> np.ndarray:
-    """Components of tangential vectors along the principal friction directions."""
-    if friction.axes is None:
-        return t
-    (x, y), (cos, sin) = t.T, friction.axes.T
-    return np.column_stack((cos * x + sin * y, cos * y - sin * x))
 
 
 def _split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

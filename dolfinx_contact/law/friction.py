@@ -9,12 +9,14 @@ anisotrope", 18e Congrès Français de Mécanique, 2007.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
+from dolfinx_contact.attributes import Guarded, frozen
 
 Field = Callable[[Any], Any]  # or a DOLFINx Function, which this module does not know
 
@@ -61,7 +63,7 @@ def _coefficients(name: str, value) -> np.ndarray:
     return array.astype(np.float64)
 
 
-class Friction:
+class Friction(Guarded):
     """Orthotropic dry friction with a slip rule that need not be associated.
 
     The cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip rule
@@ -106,22 +108,21 @@ class Friction:
     associated: bool
     field: bool
     exponent: float | None
-    __slots__ = ("mu", "p", "axes", "frictionless", "isotropic", "associated", "field", "exponent", "_given", "_laws")  # fmt: skip
+    _remedy = "it is immutable, make a new Friction."
 
     def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, k: float | None = None, *, axes: ArrayLike | Field | None = None) -> None:  # fmt: skip
-        fields = {"mu": mu, "p": p, "axes": axes}
-        object.__setattr__(self, "field", any(map(is_field, fields.values())))
-        object.__setattr__(self, "exponent", k)
-        object.__setattr__(self, "_given", fields if self.field else None)
-        if self.field:
-            if p is not None and k is not None:
-                raise ValueError("give p or k, not both")
-            return
+        if p is not None and k is not None:
+            raise ValueError(f"give p or k, not both (mu={mu!r}, p={p!r}, k={k!r})")
+        self._given, self.exponent = {"mu": mu, "p": p, "axes": axes}, k
+        self._laws: dict[int, Any] = {}
+        self.field = any(map(is_field, self._given.values()))
+        if not self.field:
+            self._take(mu, p, k, axes)
+        self._made = True
+
+    def _take(self, mu, p, k, axes) -> None:
         given = f"mu={mu!r}, p={p!r}, k={k!r}"
         mu = _cone(mu)
-        positive = mu > 0
-        if p is not None and k is not None:
-            raise ValueError(f"give p or k, not both ({given})")
         if k is not None:
             q = _q_from_exponent(mu, k)
         elif p is not None:
@@ -132,9 +133,8 @@ class Friction:
                 raise ValueError(f"p has shape {p.shape}, mu {mu.shape}: give both for each node")
             if p.ndim > mu.ndim:
                 mu = np.tile(mu, (len(p), 1))
-                positive = mu > 0
             p = p / p.max(axis=-1, keepdims=p.ndim > 0)
-            q = np.divide(p, mu, out=np.ones_like(mu), where=positive)
+            q = np.divide(p, mu, out=np.ones_like(mu), where=mu > 0)
         else:
             q = np.ones_like(mu)
         q = q / q.max(axis=-1, keepdims=True)
@@ -145,24 +145,14 @@ class Friction:
                 f"p/mu must not differ by more than {_LARGEST} between the two directions, "
                 f"but does with {given}"
             )
-
-        p = q * mu
-        for array in (mu, p):
-            array.flags.writeable = False
-        set_ = object.__setattr__
-        set_(self, "mu", mu)
-        set_(self, "p", p)
-        set_(self, "axes", None if axes is None else _unit_vectors(axes, mu))
-        set_(self, "frictionless", not positive.any())
-        set_(self, "associated", bool(np.all(q == 1.0)))
-        set_(self, "isotropic", self.associated and bool(np.all(mu[..., 0] == mu[..., 1])))
-        set_(self, "_laws", {})
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"Friction is immutable: make a new one to change {name}")
+        self.mu, self.p = frozen(mu), frozen(q * mu)
+        self.axes = None if axes is None else _unit_vectors(axes, mu)
+        self.frictionless = not (mu > 0).any()
+        self.associated = bool(np.all(q == 1.0))
+        self.isotropic = self.associated and bool(np.all(mu[..., 0] == mu[..., 1]))
 
     def __getattr__(self, name: str) -> Any:
-        if name in Friction.__slots__:
+        if name in Friction.__annotations__:
             raise AttributeError(f"{self!r} has no {name} yet: contact.friction has the values at the contact's nodes.")  # fmt: skip
         raise AttributeError(f"Friction has no attribute {name!r}")
 
@@ -170,14 +160,11 @@ class Friction:
         """What ``mu``, ``p`` and ``axes`` were given as, if any is a field."""
         return self._given
 
-    def __delattr__(self, name: str) -> None:
-        self.__setattr__(name, None)
-
     def __reduce__(self) -> tuple:
         if self.field:
-            return _restore_field, (*self._given.values(), self.exponent)
-        p = np.where(self.mu > 0, self.p, 1.0)
-        return _restore, (self.mu, p, self.axes)
+            mu, p, axes = self._given.values()
+            return partial(Friction, axes=axes), (mu, p, self.exponent)
+        return partial(Friction, axes=self.axes), (self.mu, np.where(self.mu > 0, self.p, 1.0))
 
     def __repr__(self) -> str:
         if self.field:
@@ -193,6 +180,13 @@ class Friction:
         """Diagonal of Q = P M^-1, largest entry 1, same shape as ``mu``; zero where ``mu`` is."""
         return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
 
+    def along_axes(self, t: np.ndarray) -> np.ndarray:
+        """Components of tangential vectors along the principal friction directions, ``shape=(n, 2)`` or ``(n, 1)``."""
+        if self.axes is None:
+            return t
+        (x, y), (cos, sin) = t.T, self.axes.T
+        return np.column_stack((cos * x + sin * y, cos * y - sin * x))
+
     def against_slip(self, r_t: np.ndarray) -> np.ndarray:
         """Unit vectors along ``P^-2 r_t``, against which nodes slip [dSFMH07, Section 1].
 
@@ -205,13 +199,12 @@ class Friction:
         p = self.p[..., : r_t.shape[1]]
         largest = np.abs(r_t).max(axis=1, keepdims=True, initial=0.0)
         unit = np.divide(r_t, largest, out=np.zeros_like(r_t), where=largest > 0)
-        if self.axes is not None:
-            cos, sin = self.axes.T
-            unit = np.stack((cos * unit[:, 0] + sin * unit[:, 1], cos * unit[:, 1] - sin * unit[:, 0]), axis=1)  # fmt: skip
+        unit = self.along_axes(unit)
         smallest = p.min(axis=-1, keepdims=True)
         softness = np.divide(smallest, p, out=np.zeros_like(p), where=p > 0) ** 2
         along = softness * unit
         if self.axes is not None:
+            cos, sin = self.axes.T
             along = np.stack((cos * along[:, 0] - sin * along[:, 1], sin * along[:, 0] + cos * along[:, 1]), axis=1)  # fmt: skip
         length = np.linalg.norm(along, axis=1, keepdims=True)
         return np.divide(along, length, out=np.zeros_like(along), where=length > 0)
@@ -232,9 +225,7 @@ class Friction:
             raise ValueError("in two dimensions there is one tangential direction: give no axes")
         if dim not in self._laws:
             mu = np.ascontiguousarray(self.mu[..., : dim - 1])
-            p = None
-            if not self.associated:
-                p = np.where(self.mu > 0, self.p, 1.0)
+            p = None if self.associated else np.where(self.mu > 0, self.p, 1.0)
             self._laws[dim] = _kernel.make_law(mu, p, dim, self.axes)
         return self._laws[dim]
 
@@ -267,19 +258,9 @@ def _unit_vectors(axes, mu: np.ndarray) -> np.ndarray:
             f"axes must be unit vectors (cos, sin), not {given[wrong][0]} of length "
             f"{length[wrong][0]}"
         )
-    unit = given.astype(np.float64) / length[:, None]
-    unit.flags.writeable = False
-    return unit
+    return frozen(given.astype(np.float64) / length[:, None])
 
 
 def is_field(value) -> bool:
     """Whether a value is a callable of positions or a DOLFINx Function."""
     return callable(value) or hasattr(value, "function_space")
-
-
-def _restore_field(mu, p, axes, k) -> Friction:
-    return Friction(mu, p, k, axes=axes)
-
-
-def _restore(mu, p, axes) -> Friction:
-    return Friction(mu, p, axes=axes)
