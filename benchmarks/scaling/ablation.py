@@ -13,6 +13,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from contextlib import ExitStack
+from functools import partial
+from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
@@ -21,7 +24,7 @@ from benchmarks.measurement import commit, now, timed
 from benchmarks.scaling.elastic_ratio import step_to
 from benchmarks.stress import matrix
 from benchmarks.stress.scenes import scenes
-from benchmarks.tables import table
+from benchmarks.tables import chosen, table
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.solvers import fixed_point, preconditioner, rigid_balance
 from dolfinx_contact.solvers.anderson import Anderson
@@ -55,17 +58,16 @@ PUNCHES = {  # case, mesh, displacements of the top face; None: the paper's firs
     "C_264435": (dict(case="C", tol=1e-10), dict(divisions=32, layers=16), None),
     "C_flat_871275": (dict(case="C", tol=1e-10, lowest=0.05), dict(divisions=48, layers=24), None),
 }
+TITLES = {key: key for key in ("scene", "without", "solved", "lost", "iterations")}
+TITLES["seconds"] = "processor seconds"
 
 
 def stress(solver, every: int):
     """Iterations and refusals on every n-th scene that has a body: name, record."""
     for scene in [scene for scene in scenes() if not scene.condensed][::every]:
         found = matrix.run(scene, solver())
-        yield (
-            f"{scene.group}: {scene.name}",
-            found["iterations"],
-            found["outcome"] in ("refused", "WRONG"),
-        )
+        lost = found["outcome"] in ("refused", "WRONG")
+        yield f"{scene.group}: {scene.name}", found["iterations"], lost
 
 
 def punch(name: str, solver):
@@ -84,16 +86,12 @@ def punch(name: str, solver):
 def without(ingredient: str, scene: str, every: int) -> dict:
     """Steps or scenes solved and refused, iterations and processor seconds."""
     options, replaced = INGREDIENTS[ingredient]
-
-    def solver():
-        return dc.FixedPoint(**options)
-
-    patches = [patch.object(*each) for each in replaced]
-    for each in patches:
-        each.start()
-    seconds, found = timed(list, stress(solver, every) if scene == "stress" else punch(scene, solver))  # fmt: skip
-    for each in patches:
-        each.stop()
+    solver = partial(dc.FixedPoint, **options)
+    with ExitStack() as stack:
+        for each in replaced:
+            stack.enter_context(patch.object(*each))
+        work = stress(solver, every) if scene == "stress" else punch(scene, solver)
+        seconds, found = timed(list, work)
     lost = [name for name, _, refused in found if refused]
     return dict(
         without=ingredient, scene=scene, every=every if scene == "stress" else 1, solved=len(found) - len(lost),
@@ -104,36 +102,22 @@ def without(ingredient: str, scene: str, every: int) -> dict:
 def main(argv=None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", choices=["stress", *PUNCHES])
-    parser.add_argument(
-        "--every", type=int, default=1, help="every n-th scene of the stress matrix only"
-    )
+    parser.add_argument("--every", type=int, default=1, help="n-th scene of the stress matrix only")
     parser.add_argument("--only", nargs="*", choices=INGREDIENTS, default=list(INGREDIENTS))
     parser.add_argument("--output", type=Path, default=Path("results/ablation.jsonl"))
     options = parser.parse_args(argv)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
     log = options.output
+    log.parent.mkdir(parents=True, exist_ok=True)
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(record["without"], record["scene"]) for record in records}
-    for scene in options.scenes:
-        for ingredient in options.only:
-            if (ingredient, scene) not in done:
-                records.append(without(ingredient, scene, options.every))
-                with log.open("a") as file:
-                    print(json.dumps(records[-1]), file=file)
-                print(ingredient, scene, records[-1]["iterations"], records[-1]["lost"], flush=True)
-    titles = ("scene", "without", "solved", "lost", "iterations", "processor seconds")
-    rows = [
-        (
-            r["scene"],
-            r["without"],
-            r["solved"],
-            len(r["lost"]),
-            r["iterations"],
-            f"{r['seconds']:.3g}",
-        )
-        for r in records
-    ]
-    print(table(titles, rows))
+    for scene, ingredient in product(options.scenes, options.only):
+        if (ingredient, scene) not in done:
+            records.append(without(ingredient, scene, options.every))
+            with log.open("a") as file:
+                print(json.dumps(records[-1]), file=file)
+            print(ingredient, scene, records[-1]["iterations"], records[-1]["lost"], flush=True)
+    shown = [r | dict(lost=len(r["lost"]), seconds=f"{r['seconds']:.3g}") for r in records]
+    print(table(TITLES.values(), (row.values() for row in chosen(shown, TITLES))))
 
 
 if __name__ == "__main__":
