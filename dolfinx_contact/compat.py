@@ -94,10 +94,14 @@ def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
         destinations = np.asarray(ranks(count, size), dtype=np.int32)
         if not hasattr(graph, "adjacencylist"):
             return dolfinx.cpp.graph.AdjacencyList_int32(destinations)
-        destinations = graph.adjacencylist(destinations)
-        return getattr(destinations, "_cpp_object", destinations)
+        return _cpp(graph.adjacencylist(destinations))
 
     return partition
+
+
+def _cpp(wrapped: Any) -> Any:
+    """The C++ object of a Python one, which some releases wrap."""
+    return getattr(wrapped, "_cpp_object", wrapped)
 
 
 def is_function_space(V) -> bool:
@@ -171,8 +175,8 @@ def _name_of(vertices):
 
 def bc_dofs(bc, size: int):
     """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
-    dofs, _ = (bc if hasattr(bc, "dof_indices") else bc._cpp_object).dof_indices()
-    return np.asarray(dofs)[np.asarray(dofs) < size]
+    dofs = np.asarray(_cpp(bc).dof_indices()[0])
+    return dofs[dofs < size]
 
 
 def bc_constants(bcs) -> list:
@@ -208,15 +212,12 @@ def petsc_vec(u: fem.Function) -> PETSc.Vec:
 
 def is_condition(bc) -> bool:
     """Whether it is what ``dirichletbc`` returns."""
-    return hasattr(
-        bc if hasattr(bc, "dof_indices") else getattr(bc, "_cpp_object", 0), "dof_indices"
-    )
+    return hasattr(_cpp(bc), "dof_indices")
 
 
 def condition_lives_on(bc, V) -> bool:
     """Whether a boundary condition is one on ``V`` or a part of it."""
-    space = bc.function_space
-    return V._cpp_object.contains(getattr(space, "_cpp_object", space))
+    return _cpp(V).contains(_cpp(bc.function_space))
 
 
 def free_garbage(comm) -> None:

@@ -87,11 +87,8 @@ def advance(
 def _increments(problem, programme, now: float, end: float, smallest: float):
     """Parameter and record of every step from ``now`` to ``end``."""
     whole, begun = end - now, now
-    parts, done, easy = (
-        1,
-        0,
-        0,
-    )  # increments are the whole over ``parts``, of which so many are done
+    # Increments are the whole over ``parts``, of which so many are done.
+    parts, done, easy = 1, 0, 0
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
         programme(at)

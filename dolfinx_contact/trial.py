@@ -23,25 +23,16 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
         step.planes.move_to(step.planes.at_rest())
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
-        if not (body.known.exact or presses(body, contacts, trial)):
+        certain = CERTAIN * body.largest(np.abs(trial))
+        if not (body.known.exact or _deepest(body, contacts, trial) > certain):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
-    if not may_touch(body, contacts, trial):
+    if not _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0:
         trial = refined(body, step, trial)
         if step.errors.within(step.tol):
             return SolverResult(trial, 0, 0.0, NOTHING)
     if step.planes is not None:
         step.planes.move_to(np.zeros(step.planes.count))
     return None
-
-
-def presses(body, contacts, trial: np.ndarray) -> bool:
-    """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
-    return _deepest(body, contacts, trial) > CERTAIN * body.largest(np.abs(trial))
-
-
-def may_touch(body, contacts, trial: np.ndarray) -> bool:
-    """Whether a displacement without reactions penetrates a plane by more than rounding."""
-    return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
 
 
 def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> float:

@@ -14,6 +14,7 @@ What double precision itself allows is estimated from the terms that cancel, tak
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -224,15 +225,6 @@ def polished(relation, start, law, target, reaction=None, near=0.0):
     return best
 
 
-@dataclass
-class _Law:
-    mu: np.ndarray
-    p: np.ndarray
-    k_n: np.ndarray
-    k_t: np.ndarray
-    K_t: np.ndarray
-
-
 def condensed(W, q, mu, p, reaction, tol) -> Verdict:
     """Judge reactions of ``w = q + W r``, ``shape=(n, d)``; slips first, the gap last.
 
@@ -246,7 +238,7 @@ def condensed(W, q, mu, p, reaction, tol) -> Verdict:
     largest = np.linalg.norm(blocks[:, :-1, :-1], 2, axis=(1, 2)) if d > 1 else np.zeros(n)
     k_t = 1 / np.maximum(largest, EPS * np.abs(W).max())
     mu, p = np.atleast_1d(np.asarray(mu, float)), np.atleast_1d(np.asarray(p, float))
-    law = _Law(mu, p, k_n, k_t, k_t[:, None, None] * np.eye(d - 1))
+    law = SimpleNamespace(mu=mu, p=p, k_n=k_n, k_t=k_t, K_t=k_t[:, None, None] * np.eye(d - 1))
     relation = ByCompliance(W, q)
     relation.start(reaction)
     _, gap, slip = (part.astype(float) for part in relation.state())

@@ -10,12 +10,8 @@ import numpy as np
 def norm(values) -> float:
     """Euclidean, without under- or overflow of squares."""
     values = np.abs(np.asarray(values, dtype=float)).ravel()
-    largest = values.max(initial=0.0)
-    return (
-        float(largest * np.linalg.norm(values / largest))
-        if 0 < largest < np.inf
-        else float(largest)
-    )
+    largest = float(values.max(initial=0.0))
+    return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
 
 
 def against(r_t, p):

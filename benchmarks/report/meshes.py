@@ -106,9 +106,7 @@ def figure(data):
         rows, orders = data[family], data["orders"][family]
         for key, name in QUANTITIES.items():
             error = column(rows, f"{key}_error")
-            error[error <= NOISE] = (
-                np.nan
-            )  # what the tolerance leaves is none of mesh or increments
+            error[error <= NOISE] = np.nan  # what the tolerance leaves is of neither of them
             said = f"{name}, order {orders[key]:.1f}" if orders.get(key) else name
             ax.plot(column(rows, "x"), error, marker=marker, label=said)
             if key == "dissipation":

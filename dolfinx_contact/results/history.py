@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.results.record import Step
 
 if TYPE_CHECKING:
@@ -66,7 +66,9 @@ class History:
             raise ValueError(f"points must have shape (m, {gdim}), got {at.shape}.")
         self._nodes = [self._nearest(point) for point in at]
         self.positions = np.array([self._at(node, self._tracked.x) for node in self._nodes])
-        self.rows: list[dict[str, Any]] = self._read(resume) if resume else []
+        self.rows: list[dict[str, Any]] = []
+        if resume:
+            self.rows = by_first_rank(self.comm, lambda _: self._rows_of_file(resume))
         self._written = 0
         if self.rows:
             self._write()
@@ -146,13 +148,6 @@ class History:
                         writer.writeheader()
                     writer.writerows(self.rows[self._written :])
         self._written = len(self.rows)
-
-    def _read(self, count: int) -> list[dict]:
-        rows = None
-        with raised_together(self.comm):
-            if self.comm.rank == 0:
-                rows = self._rows_of_file(count)
-        return self.comm.bcast(rows, root=0)
 
     def _rows_of_file(self, count: int) -> list[dict]:
         if self.path is None or not self.path.exists():

@@ -91,25 +91,16 @@ def _available() -> float:
 
 def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
     """Whether W would fit into half of the memory that rank 0 has free."""
-    enough = 2 * bytes_needed(nodes, dim, unknowns) <= _available() if comm.rank == 0 else None
-    return comm.bcast(enough, root=0)
+    return 2 * bytes_needed(nodes, dim, unknowns) <= comm.bcast(_available(), root=0)
 
 
 def check_memory(comm, needed: int) -> None:
-    available = comm.bcast(_available() if comm.rank == 0 else None, root=0)
+    available = comm.bcast(_available(), root=0)
     if needed > available:
         raise MemoryError(
             f"the condensed operator needs about {needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are "
             "free: use solver=dc.FixedPoint(), which needs none of it."
         )
-
-
-def _mumps_factors(ksp):
-    """The factors, which then take many right-hand sides at once, unless the user has chosen how many."""
-    factors = ksp.getPC().getFactorMatrix()
-    if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:
-        factors.setMumpsIcntl(*_MUMPS_BLOCK)
-    return factors
 
 
 def block_solver(ksp):
@@ -145,7 +136,10 @@ def block_solver(ksp):
         answer = PETSc.Mat().createDense(((owned, size), (None, count)), comm=comm)
         answer.setUp()
         answer.assemble()
-        _mumps_factors(ksp).matSolve(rhs, answer)
+        factors = ksp.getPC().getFactorMatrix()
+        if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen how many at once
+            factors.setMumpsIcntl(*_MUMPS_BLOCK)
+        factors.matSolve(rhs, answer)
         result = answer.getDenseArray().copy()
         for matrix in (rhs, transposed, answer):
             matrix.destroy()

@@ -153,13 +153,6 @@ class BoundFixedPoint:
         self.preconditioner.forget_tangent()
         return maps
 
-    def _set_tangent(self, derivatives) -> None:
-        """Correct with the contact linearised, see ``LoadStep.derivatives``; None is without."""
-        if derivatives is None:
-            self.preconditioner.forget_tangent()
-        else:
-            self.preconditioner.linearise(derivatives)
-
     def _accelerate(self, search, maps, x: np.ndarray, every: int) -> None:
         """Anderson's method from ``x``, until the search ends or a tangent misleads."""
         step, tangent = search.step, np.inf  # error at the last tangent
@@ -175,7 +168,9 @@ class BoundFixedPoint:
                 useless = search.error > USELESS * tangent
                 # not where the end is as near as the last tangent is behind
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
-                    self._set_tangent(None if useless else step.derivatives(x, maps))
+                    self.preconditioner.forget_tangent()
+                    if not useless:
+                        self.preconditioner.linearise(step.derivatives(x, maps))
                     anderson.restart()
                     smallest = np.inf
                 tangent = np.inf if useless else search.error

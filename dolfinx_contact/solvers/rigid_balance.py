@@ -51,11 +51,8 @@ class RigidBalance:
         root = _inverse_root(all_energy)
         share, vectors = np.linalg.eigh(root.T @ (energy + energy.T) @ root / 2)
         soft = root @ vectors[:, share < 1 / STIFFENED]
-        self.modes, self.forces, self._energy = (
-            modes @ soft,
-            forces @ soft,
-            soft.T @ energy @ soft,
-        )
+        self.modes, self.forces = modes @ soft, forces @ soft
+        self._energy = soft.T @ energy @ soft
         self._scale = 1 / np.sqrt(A.getDiagonal().array_r) if len(self) else None
 
     def __len__(self) -> int:

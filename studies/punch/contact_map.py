@@ -21,9 +21,8 @@ ZONES = {  # orange, blue and hatching: for all eyes, and in black and white
     REVERSE: dict(facecolor="#c25700", edgecolor="#c25700", label="slip inwards, $f=0$"),
     OPEN: dict(facecolor="white", edgecolor="#888888", hatch="////", label="open"),
 }
-STICKING = ListedColormap(
-    colormaps["Blues_r"](np.linspace(0, 0.72, 256))
-)  # blue up to f = 0, as in the legend
+# Blue up to f = 0, as in the legend.
+STICKING = ListedColormap(colormaps["Blues_r"](np.linspace(0, 0.72, 256)))
 HANDLES = [Patch(**style) for style in ZONES.values()]
 LEGEND = dict(handles=HANDLES, loc="outside lower center", ncols=4, frameon=False)
 
@@ -40,9 +39,8 @@ class ContactMap(NamedTuple):
     slip_increment: np.ndarray  # (n, 2) mm
     status: np.ndarray  # (n,)
     load_function: np.ndarray  # (n,) N
-    nodal_area: np.ndarray | None = (
-        None  # (n,) mm^2; None: that of the quarters, as good in first order
-    )
+    # (n,) mm^2; None: that of the quarters, as good in first order
+    nodal_area: np.ndarray | None = None
 
     def quarters(self) -> np.ndarray:
         """Four quarters of each face, ``shape=(m, 4, 4, 2)``: quarter i belongs to its node i.

@@ -64,15 +64,10 @@ class EnergyBalance:
         self.open()
         u1, r1, gap1, work1, W1, force1, depth1 = self.state
         moved, slip = depth1 - depth0, self.punch.contact.slip_increment
-        nodal = (
-            -r1[:, :2] * slip,
-            -0.5 * (r0 + r1)[:, :2] * slip,
-            r1[:, 2] * gap0,
-            r0[:, 2] * gap1,
-            work1 - work0,
-        )
+        frictions = -r1[:, :2] * slip, -0.5 * (r0 + r1)[:, :2] * slip, work1 - work0
+        nodal = (*frictions, r1[:, 2] * gap0, r0[:, 2] * gap1)
         sums = self.punch.comm.allreduce(np.array([values.sum() for values in nodal]))
-        end, mean, closing, opening, friction = sums
+        end, mean, friction, closing, opening = sums
         terms = {
             "elastic_change": W1 - W0,
             "dissipation_end": end,
