@@ -53,32 +53,27 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
 
     __version__: str
 
-_HOME = {  # the module of every name
-    "CondensedNewton": "solvers.condensed_newton",
-    "CondensedNotConverged": "solvers.condensed_result",
-    "CondensedResult": "solvers.condensed_result",
-    "Contact": "contact.contact",
-    "ContactProblem": "problem",
-    "Counts": "results.record",
-    "FixedPoint": "solvers.fixed_point",
-    "Friction": "law.friction",
-    "History": "results.history",
-    "LinearSolverError": "petsc.linear_solver",
-    "NotConverged": "results.record",
-    "RigidCylinder": "contact.curved",
-    "RigidPlane": "contact.plane",
-    "RigidSphere": "contact.curved",
-    "RoundingWarning": "checks",
-    "SparseNewton": "solvers.sparse_newton",
-    "Status": "contact.history",
-    "Step": "results.record",
-    "Wear": "law.wear",
-    "advance": "increments",
-    "bipotential_gap": "law.bipotential",
-    "load_function": "law.friction_cone",
-    "project_cone": "law.friction_cone",
-    "solve_condensed": "solvers.condensed_newton",
+_NAMES = {  # by their module
+    "checks": ["RoundingWarning"],
+    "contact.contact": ["Contact"],
+    "contact.curved": ["RigidCylinder", "RigidSphere"],
+    "contact.history": ["Status"],
+    "contact.plane": ["RigidPlane"],
+    "increments": ["advance"],
+    "law.bipotential": ["bipotential_gap"],
+    "law.friction": ["Friction"],
+    "law.friction_cone": ["load_function", "project_cone"],
+    "law.wear": ["Wear"],
+    "petsc.linear_solver": ["LinearSolverError"],
+    "problem": ["ContactProblem"],
+    "results.history": ["History"],
+    "results.record": ["Counts", "NotConverged", "Step"],
+    "solvers.condensed_newton": ["CondensedNewton", "solve_condensed"],
+    "solvers.condensed_result": ["CondensedNotConverged", "CondensedResult"],
+    "solvers.fixed_point": ["FixedPoint"],
+    "solvers.sparse_newton": ["SparseNewton"],
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = list(_HOME)
 
 

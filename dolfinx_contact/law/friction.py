@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.checks import finite
 
 Field = Callable[[Any], Any]  # or a DOLFINx Function, which this module does not know
 
@@ -42,25 +43,15 @@ def _cone(given: ArrayLike) -> np.ndarray:
 
 def _coefficients(name: str, value) -> np.ndarray:
     """``value`` as a finite float64 array of shape (), (2,) or (n, 2), or a ``ValueError``."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        raise ValueError(
-            f"{name} must be numbers in an array without gaps, not {value!r}"
-        ) from None
-    has_bool = array.size < 4 and any(
-        isinstance(i, bool) for i in np.ravel(np.array(value, object))
-    )
-    if has_bool or array.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must be real numbers, not {value!r} of type {array.dtype}")
+    array = finite(name, value)
+    if array.size < 4 and any(isinstance(i, bool) for i in np.ravel(np.array(value, object))):
+        raise ValueError(f"{name} must be real numbers, not {value!r}")
     if array.shape != () and not (array.ndim in (1, 2) and array.shape[-1] == 2):
         raise ValueError(
             f"{name} must be one number, a pair, or an array of shape (n, 2) with a pair per node, "
             f"not of shape {array.shape}: {value!r}"
         )
-    if not np.all(np.isfinite(array)):
-        raise ValueError(f"{name} must be finite, not {value!r}")
-    return array.astype(np.float64)
+    return array
 
 
 class Friction(Guarded):
@@ -233,11 +224,9 @@ class Friction(Guarded):
 def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
     """Q = P M^-1 up to a factor for ``p_y / p_x = (mu_y / mu_x)**k``, by logarithms: the powers alone
     could overflow."""
-    exponent = np.asarray(k)
-    if exponent.dtype.kind not in "iuf" or exponent.shape != ():
+    exponent = finite("k", k)
+    if exponent.shape != ():
         raise ValueError(f"k must be one real number, not {k!r}")
-    if not np.isfinite(exponent):
-        raise ValueError(f"k must be finite, not {k!r}")
     positive = np.where(mu > 0, mu, 1.0)
     log_q = (float(exponent) - 1.0) * np.log(positive)
     return np.exp(log_q - log_q.max(axis=-1, keepdims=True))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.checks import finite
 
 
 class Wear(Guarded):
@@ -27,14 +28,13 @@ class Wear(Guarded):
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
 
     def __init__(self, coefficient: ArrayLike) -> None:
-        array = np.asarray(coefficient)
-        real = array.dtype.kind in "iuf" and array.shape in ((), (1,), (2,))
-        if not real or not np.isfinite(array).all() or (array < 0).any():
+        array = finite("wear coefficient", coefficient)
+        if array.shape not in ((), (1,), (2,)) or (array < 0).any():
             raise ValueError(
                 "wear coefficient must be a number or a pair of numbers >= 0, volume per work; got "
                 f"{coefficient!r}."
             )
-        self.coefficient = frozen(array.astype(np.float64))
+        self.coefficient = frozen(array)
         self._made = True
 
     def depth(self, work: np.ndarray, area: np.ndarray) -> np.ndarray:
