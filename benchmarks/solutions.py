@@ -116,11 +116,7 @@ def examine(make, programme: list, starts: list[int]) -> None:
 def punch(solver):
     """The coarse punch."""
     made = Punch(Parameters(refine=-1, tol=TOL), solver=solver, friction=CROSSED)
-
-    def move(top):
-        made.approach.value = -top
-
-    return made.problem, move
+    return made.problem, made.move_top
 
 
 def block(solver):

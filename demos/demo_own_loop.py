@@ -62,7 +62,7 @@ def compare(case: str = "C", displacements=(0.05, 0.1, 0.07)) -> float:
     loop = OwnLoop(own.F, own.u, own.contact, own.bcs)
     differences = []
     for displacement in displacements:
-        own.approach.value = -displacement
+        own.move_top(displacement)
         iterations = loop.solve(tol=1e-13)
         record = reference.press(displacement)
         found, expected = everywhere(own.contact.reaction, reference.contact.reaction)

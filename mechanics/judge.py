@@ -167,18 +167,19 @@ class Body:
     def _compare(self, found, reaction, state, errors, tol, scratch):
         """Distance from a tight solution that starts at the state, and if asked for from another one."""
         target = TIGHT * tol * max(found.contact_scale, 0.0)
-        starts = [self.relation.start] + scratch * [self.relation.start_closed]
-        distances = []
-        for k, start in enumerate(starts):
-            tight = polished(self.relation, lambda s=start: s(*state), self, target)
-            if tight is None and k == 0:
-                found.notes.append("no tight solution was found from this state")
-            distances.append(np.nan if tight is None else norm(tight - reaction))
-            if tight is not None and k == 0:
-                found.allowances["reactions"] += self._response(errors)
-        found.defects["reactions"] = np.inf if np.isnan(distances[0]) else np.nanmax(distances)
-        if scratch and not np.isnan(distances[1]):
-            found.from_scratch = distances[1]
+
+        def distance(start) -> float:
+            tight = polished(self.relation, lambda: start(*state), self, target)
+            return np.nan if tight is None else norm(tight - reaction)
+
+        near = distance(self.relation.start)
+        if np.isnan(near):
+            found.notes.append("no tight solution was found from this state")
+        else:
+            found.allowances["reactions"] += self._response(errors)
+        far = distance(self.relation.start_closed) if scratch else np.nan
+        found.defects["reactions"] = np.inf if np.isnan(near) else np.fmax(near, far)
+        found.from_scratch = None if np.isnan(far) else far
 
     def _response(self, errors) -> float:
         """Change of the tight reactions when each term is wrong by its rounding, signs at random."""

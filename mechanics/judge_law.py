@@ -17,10 +17,10 @@ def norm(values) -> float:
 def against(r_t, p):
     """Unit vectors along P^-2 r_t, against which nodes slip; zero without a tangential force."""
     d = r_t / (p / np.max(p)) ** 2
-    for _ in range(2):  # first to order one, so that no square under- or overflows
-        size = np.abs(d).max(axis=1, keepdims=True) if _ == 0 else np.sqrt((d**2).sum(axis=1, keepdims=True))  # fmt: skip
-        d = d / np.where(size > 0, size, 1)
-    return d
+    largest = np.abs(d).max(axis=1, keepdims=True)
+    d = d / np.where(largest > 0, largest, 1)  # of order one, so that no square under- or overflows
+    length = np.sqrt((d**2).sum(axis=1, keepdims=True))
+    return d / np.where(length > 0, length, 1)
 
 
 def law_defects(r, gap, slip, k_n, K_t, mu, p):

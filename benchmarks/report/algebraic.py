@@ -45,11 +45,7 @@ def opened(name: str, solver, tol: float, mesh: dict):
     """A problem, a function that moves what is prescribed, and its load steps."""
     if name in CASES:
         punch = Punch(Parameters(case=name, tol=tol), solver=solver, **mesh)
-
-        def move(displacement):
-            punch.approach.value = -displacement
-
-        return punch.problem, move, programme(punch.parameters)
+        return punch.problem, punch.move_top, programme(punch.parameters)
     body, of, _ = EXTREMES[name]
     built = build(**body)
     return problem_of(built, solver, tol), built.move_top, PROGRAMMES[of]

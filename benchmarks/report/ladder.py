@@ -78,7 +78,8 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
     seconds, iterations, before = [], [], peak_memory(anew=True)
     PETSc.Log.begin()
     for k, displacement in enumerate(programme(punch.parameters)[:steps]):
-        punch.approach.value, scale.value = -displacement, 1.0 + 1e-3 * k
+        punch.move_top(displacement)
+        scale.value = 1.0 + 1e-3 * k
         spent, (count, solver) = timed(solved)
         seconds.append(spent)
         iterations.append(count)

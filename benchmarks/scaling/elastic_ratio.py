@@ -37,7 +37,7 @@ UNLOADING, CYCLE = 5, 15  # the first step of unloading, and the steps of a cycl
 def elastic_solve(punch, displacement: float, repeat: int) -> dict:
     """Iterations and seconds of K u = b by conjugate gradients with multigrid, to 1e-10 from zero."""
     body, seconds = punch.problem.body, []
-    punch.approach.value = -displacement
+    punch.move_top(displacement)
     body.refresh()
     b, _ = body.load()
     solver = LinearSolver(body.K, MULTIGRID | {"ksp_rtol": 1e-10}, "yardstick_", body.rigid_modes)
@@ -55,7 +55,7 @@ def slowest(seconds: float) -> float:
 
 def step_to(punch, displacement: float) -> dict:
     """What a record has of a step; of one that was refused, what it said."""
-    punch.approach.value = -displacement
+    punch.move_top(displacement)
     try:
         step = punch.problem.solve()
     except (dc.NotConverged, MemoryError) as failure:

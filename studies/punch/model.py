@@ -127,9 +127,13 @@ class Punch:
             return [down, fix(0, 0, centre), fix(1, 0, centre), fix(1, 0, rim)]
         raise ValueError(f'top must be "bonded" or "free", got {self.parameters.top!r}.')
 
-    def press(self, displacement: float) -> dict:
-        """Move the top face to ``displacement`` mm below its first position: one load step; what is said of it."""
+    def move_top(self, displacement: float) -> None:
+        """Move the top face to ``displacement`` mm below its first position."""
         self.approach.value = -displacement
+
+    def press(self, displacement: float) -> dict:
+        """Move the top face: one load step; what is said of it."""
+        self.move_top(displacement)
         step = self.problem.solve()
         contact = self.contact
         tangential = np.linalg.norm(contact.reaction[:, :2], axis=1).sum()

@@ -100,14 +100,14 @@ def compute(parameters, directory, points=(), bar=None, **mesh_options) -> str:
     positions = [(*xy, 0.0) for xy in (parameters.target, *points)]
     if done:
         punch.problem.load(_checkpoint(directory, done))
-        punch.approach.value = -displacements[done - 1]
+        punch.move_top(displacements[done - 1])
     else:
         _begin(punch, directory, settings)
     COMM.barrier()
     history = dc.History(punch.problem, directory / "history.csv", positions, resume=done)
     for number, displacement in enumerate(displacements[done:], start=done + 1):
         balance.open()
-        punch.approach.value = -displacement
+        punch.move_top(displacement)
         try:
             step = punch.problem.solve()
         except dc.NotConverged as error:
