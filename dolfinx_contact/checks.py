@@ -24,7 +24,7 @@ def finite(name: str, value) -> np.ndarray:
     except ValueError:
         raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} contains NaN or infinity: {value!r}.")
+        raise ValueError(f"{name} must be finite, but contains NaN or infinity: {value!r}.")
     return array.astype(np.float64)
 
 
