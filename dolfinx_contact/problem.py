@@ -44,7 +44,7 @@ from dolfinx_contact.results.record import (
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
-from dolfinx_contact.trial import without_reactions
+from dolfinx_contact.trial import floating, without_reactions
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -69,6 +69,8 @@ class ContactProblem(ProblemStates):
         before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
             ``state``, and changes no ``state``.  ``J`` has to be given.
         after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
+        undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
+            "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
@@ -104,6 +106,7 @@ class ContactProblem(ProblemStates):
         state: Sequence[fem.Function] = (),
         before_residual: Callable[[fem.Function], object] | None = None,
         after_step: Callable[[fem.Function], object] | None = None,
+        undetermined: str = "refused",
     ) -> None:
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
@@ -112,10 +115,11 @@ class ContactProblem(ProblemStates):
             self.contacts = checked_contacts(contacts, u)
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
+            self.undetermined = undetermined
             petsc_options = checked_options(petsc_options)
             self._variables = InternalVariables(state, after_step)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
-        agree(comm, solver=self.solver, tol=self.tol)
+        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
         self.u, self.monitor = u, None
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual)
         hold(self.contacts, self.body)
@@ -232,14 +236,36 @@ class ContactProblem(ProblemStates):
         step = self.load_step()
         if step.planes is not None and step.planes.beyond(given=True):
             return step, self._unmoved(step)
+        if self.body.loose is not None:
+            return step, self._search_loose(step)
         found = None
         if not self.body.nonlinear:
             found = without_reactions(self.body, self.contacts, step)
-        if found is None:
-            with stage("contact: iterations"):
-                found = self.bound().solve(step)
-            step.measure(found.x)
-        return step, found
+        return step, found or self._solved(step)
+
+    def _solved(self, step: LoadStep) -> SolverResult:
+        with stage("contact: iterations"):
+            found = self.bound().solve(step)
+        step.measure(found.x)
+        return found
+
+    def _search_loose(self, step: LoadStep) -> SolverResult:
+        """As ``_search``, of a body that contact alone holds."""
+        from dolfinx_contact.statics import Statics
+
+        last = self._states[0]
+        step.statics = Statics(self.body, self.contacts, step, last)
+        if step.statics.said:
+            return self._unmoved(step)
+        found = None
+        if not step.statics.loads.any():
+            found = floating(self.body, self.contacts, step, last)
+        if not any(contact.last.reaction.any() for contact in self.contacts):
+            step.statics.place()
+        found = found or self._solved(step)
+        if not step.errors.within(step.tol):
+            return found
+        return found._replace(x=step.statics.settled(step, found.x, self.undetermined))
 
     def _unmoved(self, step: LoadStep) -> SolverResult:
         """The last displacement with the present boundary values, judged as what it is: no solution."""
@@ -250,7 +276,9 @@ class ContactProblem(ProblemStates):
 
     def _advice(self, step: LoadStep) -> str:
         """What to do about a step that did not converge.  Collective."""
-        slides = "" if step.planes is None else step.planes.beyond(True) or step.planes.beyond()
+        slides = "" if step.statics is None else step.statics.said
+        if step.planes is not None:
+            slides = slides or step.planes.beyond(True) or step.planes.beyond()
         return f"{slides}." if slides else "Smaller load steps help most often."
 
     def _unbind(self) -> None:

@@ -21,6 +21,9 @@ from dolfinx_contact.solvers.base import Solver
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
 
+# What to do where a motion of a body that contact alone holds is undetermined.
+UNDETERMINED = ("refused", "nearest")
+
 
 def checked_contacts(contacts, u) -> tuple[Contact, ...]:
     """The contacts, each on the space of ``u``, no node in two of them."""
@@ -196,8 +199,8 @@ class ProblemOptions(Guarded):
     """Solver and tolerance of a ``ContactProblem``, which may be exchanged between steps; the rest stays."""
 
     monitor: Callable[[int, float, Counts], object] | None
-    _settable = ("monitor", "solver", "tol")
-    _remedy = "monitor, solver and tol may be changed between steps; for anything else make a new ContactProblem."
+    _settable = ("monitor", "solver", "tol", "undetermined")
+    _remedy = "monitor, solver, tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     @property
     def solver(self) -> Solver:
@@ -216,6 +219,17 @@ class ProblemOptions(Guarded):
     @tol.setter
     def tol(self, tol: float) -> None:
         self._tol = checked_tolerance(tol)
+
+    @property
+    def undetermined(self) -> str:
+        """What to do with rigid motions that nothing determines, "refused" or "nearest"; may change between steps, on all ranks."""
+        return self._undetermined
+
+    @undetermined.setter
+    def undetermined(self, choice: str) -> None:
+        if choice not in UNDETERMINED:
+            raise ValueError(f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}.")
+        self._undetermined = choice
 
     def __repr__(self) -> str:
         nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"

@@ -48,12 +48,14 @@ class LoadStep:
 
     Attributes:
         planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
+        statics: ``Statics`` of a body that contact alone holds, else None.
     """
 
     def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
         self.planes = driven_planes(body, contacts)
+        self.statics = None
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before = None  # reactions of the state judged before
         self._told = 0
@@ -71,6 +73,8 @@ class LoadStep:
         normal of the cone, takes an extrapolation for worse than it is.
         """
         guesses = [start.copy() for start in self._starts]
+        if self.statics is not None:
+            guesses.append(self.statics.start.copy())
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]

@@ -23,16 +23,38 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
         step.planes.move_to(step.planes.at_rest())
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
-        certain = CERTAIN * body.largest(np.abs(trial))
-        if not (body.known.exact or _deepest(body, contacts, trial) > certain):
+        if not (body.known.exact or presses(body, contacts, trial)):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
-    if not _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0:
+    if not may_touch(body, contacts, trial):
         trial = refined(body, step, trial)
         if step.errors.within(step.tol):
             return SolverResult(trial, 0, 0.0, NOTHING)
     if step.planes is not None:
         step.planes.move_to(np.zeros(step.planes.count))
     return None
+
+
+def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
+    """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
+
+    None where it touches.
+    """
+    x = last.copy()
+    x[body.fixed] = step.b[body.fixed]
+    x += body.solve(step.forces(x))
+    if may_touch(body, contacts, x) or not step.measure_open(x).within(step.tol):
+        return None
+    return SolverResult(x, 0, 0.0, NOTHING)
+
+
+def presses(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
+    return _deepest(body, contacts, trial) > CERTAIN * body.largest(np.abs(trial))
+
+
+def may_touch(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions penetrates a plane by more than rounding."""
+    return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
 
 
 def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> float:

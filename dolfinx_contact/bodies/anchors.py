@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A body that soft springs hold, held well by springs of its own whose forces are taken back."""
+"""A body that soft springs or contact alone hold, held well by springs of its own whose forces are taken back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Anchors:
 
     Solving with ``K`` passes through displacements of the size of force over spring. ``A = K + E a E^T`` holds the
     body; ``K u = f`` is ``A u = f + E s`` with the forces ``s = a E^T u`` that undo the springs, one unknown and
-    one equation more a spring.
+    one equation more a spring.  Where contact alone holds the body these equations are its equilibrium of forces and moments.
 
     Args:
         body: ElasticBody with its assembled stiffness and ``soft`` motions, at least one.  Collective.
@@ -24,6 +24,7 @@ class Anchors:
         dofs: Those with a spring that this rank owns, ``shape=(m,)``.
         stiffness: ``a`` of each, ``shape=(m,)``, force per length.
         count: Number of springs of all ranks.
+        solver: The linear solver of A.
     """
 
     def __init__(self, body):
@@ -35,17 +36,17 @@ class Anchors:
         added.array_w[:] = 0.0
         added.array_w[self.dofs] = self.stiffness
         A.setDiagonal(added, addv=True)
-        self._solver: LinearSolver = body.solver(A)
+        self.solver: LinearSolver = body.solver(A)
         A.destroy()  # the solver has its own reference
 
     @property
     def ksp(self):
         """The linear solver of A, for many right-hand sides at a time."""
-        return self._solver.ksp
+        return self.solver.ksp
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """A^-1 b; arrays of owned degrees of freedom."""
-        return self._solver.solve(b)
+        return self.solver.solve(b)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """A x; arrays of owned degrees of freedom."""
@@ -55,7 +56,7 @@ class Anchors:
 
     def destroy(self) -> None:
         """Free the factors.  Collective."""
-        self._solver.destroy()
+        self.solver.destroy()
 
 
 def _pivots(modes: np.ndarray, comm) -> np.ndarray:

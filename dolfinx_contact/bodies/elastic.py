@@ -35,6 +35,7 @@ class ElasticBody(OverRanks):
     """
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
+    loose = None  # ``LooseMotions``, where rigid motions cost nothing
 
     def __init__(self, F, u, bcs, derivative, petsc_options=None, petsc_options_prefix=None):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
@@ -79,7 +80,7 @@ class ElasticBody(OverRanks):
             checks.check_diagonal(self.diagonal(), self.V)
         checks.check_dilation(self)
         self._hold()
-        self.soft = rigid_motion.soft_motions(self)
+        self.soft, self.loose = rigid_motion.soft_motions(self)
         self._digest = digest
         return self._assemblies
 
@@ -222,12 +223,12 @@ class ElasticBody(OverRanks):
     # -- solves --------------------------------------------------------------------------------
 
     def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
-        """K^-1 b; the solver is set up at the first call and kept while K stands."""
+        """K^-1 b, of a loose body the solution that its anchors hold; the solver is kept while K stands."""
         return self._own_solver().solve(b, rough, start)
 
     def _own_solver(self) -> LinearSolver:
         if self._elastic is None:
-            self._elastic = self.solver(self.K)
+            self._elastic = self.anchors.solver if self.loose else self.solver(self.K)
             if self.options is not None and not self._said:
                 self._said = True
                 checks.warn_of_unread(self._elastic.unread)
@@ -259,10 +260,9 @@ class ElasticBody(OverRanks):
 
     def forget_solver(self) -> None:
         """Set the solver of K up anew when it is next needed.  Collective."""
-        if self._elastic is not None:
-            self._elastic.destroy()
-        if self._anchors is not None:
-            self._anchors.destroy()
+        for part in (self._elastic, self._anchors):
+            if part is not None:
+                part.destroy()
         self._elastic = self._anchors = None
 
     @property

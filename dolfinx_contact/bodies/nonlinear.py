@@ -101,7 +101,12 @@ class NonlinearBody(ElasticBody):
             with raised_together(self.comm):
                 check_diagonal(self.diagonal(), self.V)
             if self.soft is None:
-                self.soft = rigid_motion.soft_motions(self)
+                self.soft, loose = rigid_motion.soft_motions(self)
+                if loose is not None:
+                    raise ValueError(
+                        f"{loose.refusal()} Contact alone does not hold a body whose F is not linear in u: fix it by "
+                        "Dirichlet conditions, or add a soft spring to F."
+                    )
         return self._assemblies
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:

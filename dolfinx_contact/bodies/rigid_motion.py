@@ -7,6 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
+from dolfinx_contact.bodies.loose import LooseMotions, LoosePart
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
@@ -15,31 +16,29 @@ ROUNDING = 1e-13
 SOFT = 1e-4
 
 
-def soft_motions(body) -> np.ndarray:
+def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
     """Rigid motions of a part of the body that cost next to no energy.
 
-    Every connected part of the mesh is tried: the rigid motions that the boundary conditions
-    leave free must cost energy, which a spring in F gives them.
+    Every connected part of the mesh is tried: a spring in F gives energy to the rigid motions that the boundary
+    conditions leave free.
 
     Args:
         body: ElasticBody with its assembled stiffness.  Collective.
 
     Returns:
-        ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.
-
-    Raises:
-        ValueError: on all ranks, if a motion costs nothing, with the number of free motions and where
-            the part is.
+        ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.  Of these,
+        those that cost nothing, which contact alone can hold; None where all cost something.
     """
     gdim = body.V.mesh.geometry.dim
     x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
     part, parts = _connected_parts(body.V, body.comm)
-    diagonal, soft = body.diagonal(), [np.zeros((body.size, 0))]
+    diagonal, soft, loose = body.diagonal(), [np.zeros((body.size, 0))], []
     for k in range(parts):
         modes = rigid_modes(x, part[: x.shape[0]] == k, body.comm)
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
-        free = modes @ vectors[:, values <= ROUNDING * values[-1]]
+        left_free = vectors[:, values <= ROUNDING * values[-1]]
+        free = modes @ left_free
         if free.shape[1] == 0:
             continue
         free[body.fixed] = 0.0
@@ -49,13 +48,21 @@ def soft_motions(body) -> np.ndarray:
         relative, vectors = np.linalg.eigh(root @ (energy + energy.T) / 2 @ root.T)
         if relative[0] < ROUNDING:
             where = f"one of its {parts} separate parts" if parts > 1 else "the body"
-            raise ValueError(
-                f"nothing holds {where}: {int((relative < ROUNDING).sum())} rigid motion(s) are left "
-                "free by the boundary conditions and cost no energy. Contact alone does not hold it "
-                "here: fix it by Dirichlet conditions, or add a soft spring to F."
-            )
+            turned = root.T @ vectors[:, relative < ROUNDING]
+            combination = left_free @ turned
+            middle, size = box(x, part[: x.shape[0]] == k, body.comm)
+            loose.append(LoosePart(where, free @ turned, combination, middle, size))
         soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
-    return np.concatenate(soft, axis=1)
+    return np.concatenate(soft, axis=1), LooseMotions(loose) if loose else None
+
+
+def box(x: np.ndarray, here: np.ndarray, comm) -> tuple[np.ndarray, float]:
+    """Middle and largest edge of the box around the nodes ``here``.  Collective."""
+    low = x[here].min(axis=0, initial=np.inf)
+    high = x[here].max(axis=0, initial=-np.inf)
+    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    return (low + high) / 2, (high - low).max()
 
 
 def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
@@ -64,11 +71,8 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
     ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.
     """
     n, gdim = x.shape
-    low = x[here].min(axis=0, initial=np.inf)
-    high = x[here].max(axis=0, initial=-np.inf)
-    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-    x = (x - (low + high) / 2) / (high - low).max()
+    middle, size = box(x, here, comm)
+    x = (x - middle) / size
     pairs = [(i, j) for i in range(gdim) for j in range(i)]
     modes = np.zeros((n, gdim, gdim + len(pairs)))
     modes[:, range(gdim), range(gdim)] = 1.0

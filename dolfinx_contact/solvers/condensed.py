@@ -20,6 +20,8 @@ from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 
+UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
+
 KEPT = 64  # earlier steps: more than a cycle has
 
 
@@ -68,8 +70,7 @@ class CondensedBody:
                 inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
                 share = 1 - len(inert) / size
                 W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
-                last = range(size, len(W))
-                W[last, last] -= 1 / a
+                _tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
                 W = self._planes.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
@@ -104,15 +105,20 @@ class CondensedBody:
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
         self._planes.begin(step, free)
         q = self._motion(step, free)
-        starts, iterations, error, rounding = self._starts(q), 0, np.inf, 0.0
+        placed, starts = np.zeros(q.size), self._starts(q)
+        rows = q
+        if step.statics is not None:
+            q, placed = self._placed(step, free)
+        iterations, error, rounding = 0, np.inf, 0.0
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             previous = error
             for fallbacks in (True,) if step.planes is None else (False, True):
                 goal = factor * step.tol
-                result = self._reactions(step, q + rounding, goal, starts, acting, fallbacks)
+                near = [start - placed for start in starts]
+                result = self._reactions(step, q + rounding, goal, near, acting, fallbacks)
                 iterations += result.iterations
-                force = np.concatenate((result.reaction.ravel(), result.tied))
+                force = placed + np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
                 self._planes.move(step, force)
                 error = step.measure(x).largest
@@ -135,9 +141,20 @@ class CondensedBody:
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result = best
         self._planes.move(step, force)
-        self.past.append((q, force, self._tied))
+        self.past.append((rows, force, self._tied))
         forward = max(result.change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+
+    def _placed(self, step, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of a loose body: q where it stands at first, and the forces of all rows that hold it there."""
+        first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
+        anchors, rows = slice(first, first + self._anchored), self._parts[1]
+        placed = np.zeros(first + self._tied)
+        held = rows.gather(rows.of(step.statics.start))
+        placed[anchors] = stiffness[: self._anchored] * held
+        q = self._motion(step, self.displacement(free, placed))
+        q[anchors] -= held
+        return q, placed
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
@@ -265,6 +282,22 @@ class CondensedBody:
             for name in ("mu", "p")
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
+
+
+def _tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
+    """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
+
+    Where all springs are at motions without energy their block has to vanish.  What is left for it is put along motions
+    of the anchors that no node feels, which keeps those where they are.
+    """
+    last = slice(size, len(W))
+    W[last, last] -= np.diag(1 / a)
+    if loose:
+        root = np.sqrt(a)
+        _, values, vectors = np.linalg.svd(np.linalg.qr(W[:size, last] * root, mode="r"))
+        values = np.append(values, np.zeros(len(a) - len(values)))
+        unfelt = vectors[values <= UNFELT * values[0]].T / root[:, None]
+        W[last, last] = -unfelt @ unfelt.T
 
 
 def components(contacts) -> int:

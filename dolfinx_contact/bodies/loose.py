@@ -1,0 +1,102 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Rigid motions of a body that cost no energy: contact alone can hold them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+# What is smaller than this part of the largest component is not said of a motion.
+SAID = 1e-3
+
+
+class LoosePart(NamedTuple):
+    """A connected part of a body, and its motions that cost no energy."""
+
+    where: str
+    modes: np.ndarray  # (owned dofs, k)
+    combination: np.ndarray  # of translations and rotations, as of ``rigid_modes``
+    middle: np.ndarray  # about which these turn
+    size: float  # unit of length of rotations
+
+
+class LooseMotions:
+    """All of them.
+
+    Args:
+        parts: The parts of the body that have such motions, at least one.
+
+    Attributes:
+        modes: ``Z``, ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``K Z = 0``.
+    """
+
+    def __init__(self, parts: list[LoosePart]):
+        self._parts, self.modes = parts, np.concatenate([part.modes for part in parts], axis=1)
+        self._combination = block_diag(*(part.combination for part in parts))
+
+    def refusal(self, motions: np.ndarray | None = None) -> str:
+        """What to say where nothing holds some motions ``Z motions``, ``shape=(m, k)``; None is all."""
+        motions = np.eye(self.modes.shape[1]) if motions is None else motions
+        rows = self._simplest(motions)
+        said = "; ".join(self._words(row) for row in rows)
+        return f"nothing holds {self._part_of(rows[0])[0].where}: {len(rows)} rigid motion(s) are left free, {said}."
+
+    def words(self, c: np.ndarray) -> str:
+        """A motion ``Z c`` in words."""
+        return self._words(self._combination @ c)
+
+    def _words(self, amounts: np.ndarray) -> str:
+        part, amounts = self._part_of(amounts)
+        gdim = part.middle.size
+        along, turning = amounts[:gdim], _rotation(amounts[gdim:]) / part.size
+        of = "" if part.where == "the body" else f" of {part.where}"
+        if np.linalg.norm(turning) * part.size < SAID * np.linalg.norm(along):
+            return f"a translation along {_rounded(along)}{of}"
+        axis = turning / np.linalg.norm(turning)
+        arm = np.cross(axis, np.append(along, np.zeros(3 - gdim))) / np.linalg.norm(turning)
+        at = part.middle + arm[:gdim]
+        at[np.abs(at) < SAID * part.size] = 0.0
+        about = f"({', '.join(f'{x:.4g}' for x in at)}){of}"
+        return f"a rotation about {'' if gdim == 2 else f'the axis {_rounded(axis)} through '}{about}"
+
+    def _simplest(self, motions: np.ndarray) -> np.ndarray:
+        """Amounts of motions that span the same: translations, and as few others as there have to be, one a row."""
+        gdim = self._parts[0].middle.size
+        rows = (self._combination @ motions).T
+        each = rows.shape[1] // len(self._parts)
+        turning = np.arange(rows.shape[1]) % each >= gdim
+        done = 0
+        for column in (*np.flatnonzero(turning), *np.flatnonzero(~turning)):
+            if done == len(rows):
+                break
+            largest = done + int(np.abs(rows[done:, column]).argmax())
+            if abs(rows[largest, column]) < SAID * np.abs(rows).max():
+                continue
+            rows[[done, largest]] = rows[[largest, done]]
+            rows[done] /= rows[done, column]
+            others = np.arange(len(rows)) != done
+            rows[others] -= np.outer(rows[others, column], rows[done])
+            done += 1
+        return rows
+
+    def _part_of(self, amounts: np.ndarray) -> tuple[LoosePart, np.ndarray]:
+        """The part that moves most, and its amounts."""
+        shares = np.split(amounts, len(self._parts))
+        k = int(np.argmax([np.linalg.norm(share) for share in shares]))
+        return self._parts[k], shares[k]
+
+
+def _rotation(amounts: np.ndarray) -> np.ndarray:
+    """Vector of a rotation from the amounts of ``rigid_modes``."""
+    if amounts.size == 1:
+        return np.array([0.0, 0.0, -amounts[0]])
+    about_z, about_y, about_x = amounts
+    return np.array([-about_x, about_y, -about_z])
+
+
+def _rounded(vector: np.ndarray) -> str:
+    vector = vector / np.linalg.norm(vector)
+    return f"({', '.join(f'{x:.3g}' for x in np.where(np.abs(vector) < SAID, 0.0, vector))})"

@@ -1,0 +1,216 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Statics of a body that contact alone holds: whether reactions can balance its loads, and whether it can still move."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.solvers.condensed_input import principal_axes
+
+# Part of the loads whose sum is rounding, part of that sum that may be left, and rays of friction cones that are tried.
+ROUNDING, BALANCED, RAYS = 1e-12, 1e-9, 400
+
+# Part of a motion that is none.
+SMALL = 1e-6
+
+# Directions that take more than so many times the reactions found so far count as none.
+JAMMED = 1e3
+
+# A motion changes no reaction if it changes less than this part of what springs at all nodes would.
+UNFELT = 1e-9
+
+# Where a body is moved to before it is taken back out of the planes, over the largest gap.
+FAR = 1e4
+
+# How often a step towards the last state is halved.
+HALVED = 12
+
+
+class Statics:
+    """Loads and reactions of a loose body along its rigid motions ``Z``, which have no elastic energy.
+
+    Args:
+        body: ElasticBody with ``loose`` motions.
+        contacts: Its contacts.
+        step: The ``LoadStep``.
+        last: The last converged displacement, owned degrees of freedom.  Collective.
+
+    Attributes:
+        loads: Their sums along the motions, ``shape=(m,)``; zero where they are rounding.
+        start: Displacement near which the solution may lie.
+        said: Why there is no static state, in words; empty where there may be one.
+
+    Raises:
+        ValueError: on all ranks, if no contact node is on a part of the body that nothing holds.
+    """
+
+    def __init__(self, body, contacts, step, last: np.ndarray):
+        self._body, self._contacts, self._modes = body, contacts, body.loose.modes
+        m, self._dim = self._modes.shape[1], body.V.mesh.geometry.dim
+        parts, coefficients = [np.zeros((0, self._dim, m))], [np.zeros((0, self._dim - 1))]
+        for contact in contacts:
+            points = contact.points
+            motion = (points.B @ self._modes).reshape(points.count, self._dim, m)
+            motion[:, :-1][points.held] = 0.0
+            motion[points.closed] = 0.0
+            turns = principal_axes(contact.friction, points.count, self._dim)
+            parts.append(turns @ motion)
+            mu = contact.friction.mu[..., : self._dim - 1]
+            coefficients.append(np.broadcast_to(mu, (points.count, self._dim - 1)))
+        self._motion, self._mu = np.concatenate(parts), np.concatenate(coefficients)
+        self._felt = body.total((self._motion**2).sum(axis=(0, 1)))
+        if not self._felt.all():
+            raise ValueError(
+                f"{body.loose.refusal(np.eye(m)[:, self._felt == 0.0])} No contact node can hold it: fix it by Dirichlet "
+                "conditions, add a soft spring to F, or name the facets that may touch."
+            )
+        b = step.free(step.b)
+        sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
+        self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
+        escape = self._escape()
+        self.start, self._last = last, last
+        self.said = "" if escape is None else (
+            f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
+            "hold: no static state exists"
+        )
+
+    def _escape(self) -> np.ndarray | None:
+        """A motion along which the loads push the body and no reaction can hold it, ``shape=(m,)``; None if there is none.
+
+        The sums of forces and moments that reactions in their friction cones can have are a cone.  The loads' nearest
+        point in it leaves a rest: along that motion loads do work, and reactions can only do more.  It is found by
+        the rays that reach farthest along the rest, one after another, and least squares with weights that are not
+        negative.  The last ones are reactions that balance the loads.
+        """
+        from scipy.optimize import nnls  # of loose bodies alone
+
+        unit = float(np.linalg.norm(self.loads)) or 1.0
+        target, rays, weights = -self.loads / unit, np.zeros((self.loads.size, 0)), np.zeros(0)
+        rest, kept, self._balancing = target, [], np.zeros(self._motion.shape[:2])
+        for _ in range(RAYS):
+            if np.linalg.norm(rest) <= BALANCED:
+                break
+            reach, ray, *reaction = self._farthest(rest)
+            length = float(np.linalg.norm(ray))
+            far = JAMMED * weights.sum() or np.inf
+            if reach <= max(1e-14 * length, rest @ rest / far):
+                return self._along_planes(-rest, kept, weights)
+            rays = np.column_stack((rays[:, weights > 0], ray))
+            kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
+            weights, _ = nnls(rays, target)
+            rest = target - rays @ weights
+        for weight, (_, reaction) in zip(weights, kept):
+            self._balancing += unit * weight * reaction
+        return None  # or not decided: the solver will
+
+    def _along_planes(self, motion: np.ndarray, kept: list, weights: np.ndarray) -> np.ndarray:
+        """The part of a motion with which the nodes of some reactions stay on their planes, if loads drive that."""
+        normals = [normal for (normal, _), weight in zip(kept, weights) if weight > 0]
+        if normals:
+            along = motion - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
+            if along @ self.loads > SMALL * np.linalg.norm(self.loads) * np.linalg.norm(motion):
+                return along
+        return motion
+
+    def _farthest(self, along: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Of reactions with ``r_n = 1`` at one node those whose sums reach farthest along a motion.
+
+        Returns:
+            How far; the sums; what ``r_n`` alone makes of them; the reactions of this rank's nodes.
+        """
+        velocity, reaction = self._motion @ along, np.zeros(self._motion.shape[:2])
+        tangential = self._mu * velocity[:, :-1]
+        length = np.linalg.norm(tangential, axis=1)
+        reach = velocity[:, -1] + length
+        largest = (float(reach.max(initial=-np.inf)), self._body.comm.rank)
+        reached, owner = self._body.comm.allreduce(largest, op=MPI.MAXLOC)
+        ray = None
+        if self._body.comm.rank == owner:
+            k = int(reach.argmax())
+            way = np.divide(tangential[k], length[k], np.zeros(self._dim - 1), where=length[k] > 0)
+            reaction[k] = np.append(self._mu[k] * way, 1.0)
+            ray = reaction[k] @ self._motion[k], self._motion[k, -1]
+        return reached, *self._body.comm.bcast(ray, root=owner), reaction
+
+    def place(self) -> None:
+        """Move the start until it touches, where it can.  Collective.
+
+        A linear programme for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
+        as near as they can be.
+        """
+        gaps = [np.zeros(0)]
+        for contact in self._contacts:
+            contact.move(self.start)
+            gaps.append(contact.gap)
+        mine = self._motion[:, -1], np.concatenate(gaps), self._balancing[:, -1]
+        parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
+        motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
+        if motion is not None:
+            self.start = self.start + self._modes @ motion
+
+    def _undetermined(self, step) -> np.ndarray:
+        """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective."""
+        changed = [np.zeros((0, self._felt.size))]
+        for contact, of in zip(self._contacts, step.stiffness):
+            map, points = ReturnMap(of.normal, of.normal), contact.points
+            state = contact.reaction, contact.gap, contact.slip_increment
+            by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
+            by_motion[contact.reaction[:, -1] <= 0.0] = 0.0
+            motion = (points.B @ self._modes).reshape(points.count, self._dim, -1)
+            changed.append((by_motion @ motion).reshape(-1, self._felt.size))
+        triangle = np.linalg.qr(np.concatenate(changed), mode="r") / np.sqrt(self._felt)
+        _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(triangle)))
+        unfelt = np.append(values, np.zeros(len(vectors) - len(values))) <= UNFELT
+        return vectors[unfelt].T / np.sqrt(self._felt)[:, None]
+
+    def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
+        """A solution whose undetermined motions are those nearest to the last displacement.  Collective.
+
+        Args:
+            step: The ``LoadStep``; has measured ``x``.
+            x: Displacement of owned degrees of freedom.
+            choice: "refused" or "nearest".
+
+        Raises:
+            ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
+        """
+        motions = self._undetermined(step)
+        if motions.shape[1] == 0:
+            return x
+        if choice == "refused":
+            raise ValueError(
+                f"{self._body.loose.refusal(motions)} No reaction changes with them: fix them by Dirichlet conditions, add "
+                'friction or a soft spring, or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
+            )
+        Z = self._modes @ motions
+        apart, sizes = self._body.total(Z.T @ (self._last - x)), self._body.total(Z.T @ Z)
+        way = Z @ np.linalg.solve(sizes, apart)
+        for halved in range(HALVED):
+            trial = x + 0.5**halved * way
+            if step.measure(trial).within(step.tol):
+                return trial
+        step.measure(x)
+        return x
+
+
+def _touching(normal: np.ndarray, gap: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+    """The motion ``c`` with ``gap + normal c >= 0`` that is nearest to a far one against these forces; None if there is none.
+
+    Least distance by non-negative least squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974].
+    """
+    from scipy.optimize import nnls
+
+    against = -force @ normal
+    length, most = np.abs(gap).max(), np.linalg.norm(against) * np.linalg.norm(normal, axis=1).max()
+    if not length * most > 0.0:
+        return None
+    far = FAR * length * np.linalg.norm(against) / most * against / np.linalg.norm(against)
+    below = -(gap + normal @ far) / length
+    weights, left = nnls(np.vstack((normal.T, below)), np.append(np.zeros(len(far)), 1.0))
+    if not left > 1e-14:
+        return None
+    rest = np.vstack((normal.T, below)) @ weights - np.append(np.zeros(len(far)), 1.0)
+    return far - length * rest[:-1] / rest[-1]
