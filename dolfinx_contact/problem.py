@@ -265,6 +265,8 @@ class ContactProblem(ProblemStates):
         found = found or self._solved(step)
         if not step.errors.within(step.tol):
             return found
+        if not step.statics.balanced():
+            return self._unmoved(step)
         return found._replace(x=step.statics.settled(step, found.x, self.undetermined))
 
     def _unmoved(self, step: LoadStep) -> SolverResult:

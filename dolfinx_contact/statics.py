@@ -13,6 +13,9 @@ from dolfinx_contact.solvers.condensed_input import principal_axes
 # Part of the loads whose sum is rounding, part of that sum that may be left, and rays of friction cones that are tried.
 ROUNDING, BALANCED, RAYS = 1e-12, 1e-9, 400
 
+# What reactions may leave of loads in a state that is no more than rounding away from a solution.
+ROUGH = 1e-3
+
 # Part of a motion that is none.
 SMALL = 1e-6
 
@@ -23,7 +26,7 @@ JAMMED = 1e3
 UNFELT = 1e-9
 
 # Where a body is moved to before it is taken back out of the planes, over the largest gap.
-FAR = 1e4
+FAR = 30.0
 
 # How often a step towards the last state is halved.
 HALVED = 12
@@ -40,7 +43,7 @@ class Statics:
 
     Attributes:
         loads: Their sums along the motions, ``shape=(m,)``; zero where they are rounding.
-        start: Displacement near which the solution may lie.
+        start: Displacement near which the solution may lie; ``placed`` if it is not the last one.
         said: Why there is no static state, in words; empty where there may be one.
 
     Raises:
@@ -71,7 +74,7 @@ class Statics:
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
         escape = self._escape()
-        self.start, self._last = last, last
+        self.start, self._last, self.placed = last, last, False
         self.said = "" if escape is None else (
             f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
             "hold: no static state exists"
@@ -149,7 +152,7 @@ class Statics:
         parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
         motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
         if motion is not None:
-            self.start = self.start + self._modes @ motion
+            self.start, self.placed = self.start + self._modes @ motion, True
 
     def _undetermined(self, step) -> np.ndarray:
         """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective."""
@@ -165,6 +168,18 @@ class Statics:
         _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(triangle)))
         unfelt = np.append(values, np.zeros(len(vectors) - len(values))) <= UNFELT
         return vectors[unfelt].T / np.sqrt(self._felt)[:, None]
+
+    def balanced(self) -> bool:
+        """Whether present reactions balance the loads, roughly: where a body is lost far away rounding hides that they do not.
+
+        Collective.
+        """
+        forces = np.zeros((2, self._body.size))
+        for contact in self._contacts:
+            contact.points.add_forces(contact.reaction, forces[0])
+            contact.points.add_magnitudes(contact.reaction, forces[1])
+        sums, sizes = self._body.total([self._modes.T @ forces[0], np.abs(self._modes).T @ forces[1]])
+        return bool((np.abs(sums + self.loads) <= ROUGH * (np.abs(self.loads) + sizes)).all())
 
     def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
         """A solution whose undetermined motions are those nearest to the last displacement.  Collective.

@@ -73,8 +73,8 @@ class LoadStep:
         normal of the cone, takes an extrapolation for worse than it is.
         """
         guesses = [start.copy() for start in self._starts]
-        if self.statics is not None:
-            guesses.append(self.statics.start.copy())
+        if self.statics is not None and self.statics.placed:
+            guesses = [self.statics.start.copy()]
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]

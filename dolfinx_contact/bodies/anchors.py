@@ -54,6 +54,18 @@ class Anchors:
         forces[self.dofs] += self.stiffness * x[self.dofs]
         return forces
 
+    def columns(self) -> tuple[np.ndarray, np.ndarray]:
+        """``E a`` and ``a`` of the springs of all ranks, ``shape=(owned dofs, m)`` and ``(m,)``.  Collective."""
+        counts = self._body.comm.allgather(self.dofs.size)
+        forces, first = np.zeros((self._body.size, self.count)), sum(counts[: self._body.comm.rank])
+        forces[self.dofs, first + np.arange(self.dofs.size)] = self.stiffness
+        return forces, np.concatenate(self._body.comm.allgather(self.stiffness))
+
+    @property
+    def A(self):
+        """The stiffness with the springs, a PETSc matrix."""
+        return self.ksp.getOperators()[0]
+
     def destroy(self) -> None:
         """Free the factors.  Collective."""
         self.solver.destroy()

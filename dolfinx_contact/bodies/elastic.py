@@ -273,6 +273,11 @@ class ElasticBody(OverRanks):
         return self._anchors
 
     @property
+    def held(self):
+        """The stiffness, a PETSc matrix; of a loose body with its anchors.  Collective."""
+        return self.anchors.A if self.loose else self.K
+
+    @property
     def ksp(self):
         """The linear solver of K, for many right-hand sides at a time."""
         return self._own_solver().ksp

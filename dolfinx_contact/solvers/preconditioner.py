@@ -8,9 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.petsc.linear_solver import stage
-from dolfinx_contact.solvers.plane_border import PlaneBorder
+from dolfinx_contact.solvers.border import Border
 from dolfinx_contact.solvers.rigid_balance import RigidBalance, patch_motions
 from dolfinx_contact.solvers.surface_layer import SurfaceLayer
 
@@ -33,14 +32,14 @@ class ContactPreconditioner:
         self._spring_rates = self._rates()
         self._layer, self._linearised = None, False
         with stage("contact: set-up of springs"):
-            S, A = self._springs(), body.K.copy()
+            S, A = self._springs(), body.held.copy()
             A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
             self._softened = False
             self.stiffened = body.stiffened(A, S)
         self._A = A
-        planes = driven_planes(body, contacts)
-        self._border = planes and PlaneBorder(body, planes, A, self.stiffened, self._spring_rates)
+        followed = body.loose is not None or any(contact.plane.free for contact in contacts)
+        self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)
         S.destroy()
 
     def soften(self) -> bool:
@@ -113,7 +112,7 @@ class ContactPreconditioner:
         if self._linearised:
             near, residual = self._layer.correct(residual)
         correction = near + self.stiffened.apply(residual)
-        if self._border is not None:
+        if self._border:
             correction += self._border.correct(residual)
         correction[self._body.fixed] = 0.0
         return correction

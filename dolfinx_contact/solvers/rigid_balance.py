@@ -74,7 +74,7 @@ class RigidBalance:
         for _ in range(NEWTON):
             if np.linalg.norm(left) <= SMALL * size:
                 break
-            direction = np.linalg.lstsq(slope, left, rcond=1e-13)[0]
+            direction = self._limited(np.linalg.lstsq(slope, left, rcond=1e-13)[0])
             for halved in range(12):
                 c = 0.5**halved * direction
                 trial = x + self.modes @ c, forces - self.forces @ c
@@ -87,6 +87,12 @@ class RigidBalance:
             (x, forces), (left, slope, size) = trial, result
         step.know(x, forces)
         return x
+
+    def _limited(self, c: np.ndarray) -> np.ndarray:
+        """A step, of a body that contact alone holds no further than its size: it must not be lost."""
+        if self._body.loose is None:
+            return c
+        return c * min(1.0, self._body.extent / (self._body.largest(np.abs(self.modes @ c)) or np.inf))
 
     def left(self, x, forces, step, maps) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
