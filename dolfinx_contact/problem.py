@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
-import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -44,7 +43,7 @@ from dolfinx_contact.results.record import (
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
-from dolfinx_contact.trial import floating, without_reactions
+from dolfinx_contact.trial import held_by_contact, unmoved, without_reactions
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -172,7 +171,7 @@ class ContactProblem(ProblemStates):
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not converged(step.errors, done, self.tol):
                 raise NotConverged(
-                    f"not converged: {done}, tol {self.tol:.1e}. {self._advice(step)}",
+                    f"not converged: {done}, tol {self.tol:.1e}. {step.no_state() or 'Smaller load steps help most often'}.",
                     done,
                     found.x,
                     [contact.reaction for contact in self.contacts],
@@ -235,9 +234,10 @@ class ContactProblem(ProblemStates):
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
         if step.planes is not None and step.planes.beyond(given=True):
-            return step, self._unmoved(step)
+            return step, unmoved(self.body, step, self._states[0])
         if self.body.loose is not None:
-            return step, self._search_loose(step)
+            arguments = self.body, self.contacts, step, self._states[0], self.undetermined
+            return step, held_by_contact(*arguments, self._solved)
         found = None
         if not self.body.nonlinear:
             found = without_reactions(self.body, self.contacts, step)
@@ -248,40 +248,6 @@ class ContactProblem(ProblemStates):
             found = self.bound().solve(step)
         step.measure(found.x)
         return found
-
-    def _search_loose(self, step: LoadStep) -> SolverResult:
-        """As ``_search``, of a body that contact alone holds."""
-        from dolfinx_contact.statics import Statics
-
-        last = self._states[0]
-        step.statics = Statics(self.body, self.contacts, step, last)
-        if step.statics.said:
-            return self._unmoved(step)
-        found = None
-        if not step.statics.loads.any():
-            found = floating(self.body, self.contacts, step, last)
-        if not any(contact.last.reaction.any() for contact in self.contacts):
-            step.statics.place()
-        found = found or self._solved(step)
-        if not step.errors.within(step.tol):
-            return found
-        if not step.statics.balanced():
-            return self._unmoved(step)
-        return found._replace(x=step.statics.settled(step, found.x, self.undetermined))
-
-    def _unmoved(self, step: LoadStep) -> SolverResult:
-        """The last displacement with the present boundary values, judged as what it is: no solution."""
-        x, fixed = self._states[0].copy(), self.body.fixed
-        x[fixed] = step.b[fixed]
-        step.measure(x)
-        return SolverResult(x, 0, np.inf, "none: there is no solution")
-
-    def _advice(self, step: LoadStep) -> str:
-        """What to do about a step that did not converge.  Collective."""
-        slides = "" if step.statics is None else step.statics.said
-        if step.planes is not None:
-            slides = slides or step.planes.beyond(True) or step.planes.beyond()
-        return f"{slides}." if slides else "Smaller load steps help most often."
 
     def _unbind(self) -> None:
         """Forget what was set up for a stiffness that has changed.  Collective."""

@@ -228,7 +228,9 @@ class ProblemOptions(Guarded):
     @undetermined.setter
     def undetermined(self, choice: str) -> None:
         if choice not in UNDETERMINED:
-            raise ValueError(f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}.")
+            raise ValueError(
+                f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}."
+            )
         self._undetermined = choice
 
     def __repr__(self) -> str:

@@ -22,8 +22,9 @@ SMALL = 1e-6
 # Directions that take more than so many times the reactions found so far count as none.
 JAMMED = 1e3
 
-# A motion changes no reaction if it changes less than this part of what springs at all nodes would.
-UNFELT = 1e-9
+# A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
+# body slides away along it if it changes less than the second number, and loads are not balanced.
+UNFELT, SLIDING = 1e-9, 1e-3
 
 # Where a body is moved to before it is taken back out of the planes, over the largest gap.
 FAR = 30.0
@@ -75,9 +76,13 @@ class Statics:
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
         escape = self._escape()
         self.start, self._last, self.placed = last, last, False
-        self.said = "" if escape is None else (
-            f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
-            "hold: no static state exists"
+        self.said = (
+            ""
+            if escape is None
+            else (
+                f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
+                "hold: no static state exists"
+            )
         )
 
     def _escape(self) -> np.ndarray | None:
@@ -113,7 +118,10 @@ class Statics:
         """The part of a motion with which the nodes of some reactions stay on their planes, if loads drive that."""
         normals = [normal for (normal, _), weight in zip(kept, weights) if weight > 0]
         if normals:
-            along = motion - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
+            along = (
+                motion
+                - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
+            )
             if along @ self.loads > SMALL * np.linalg.norm(self.loads) * np.linalg.norm(motion):
                 return along
         return motion
@@ -154,8 +162,13 @@ class Statics:
         if motion is not None:
             self.start, self.placed = self.start + self._modes @ motion, True
 
-    def _undetermined(self, step) -> np.ndarray:
-        """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective."""
+    def _free_motions(self, step, unfelt: float) -> np.ndarray:
+        """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
+
+        Args:
+            step: The ``LoadStep``.
+            unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
+        """
         changed = [np.zeros((0, self._felt.size))]
         for contact, of in zip(self._contacts, step.stiffness):
             map, points = ReturnMap(of.normal, of.normal), contact.points
@@ -166,20 +179,40 @@ class Statics:
             changed.append((by_motion @ motion).reshape(-1, self._felt.size))
         triangle = np.linalg.qr(np.concatenate(changed), mode="r") / np.sqrt(self._felt)
         _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(triangle)))
-        unfelt = np.append(values, np.zeros(len(vectors) - len(values))) <= UNFELT
-        return vectors[unfelt].T / np.sqrt(self._felt)[:, None]
+        small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
+        return vectors[small].T / np.sqrt(self._felt)[:, None]
+
+    def slides(self, step) -> bool:
+        """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
+        motions = self._free_motions(step, SLIDING)
+        left, sizes = self._left()
+        driven = (
+            motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
+        )
+        least = ROUGH * np.linalg.norm(driven) * np.linalg.norm(sizes)
+        if driven @ self.loads <= least or abs(driven @ left) <= least:
+            return False
+        self.said = f"The loads drive {self._body.loose.words(driven)} by more than friction carries: no static state exists"
+        return True
 
     def balanced(self) -> bool:
         """Whether present reactions balance the loads, roughly: where a body is lost far away rounding hides that they do not.
 
         Collective.
         """
+        left, sizes = self._left()
+        return bool((np.abs(left) <= ROUGH * sizes).all())
+
+    def _left(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of loads and present reactions along the motions, and those of their magnitudes."""
         forces = np.zeros((2, self._body.size))
         for contact in self._contacts:
             contact.points.add_forces(contact.reaction, forces[0])
             contact.points.add_magnitudes(contact.reaction, forces[1])
-        sums, sizes = self._body.total([self._modes.T @ forces[0], np.abs(self._modes).T @ forces[1]])
-        return bool((np.abs(sums + self.loads) <= ROUGH * (np.abs(self.loads) + sizes)).all())
+        sums, sizes = self._body.total(
+            [self._modes.T @ forces[0], np.abs(self._modes).T @ forces[1]]
+        )
+        return sums + self.loads, sizes + np.abs(self.loads)
 
     def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
         """A solution whose undetermined motions are those nearest to the last displacement.  Collective.
@@ -192,7 +225,7 @@ class Statics:
         Raises:
             ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
         """
-        motions = self._undetermined(step)
+        motions = self._free_motions(step, UNFELT)
         if motions.shape[1] == 0:
             return x
         if choice == "refused":

@@ -62,6 +62,23 @@ class LoadStep:
         self._known = None  # a displacement, and the forces b - K x that it leaves
         self._measured = None  # displacement and contact states whose errors were measured with F
 
+    @property
+    def may_slide(self) -> bool:
+        """Whether a plane, or the body, is held by contact along some direction."""
+        return self.planes is not None or self.statics is not None
+
+    def slides(self) -> bool:
+        """Whether force pushes a plane, or loads a body, by more than friction carries in the present state.  Collective."""
+        slides = self.planes is not None and bool(self.planes.beyond())
+        return slides or (self.statics is not None and self.statics.slides(self))
+
+    def no_state(self) -> str:
+        """Why there is no static state, in words; empty where nothing tells.  Collective."""
+        said = "" if self.statics is None else self.statics.said
+        if self.planes is not None:
+            said = said or self.planes.beyond(True) or self.planes.beyond()
+        return said
+
     def total(self, array) -> np.ndarray:
         """Sum of an array over all ranks."""
         return self.body.total(array)

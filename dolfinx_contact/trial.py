@@ -34,7 +34,49 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
     return None
 
 
-def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
+def held_by_contact(body, contacts, step, last, undetermined: str, solve) -> SolverResult:
+    """What is found of a body that contact alone holds.  Collective.
+
+    Args:
+        body, contacts: The body, with ``loose`` motions, and its contacts.
+        step: The ``LoadStep``; gets its ``statics``, and has measured what is returned.
+        last: The last converged displacement, owned degrees of freedom.
+        undetermined: What to do with motions that nothing determines, "refused" or "nearest".
+        solve: Function of the step that asks the solver.
+
+    Raises:
+        ValueError: on all ranks, if nothing can hold the body, or nothing determines a motion that is to be refused.
+    """
+    from dolfinx_contact.statics import Statics  # of loose bodies alone
+
+    step.statics = statics = Statics(body, contacts, step, last)
+    if statics.said:
+        return unmoved(body, step, last)
+    found = None
+    if not statics.loads.any():
+        found = _floating(body, contacts, step, last)
+    if (
+        not body.largest(np.concatenate([contact.last.reaction[:, -1] for contact in contacts]))
+        > 0.0
+    ):
+        statics.place()
+    found = found or solve(step)
+    if not step.errors.within(step.tol):
+        return found
+    if not statics.balanced():
+        return unmoved(body, step, last)
+    return found._replace(x=statics.settled(step, found.x, undetermined))
+
+
+def unmoved(body, step, last: np.ndarray) -> SolverResult:
+    """The last displacement with the present boundary values, judged as what it is: no solution."""
+    x, fixed = last.copy(), body.fixed
+    x[fixed] = step.b[fixed]
+    step.measure(x)
+    return SolverResult(x, 0, np.inf, "none: there is no solution")
+
+
+def _floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
     """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
 
     None where it touches.

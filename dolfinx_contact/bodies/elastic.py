@@ -103,10 +103,8 @@ class ElasticBody(OverRanks):
     def _hold(self) -> None:
         """Keep the forces of boundary values; then rows and columns of fixed dofs become the identity's."""
         first, last = self.K.getOwnershipRange()
-        rows, fixed = (
-            PETSc.IS().createGeneral(np.asarray(dofs, dtype=np.int32), comm=self.comm)
-            for dofs in (np.arange(first, last), first + self.fixed)
-        )
+        dofs = np.arange(first, last, dtype=np.int32), (first + self.fixed).astype(np.int32)
+        rows, fixed = (PETSc.IS().createGeneral(each, comm=self.comm) for each in dofs)
         self._coupling = self.K.createSubMatrix(rows, fixed)
         self._lift, self._lifted = self._coupling.createVecs()
         self.K.zeroRowsColumns(fixed)
@@ -223,7 +221,7 @@ class ElasticBody(OverRanks):
     # -- solves --------------------------------------------------------------------------------
 
     def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
-        """K^-1 b, of a loose body the solution that its anchors hold; the solver is kept while K stands."""
+        """K^-1 b, with anchors where the body is loose; the solver is set up at the first call and kept while K stands."""
         return self._own_solver().solve(b, rough, start)
 
     def _own_solver(self) -> LinearSolver:
@@ -260,9 +258,8 @@ class ElasticBody(OverRanks):
 
     def forget_solver(self) -> None:
         """Set the solver of K up anew when it is next needed.  Collective."""
-        for part in (self._elastic, self._anchors):
-            if part is not None:
-                part.destroy()
+        for part in filter(None, (self._elastic, self._anchors)):
+            part.destroy()
         self._elastic = self._anchors = None
 
     @property
@@ -271,11 +268,6 @@ class ElasticBody(OverRanks):
         if self._anchors is None and self.soft.shape[1] > 0:
             self._anchors = Anchors(self)
         return self._anchors
-
-    @property
-    def held(self):
-        """The stiffness, a PETSc matrix; of a loose body with its anchors.  Collective."""
-        return self.anchors.A if self.loose else self.K
 
     @property
     def ksp(self):

@@ -60,7 +60,9 @@ class LooseMotions:
         at = part.middle + arm[:gdim]
         at[np.abs(at) < SAID * part.size] = 0.0
         about = f"({', '.join(f'{x:.4g}' for x in at)}){of}"
-        return f"a rotation about {'' if gdim == 2 else f'the axis {_rounded(axis)} through '}{about}"
+        return (
+            f"a rotation about {'' if gdim == 2 else f'the axis {_rounded(axis)} through '}{about}"
+        )
 
     def _simplest(self, motions: np.ndarray) -> np.ndarray:
         """Amounts of motions that span the same: translations, and as few others as there have to be, one a row."""

@@ -99,7 +99,7 @@ class BoundAutomatic:
                 start = found.x if smallest < np.inf else None
             if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
                 break
-            if step.planes is not None and step.planes.beyond():
+            if step.slides():
                 break
             why = f"the other one ended at {errors.largest:.1e}"
         return best._replace(iterations=iterations, chosen=", then ".join(said))

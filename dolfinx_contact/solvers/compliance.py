@@ -9,6 +9,7 @@ import os
 import numpy as np
 from petsc4py import PETSc
 
+UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
 _MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
 
@@ -69,6 +70,22 @@ def compliance(solver, rows: list[Rows], first: int) -> np.ndarray:
             found[:start] = (found[:start] + W[block, :start].T) / 2
             W[:, block], W[block, :start] = found, found[:start].T
     return W
+
+
+def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
+    """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
+
+    Where all springs are at motions without energy their block has to vanish.  What is left for it is put along motions
+    of the anchors that no node feels, which keeps those where they are.
+    """
+    last = slice(size, len(W))
+    W[last, last] -= np.diag(1 / a)
+    if loose:
+        root = np.sqrt(a)
+        _, values, vectors = np.linalg.svd(np.linalg.qr(W[:size, last] * root, mode="r"))
+        values = np.append(values, np.zeros(len(a) - len(values)))
+        unfelt = vectors[values <= UNFELT * values[0]].T / root[:, None]
+        W[last, last] = -unfelt @ unfelt.T
 
 
 def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:

@@ -14,13 +14,13 @@ from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
-from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance
+from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance, tie
 from dolfinx_contact.solvers.condensed_input import principal_axes
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 
-UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
+FEW = 3000  # iterations for a loose body that seems to slide away
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -70,7 +70,7 @@ class CondensedBody:
                 inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
                 share = 1 - len(inert) / size
                 W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
-                _tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
+                tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
                 W = self._planes.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
@@ -113,10 +113,12 @@ class CondensedBody:
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             previous = error
-            for fallbacks in (True,) if step.planes is None else (False, True):
+            for limits in ({"fallbacks": False}, {}) if step.may_slide else ({},):
                 goal = factor * step.tol
+                if not limits and step.statics is not None and step.statics.slides(step):
+                    limits = {"max_iterations": min(FEW, self._options.max_iterations)}
                 near = [start - placed for start in starts]
-                result = self._reactions(step, q + rounding, goal, near, acting, fallbacks)
+                result = self._reactions(step, q + rounding, goal, near, acting, limits)
                 iterations += result.iterations
                 force = placed + np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
@@ -207,11 +209,9 @@ class CondensedBody:
         )  # those of planes act on no node
         return forces
 
-    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, fallbacks: bool):
+    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
-        options = self._options
-        if not fallbacks:
-            options = type(options)(**vars(options) | {"fallbacks": False})
+        options = type(self._options)(**vars(self._options) | limits)
 
         def solve(monitor):
             try:
@@ -282,22 +282,6 @@ class CondensedBody:
             for name in ("mu", "p")
         )
         return Friction(mu, np.where(mu > 0, p, 1.0))
-
-
-def _tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
-    """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
-
-    Where all springs are at motions without energy their block has to vanish.  What is left for it is put along motions
-    of the anchors that no node feels, which keeps those where they are.
-    """
-    last = slice(size, len(W))
-    W[last, last] -= np.diag(1 / a)
-    if loose:
-        root = np.sqrt(a)
-        _, values, vectors = np.linalg.svd(np.linalg.qr(W[:size, last] * root, mode="r"))
-        values = np.append(values, np.zeros(len(a) - len(values)))
-        unfelt = vectors[values <= UNFELT * values[0]].T / root[:, None]
-        W[last, last] = -unfelt @ unfelt.T
 
 
 def components(contacts) -> int:

@@ -82,11 +82,11 @@ class FixedPoint:
 
 
 def _slides(step, x: np.ndarray) -> bool:
-    """Whether force pushes a plane by more than friction carries in this state.  Collective."""
-    if step.planes is None:
+    """Whether force pushes a plane, or loads the body, by more than friction carries in this state.  Collective."""
+    if not step.may_slide:
         return False
     step.measure(x)
-    return bool(step.planes.beyond())
+    return step.slides()
 
 
 class BoundFixedPoint:

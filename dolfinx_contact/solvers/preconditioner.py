@@ -32,7 +32,7 @@ class ContactPreconditioner:
         self._spring_rates = self._rates()
         self._layer, self._linearised = None, False
         with stage("contact: set-up of springs"):
-            S, A = self._springs(), body.held.copy()
+            S, A = self._springs(), (body.anchors.A if body.loose else body.K).copy()
             A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
             self._softened = False

@@ -92,7 +92,9 @@ class RigidBalance:
         """A step, of a body that contact alone holds no further than its size: it must not be lost."""
         if self._body.loose is None:
             return c
-        return c * min(1.0, self._body.extent / (self._body.largest(np.abs(self.modes @ c)) or np.inf))
+        return c * min(
+            1.0, self._body.extent / (self._body.largest(np.abs(self.modes @ c)) or np.inf)
+        )
 
     def left(self, x, forces, step, maps) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
