@@ -20,7 +20,7 @@ ROUGH = 1e-3
 SMALL = 1e-6
 
 # Directions that take more than so many times the reactions found so far count as none.
-JAMMED = 1e3
+JAMMED = 1e7
 
 # A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
 # body slides away along it if it changes less than the second number, and loads are not balanced.

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 # What is smaller than this part of the largest component is not said of a motion.
-SAID = 1e-3
+SAID = 3e-3
 
 
 class LoosePart(NamedTuple):

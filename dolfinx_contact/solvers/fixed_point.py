@@ -81,12 +81,12 @@ class FixedPoint:
         return BoundFixedPoint(self, body, contacts, stiffness)
 
 
-def _slides(step, x: np.ndarray) -> bool:
-    """Whether force pushes a plane, or loads the body, by more than friction carries in this state.  Collective."""
-    if not step.may_slide:
+def _slides(step, x: np.ndarray, tried: bool = False) -> bool:
+    """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
+    if step.planes is None and not (tried and step.statics is not None):
         return False
     step.measure(x)
-    return step.slides()
+    return step.slides() if tried else bool(step.planes.beyond())
 
 
 class BoundFixedPoint:
@@ -131,7 +131,7 @@ class BoundFixedPoint:
             if newton and not search.over:
                 search_by_newton(search, self.preconditioner, search.best)
                 newton = False
-            if search.over:
+            if search.over or _slides(step, search.best, tried=True):
                 break
         return SolverResult(search.best, search.iterations, search.forward_error, "FixedPoint")
 

@@ -17,6 +17,9 @@ DEPENDENT = 1e-10
 # Newton's method ends when the forces along the motions are this small beside those on all nodes.
 SMALL, NEWTON = 1e-3, 20
 
+# Part of the largest slope that is none; lengths that are tried along such a motion, and part of the forces that may be left.
+FREE, ACROSS, TURNED = 1e-9, 60, 0.9
+
 
 class RigidBalance:
     """Moves a body until the forces along its soft motions are in balance.
@@ -82,11 +85,40 @@ class RigidBalance:
                 if np.linalg.norm(result[0]) < np.linalg.norm(left):
                     break
             else:
-                x, forces = start
-                break
+                trial, result = self._across((x, forces), left, slope, step, maps)
+                if trial is None:
+                    x, forces = start
+                    break
             (x, forces), (left, slope, size) = trial, result
         step.know(x, forces)
         return x
+
+    def _across(self, start, left, slope, step, maps) -> tuple:
+        """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
+
+        Along that motion, the way that loads drive it, the length is doubled until less is left, and halved where that
+        turns round.
+
+        Returns:
+            As a step of ``balanced``: a displacement and its forces, what is left there; None, None where there is no such place.
+        """
+        if self._body.loose is None:
+            return None, None
+        _, values, vectors = np.linalg.svd(slope)
+        free = vectors[values <= FREE * values[0]]
+        way, before = free.T @ (free @ left), np.linalg.norm(left)
+        low, high, length = 0.0, np.inf, 1.0
+        for _ in range(ACROSS):
+            c = length * way
+            if not c.any() or (self._limited(c) != c).any():
+                break
+            trial = start[0] + self.modes @ c, start[1] - self.forces @ c
+            result = self.left(*trial, step, maps)
+            if np.linalg.norm(result[0]) < TURNED * before:
+                return trial, result
+            low, high = (length, high) if result[0] @ way > 0.0 else (low, length)
+            length = 2 * length if high == np.inf else (low + high) / 2
+        return None, None
 
     def _limited(self, c: np.ndarray) -> np.ndarray:
         """A step, of a body that contact alone holds no further than its size: it must not be lost."""

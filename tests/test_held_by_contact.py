@@ -1,0 +1,258 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Bodies held by contact alone: statics, soft springs that hold the same body, and what is refused with the motion named."""
+
+import numpy as np
+import pytest
+import scenes
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
+from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.statics import Statics
+
+COMM = scenes.COMM
+TOL = 1e-9
+SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint, "multigrid": dc.FixedPoint}  # fmt: skip
+CELLS = {2: (5, 4), 3: (3, 3, 2)}
+
+
+class Loose:
+    """A block of edges 1, 1, 0.8 (1, 0.8) between planes at given faces, under a force per volume that varies linearly."""
+
+    def __init__(self, dim, kind="condensed", mu=0.3, faces=("low",), gap=0.0, E=1.0, length=1.0, spring=None, bcs=None, **options):  # fmt: skip
+        corners = [np.zeros(dim), np.ones(dim)]
+        corners[1][-1] = 0.8
+        make, cell = ((mesh.create_rectangle, mesh.CellType.quadrilateral), (mesh.create_box, mesh.CellType.hexahedron))[dim - 2]  # fmt: skip
+        domain = make(COMM, corners, CELLS[dim], cell)
+        domain.geometry.x[:] *= length
+        self.dim, self.length, self.up = dim, length, np.eye(dim)[-1]
+        V = functionspace(domain, ("Lagrange", 1, (dim,)))
+        u, v = fem.Function(V), ufl.TestFunction(V)
+        self.force = fem.Constant(domain, np.zeros(dim))
+        F = scenes.elasticity(u, v, E, 0.3) - ufl.inner(self.force, v) * ufl.dx
+        if spring:
+            F = F + fem.Constant(domain, spring * E / length) * ufl.inner(u, v) * ufl.ds
+        contacts = []
+        for face in faces:
+            z, side = (0.0, 1) if face == "low" else (0.8 * length, -1)
+            facets = mesh.locate_entities_boundary(
+                domain, dim - 1, lambda x, z=z: np.isclose(x[dim - 1], z, atol=1e-9 * length)
+            )
+            plane = dc.RigidPlane((z - side * gap * length) * self.up, side * self.up)
+            contacts.append(dc.Contact(V, facets, plane, dc.Friction(mu)))
+        if kind == "multigrid":
+            options["petsc_options"] = MULTIGRID
+        bcs = [] if bcs is None else bcs(V)
+        self.contacts, self.contact, self.u = contacts, contacts[0], u
+        self.problem = dc.ContactProblem(F, u, contacts, bcs=bcs, solver=SOLVERS[kind](), tol=TOL, **options)  # fmt: skip
+        self.volume = 0.8 * length**dim
+
+    def load(self, *force):
+        """Forces on the whole body, applied at its middle."""
+        self.force.value[:] = np.array(force) / self.volume
+        return self.problem.solve()
+
+    def sums(self):
+        """Force of all planes on the body, and its moment about the middle (a number in two dimensions)."""
+        force, moment = np.zeros(self.dim), 0.0
+        middle = np.full(self.dim, self.length / 2)
+        middle[-1] = 0.4 * self.length
+        for contact in self.contacts:
+            r = contact.reaction @ contact.frame
+            force += r.sum(axis=0)
+            moment = moment + np.cross(contact.x[:, : self.dim] - middle, r).sum(axis=0)
+        return COMM.allreduce(force, op=MPI.SUM), COMM.allreduce(moment, op=MPI.SUM)
+
+
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1e9, 1e-3), (1e-6, 1e3)])
+@pytest.mark.parametrize("kind", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_reactions_balance_what_pushes_a_block_and_more_than_friction_is_refused(dim, kind, units):
+    """Sums of forces and moments are those of statics in any unit; beyond mu W the last state stays, and solves go on."""
+    E, length = units
+    scene = Loose(dim, kind, E=E, length=length)
+    weight = 1e-3 * E * length ** (dim - 1)
+    for part in (0.0, 0.6, 0.99, 0.3):
+        load = np.zeros(dim)
+        load[0], load[-1] = part * 0.3 * weight, -weight
+        step = scene.load(*load)
+        force, moment = scene.sums()
+        assert max(step.error, step.slip_error) <= TOL
+        assert np.abs(force + load).max() < 1e-8 * weight
+        assert np.abs(moment).max() < 1e-8 * weight * length
+        kept, reaction = scene.u.x.array.copy(), scene.contact.reaction.copy()
+        load[0] = 1.01 * 0.3 * weight
+        with pytest.raises(dc.NotConverged, match=r"a translation along \(1, 0"):
+            scene.load(*load)
+        assert np.array_equal(scene.u.x.array, kept)
+        assert np.array_equal(scene.contact.reaction, reaction)
+
+
+@pytest.mark.parametrize("kind", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_vanishing_spring_leads_to_the_same_reactions(dim, kind):
+    """Springs of 1e-8 of the body's stiffness hold the same block: reactions agree to what these springs carry."""
+    own, held = Loose(dim, kind), Loose(dim, spring=1e-8)
+    for side in (1e-4, 2e-4, -1e-4):
+        load = np.zeros(dim)
+        load[0], load[-1] = side, -1e-3
+        own.load(*load)
+        held.load(*load)
+        r, expected = (scenes.gathered(scene.contact)[1] for scene in (own, held))
+        assert np.abs(r - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("kind", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_above_its_plane_comes_down(dim, kind):
+    """However far the plane is, the block lands with the reactions that it has where it starts on the plane."""
+    expected = Loose(dim, kind)
+    load = np.zeros(dim)
+    load[0], load[-1] = 5e-5, -1e-3
+    expected.load(*load)
+    for gap in (1e-6, 1e-2, 5.0):
+        fallen = Loose(dim, kind, gap=gap)
+        fallen.load(*load)
+        r, of = (scenes.gathered(scene.contact)[1] for scene in (fallen, expected))
+        assert np.abs(r - of).max() < 1e-6 * np.abs(of).max()
+
+
+@pytest.mark.parametrize("kind", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("driven", [False, True])
+def test_plates_clamp_a_block(dim, kind, driven):
+    """Pressed by a plate, held by friction at both: forces balance a side force; a plate driven by force has its force."""
+    scene = Loose(dim, kind, faces=("low", "high"))
+    plate = scene.contacts[1].plane
+    if driven:
+        plate.free, plate.force = ("n",), -1e-3 * scene.up
+    else:
+        plate.displacement = -1e-3 * scene.up
+    for side in (0.0, 1e-4):
+        load = side * np.eye(dim)[0]
+        scene.load(*load)
+        force, moment = scene.sums()
+        assert np.abs(force + load).max() < 1e-11 and np.abs(moment).max() < 1e-11
+        if driven:
+            assert scene.contacts[1].force() @ scene.up == pytest.approx(-1e-3, rel=1e-7)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_that_tips_is_refused_as_a_rotation_about_its_edge(dim):
+    """Friction enough, side force above half the width over half the height times the weight: it turns about its edge."""
+    scene = Loose(dim, mu=5.0)
+    load = np.zeros(dim)
+    load[0], load[-1] = 1.24e-3, -1e-3  # 0.5 / 0.4 of the weight is the limit
+    scene.load(*load)
+    load[0] = 1.26e-3
+    about = r"about \(1, 0\)" if dim == 2 else r"axis \(0, 1, 0\) through \(1, 0\.5, 0\)"
+    with pytest.raises(
+        dc.NotConverged, match=f"a rotation {'' if dim == 2 else 'about the '}{about}"
+    ):
+        scene.load(*load)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_pulls_a_block_off_is_refused(dim):
+    """Nothing can hold a block that is pulled off its plane: the motion is named, the last state stays."""
+    scene = Loose(dim)
+    with pytest.raises(dc.NotConverged, match=r"a translation along \(0, (0, )?1\)"):
+        scene.load(*1e-3 * scene.up)
+    assert not scene.u.x.array.any()
+
+
+@pytest.mark.parametrize("kind", SOLVERS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_undetermined_motions_are_refused_or_nearest_to_the_last_state(dim, kind):
+    """Without friction: refused, the motions named; or fixed so that they do not change; pushed along: refused always."""
+    down = np.zeros(dim)
+    down[-1] = -1e-3
+    scene = Loose(dim, kind, mu=0.0)
+    with pytest.raises(ValueError, match=f"{2 * dim - 3} rigid motion.*translation along"):
+        scene.load(*down)
+    assert not scene.u.x.array.any()
+    scene.problem.undetermined = "nearest"
+    for load in (1.0, 2.0):
+        before = scene.u.x.array[: scene.problem.body.size].copy()
+        scene.load(*load * down)
+        change = (scene.u.x.array[: before.size] - before).reshape(-1, dim)
+        mean, most = COMM.allreduce(change.sum(axis=0)), scene.problem.body.largest(np.abs(change))
+        assert np.abs(mean[:-1]).max() < 1e-8 * most
+    down[0] = 1e-6
+    with pytest.raises(dc.NotConverged, match="a translation along"):
+        scene.load(*down)
+
+
+def test_a_body_without_load_stays_where_it_is():
+    """No load and nothing pressed: every position is a solution, so it is refused, or the block stays."""
+    scene = Loose(2)
+    with pytest.raises(ValueError, match="3 rigid motion"):
+        scene.load(0.0, 0.0)
+    scene.problem.undetermined = "nearest"
+    assert scene.load(0.0, 0.0).error < 1e-15
+    assert np.abs(scene.u.x.array).max() < 1e-15
+    with pytest.raises(ValueError, match="undetermined must be one of refused, nearest"):
+        scene.problem.undetermined = "any"
+
+
+@pytest.mark.parametrize("kind", SOLVERS)
+def test_half_a_block_behind_its_plane_of_symmetry_is_half_a_block(kind):
+    """A condition that leaves some motions free: with u_x = 0 at x = 0 the other reactions hold the rest."""
+
+    def symmetry(V):
+        sub = V.sub(0)
+        facets = mesh.locate_entities_boundary(V.mesh, 1, lambda x: np.isclose(x[0], 0.0))
+        return [fem.dirichletbc(0.0, fem.locate_dofs_topological(sub, 1, facets), sub)]
+
+    scene = Loose(2, kind, bcs=symmetry)
+    step = scene.load(1e-4, -1e-3)
+    assert step.error <= TOL
+    assert scene.sums()[0][1] == pytest.approx(1e-3, rel=1e-8)
+    assert scene.problem.body.loose.modes.shape[1] == 1
+
+
+def test_steps_are_taken_back_saved_and_loaded(tmp_path):
+    """rewind, and save and load, lead to the same next step."""
+    path = COMM.bcast(tmp_path / "state.npz", root=0)
+    scene = Loose(3)
+    scene.load(1e-4, 0, -1e-3)
+    scene.problem.save(path)
+    scene.load(2e-4, 0, -1e-3)
+    expected = scenes.gathered(scene.contact)[1]
+    scene.problem.rewind()
+    scene.load(2e-4, 0, -1e-3)
+    again = scenes.gathered(scene.contact)[1]
+    other = Loose(3)
+    other.problem.load(path)
+    other.load(2e-4, 0, -1e-3)
+    for r in (again, scenes.gathered(other.contact)[1]):
+        assert np.abs(r - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+def test_whether_loads_can_be_held_is_what_a_linear_programme_says():
+    """Random loads in two dimensions: the cone of sums is found to have them or not as SciPy's simplex does."""
+    optimize = pytest.importorskip("scipy.optimize")
+    scene, random, seen = Loose(2, mu=0.4), np.random.default_rng(3), set()
+    scene.load(0.0, -1e-3)
+    problem, x = scene.problem, np.concatenate(COMM.allgather(scene.contact.x))
+    for _ in range(40):
+        side, tilt = random.uniform(-1.0, 1.0, size=2)
+        scene.force.value[:] = side, -1.0
+        step = problem.load_step()
+        # a couple of forces along the sides, as a load of its own
+        body = problem.body
+        middle = body.V.tabulate_dof_coordinates()[: body.size // 2, 0] - 0.5
+        nodes = COMM.allreduce(len(middle))
+        step.b[1::2] += tilt * middle / nodes
+        arm = COMM.allreduce((tilt * middle**2 / nodes).sum())
+        rays = np.array([[s * 0.4, 1.0, (p - 0.5) + 0.4 * s * 0.4] for p in x[:, 0] for s in (-1, 1)]).T  # fmt: skip
+        target = -np.array([0.8 * side, -0.8, arm])
+        found = optimize.linprog(np.ones(rays.shape[1]), A_eq=rays, b_eq=target)
+        said = Statics(body, problem.contacts, step, np.zeros(body.size)).said
+        assert (said == "") == (found.status == 0)
+        seen.add(found.status)
+    assert seen == {0, 2}
