@@ -177,8 +177,10 @@ class Statics:
             by_motion[contact.reaction[:, -1] <= 0.0] = 0.0
             motion = (points.B @ self._modes).reshape(points.count, self._dim, -1)
             changed.append((by_motion @ motion).reshape(-1, self._felt.size))
-        triangle = np.linalg.qr(np.concatenate(changed), mode="r") / np.sqrt(self._felt)
-        _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(triangle)))
+        changed = np.concatenate(changed) / np.sqrt(self._felt)
+        if len(changed) > self._felt.size:  # and not empty, as where a rank has no contact nodes
+            changed = np.linalg.qr(changed, mode="r")
+        _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(changed)))
         small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
         return vectors[small].T / np.sqrt(self._felt)[:, None]
 
