@@ -16,7 +16,7 @@ from dolfinx_contact.bodies.internal_variables import InternalVariables
 from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.driven import check_driven, freedom
+from dolfinx_contact.contact.driven import approach, check_driven, freedom
 from dolfinx_contact.nonlinear_step import NonlinearStep
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
@@ -185,6 +185,7 @@ class ContactProblem(ProblemStates):
                 self.body.forget()
             for contact, where in zip(self.contacts, stood):
                 contact.plane.displacement = where
+                contact.plane.spin_by(None)
             self._restore()
             raise_interrupt(failure)
             raise
@@ -192,6 +193,8 @@ class ContactProblem(ProblemStates):
         self._variables.settle()
         for contact in self.contacts:
             contact.advance()
+        for contact in self.contacts:
+            contact.plane.end_step()
         self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
@@ -205,6 +208,7 @@ class ContactProblem(ProblemStates):
         """
         body = self.body
         assembled = body.refresh(self._states[0])
+        approach(body, self.contacts, self._states[0])
         turned = follow(self.contacts, body, self._states[0], self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
@@ -233,8 +237,10 @@ class ContactProblem(ProblemStates):
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
-        if step.planes is not None and step.planes.beyond(given=True):
-            return step, unmoved(self.body, step, self._states[0])
+        if step.planes is not None:
+            step.planes.check()
+            if step.planes.beyond(given=True):
+                return step, unmoved(self.body, step, self._states[0])
         if self.body.loose is not None:
             arguments = self.body, self.contacts, step, self._states[0], self.undetermined
             return step, held_by_contact(*arguments, self._solved)

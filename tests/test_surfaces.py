@@ -19,7 +19,18 @@ COMM = scenes.COMM
 E = 1000.0
 
 
-def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, nonlinear=False, **options):
+def block(
+    surface,
+    mu=0.0,
+    p=None,
+    edge=1.0,
+    cells=None,
+    half=False,
+    nonlinear=False,
+    order=1,
+    modulus=1.0,
+    **options,
+):
     """A block on [-edge/2, edge/2]^(d-1) x [0, edge] whose top is held and moved, and whose foot meets a surface.
 
     Of it the half y > 0 alone with ``half``, its displacement across y = 0 being zero.
@@ -35,10 +46,12 @@ def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, nonlinear=F
     )
     domain = create(COMM, corners, cells or [2] * d, kind)
     foot, top = (
-        mesh.locate_entities_boundary(domain, d - 1, lambda x, z=z: np.isclose(x[d - 1], z))
+        mesh.locate_entities_boundary(
+            domain, d - 1, lambda x, z=z: np.isclose(x[d - 1] / edge, z / edge)
+        )
         for z in (0.0, edge)
     )
-    V = functionspace(domain, ("Lagrange", 1, (d,)))
+    V = functionspace(domain, ("Lagrange", order, (d,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
     held = fem.Constant(domain, np.zeros(d))
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)
@@ -48,7 +61,7 @@ def block(surface, mu=0.0, p=None, edge=1.0, cells=None, half=False, nonlinear=F
         dofs, zero = fem.locate_dofs_topological(across, d - 1, middle), fem.Constant(domain, 0.0)
         bcs.append(fem.dirichletbc(zero, dofs, across))
     contact = dc.Contact(V, foot, surface, dc.Friction(mu, p))
-    F = elasticity(u, v, E, 0.0)
+    F = elasticity(u, v, E * modulus, 0.0)
     if nonlinear:  # stiffer where it is stretched
         F = F + E * ufl.inner(u, u) * ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10, **options)
@@ -412,8 +425,8 @@ def test_a_checkpoint_of_another_surface_is_refused(tmp_path):
         (lambda: dc.RigidSphere((0, 0), 1.0, inside=1), "inside must be True or False"),
         (lambda: dc.RigidCylinder((0, 0), (1, 0), 1.0), "RigidCylinder needs three dimensions"),
         (lambda: dc.RigidCylinder((0, 0, 0), (0, 0, 0), 1.0), "axis must not be zero"),
-        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "free", ("n",)), "force drives planes"),
-        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "force", (0, 1)), "force drives planes"),
+        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "free", ("n",)), "names among"),
+        (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "force", (0, 1, 0)), "vector of 2"),
         (lambda: setattr(dc.RigidSphere((0, 0), 1.0), "rotation", (0, 1)), "one angle"),
         (lambda: setattr(dc.RigidPlane((0, 0, 0), (0, 0, 1)), "rotation", 1.0), "vector of 3"),
         (lambda: dc.RigidPlane((0, 0), (0, 1), height=1.0), "height must be a function"),

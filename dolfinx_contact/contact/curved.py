@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import positive
-from dolfinx_contact.contact.surface import RigidSurface, unit, vector
+from dolfinx_contact.contact.drive import vector
+from dolfinx_contact.contact.surface import RigidSurface, unit
 
 # Part of the radius within which a position has no direction from the centre; of a direction that has to be tangential.
 NEAR, ALONG = 1e-9, 1e-8
@@ -110,6 +111,9 @@ class RigidSphere(_Round):
         displacement: From the first position, ``shape=(gdim,)``, global frame, length units; assign another one
             between steps.
         rotation: About the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle.
+        free, force, moment, stiffness, drive: As of ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
+            dimensions "x", "y", "r", along and about ``guides``.
+        guides: Directions of these names, one a row, ``shape=(gdim, gdim)``, global frame; do not turn.
     """
 
     def __init__(self, centre: ArrayLike, radius: float, axis: ArrayLike | None = None, inside: bool = False) -> None:  # fmt: skip
@@ -147,6 +151,7 @@ class RigidCylinder(_Round):
         displacement: From the first position, ``shape=(3,)``, global frame, length units; assign another one between
             steps.
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``.
+        free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
     """
 
     def __init__(

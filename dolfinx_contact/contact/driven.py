@@ -1,9 +1,10 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Planes driven by force: their motions are unknowns, each with the equilibrium of forces on its plane as equation.
+"""Surfaces driven by force: their motions are unknowns, each with the equilibrium of its surface as equation.
 
-Of all planes together there are ``m`` free motions ``c``, lengths along free axes.  A node at ``B u`` moves relative to
-its plane by ``B u - D c``, local components, and planes are in equilibrium where ``D^T r = F + k (drive - c)``.
+Of all surfaces together there are ``m`` free motions ``c``, lengths along free axes, and angles about them times a length
+of the contact.  A node at ``B u`` moves relative to its surface by ``B u - D c``, local components, and surfaces are in
+equilibrium where ``D^T r = F + k (drive - c)``.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ from mpi4py import MPI
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.plane_balance import PlaneBalance
+from dolfinx_contact.contact.sliding import slides_away
 
 # Part of the nodes' stiffness that is added to the tangent of planes: where all nodes slip it has none of its own.
 REGULAR = 1e-10
 
-# Part of what friction carries that has to be left: where all is used, how far the plane slides is not determined.
-MARGIN = 1e-9
+# Part of a motion that has to be along normals for these to resist it.
+RESISTING = 1e-8
+
+# Times that a curved surface far from the body comes nearer.
+APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
 
 def driven_planes(body, contacts) -> DrivenPlanes | None:
@@ -27,84 +32,177 @@ def driven_planes(body, contacts) -> DrivenPlanes | None:
 
 
 def freedom(contacts) -> list[tuple]:
-    """Free directions and springs of each contact's plane, which what solvers set up depends on."""
-    return [(contact.plane.free, contact.plane.springs.tolist()) for contact in contacts]
+    """Free motions and springs of each contact's plane, which what solvers set up depends on."""
+    return [
+        (contact.plane.free, contact.plane.springs.tolist(), contact.plane.guides.tolist())
+        for contact in contacts
+    ]
 
 
 def check_driven(body, contacts) -> None:
-    """Raise a ``ValueError`` on all ranks if nothing would hold a plane that force drives.  Collective."""
+    """Raise a ``ValueError`` on all ranks if what drives a plane makes no sense.  Collective."""
     with raised_together(body.comm):
         for contact in contacts:
             contact.plane.check_drive()
-    planes = driven_planes(body, contacts)
-    for plane, rough in [] if planes is None else planes.rough():
-        loose = [name for name, k in zip(plane.free, plane.springs) if name != "n" and k == 0]
-        if loose and not rough:
-            raise ValueError(
-                f"plane.free has {loose[0]!r}, along which nothing holds the plane: there is no friction. Give it "
-                "plane.stiffness, or prescribe its displacement."
-            )
+
+
+def approach(body, contacts, u: np.ndarray) -> None:
+    """Move curved surfaces that force drives and no node touches to the body.  Collective.
+
+    Args:
+        u: Last displacement, owned degrees of freedom.
+    """
+    curved = [contact for contact in contacts if contact.plane.free and contact.plane.curved]
+    for _ in range(APPROACHES if curved else 0):
+        with raised_together(body.comm):
+            for contact in curved:
+                contact.follow(u)
+        if not DrivenPlanes(body, curved).touch(u, NEAR * body.extent):
+            return
 
 
 class DrivenPlanes:
-    """The planes of some contacts that force drives, and their free motions from where they stand at first.
+    """The surfaces of some contacts that force drives, and their free motions from where they stand at first.
 
     Args:
         body: The body, for sums over ranks.
-        contacts: Its contacts; several may have the same plane.
+        contacts: Its contacts; several may have the same surface.  Collective.
 
     Attributes:
         count: Number ``m`` of free motions.
         axes: ``D`` of each contact, ``shape=(n, gdim, m)``, zero for directions in which supports hold a node.
         springs: Stiffness of each motion's spring, ``shape=(m,)``, force per length.
         moved: The motions, ``shape=(m,)``, length units, the same on all ranks.
+        plain: Whether all surfaces are planes that do not turn.
+        pressing: Which motions the normal reactions resist most, ``shape=(m,)``.
     """
 
     def __init__(self, body, contacts):
         self._body, self._contacts = body, contacts
-        self._planes = list({id(c.plane): c.plane for c in contacts if c.plane.free}.values())
-        self._home = [plane.displacement for plane in self._planes]
-        ends = np.cumsum([0] + [len(plane.free) for plane in self._planes])
-        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]
+        self.planes = list({id(c.plane): c.plane for c in contacts if c.plane.free}.values())
+        self._home = [plane.displacement for plane in self.planes]
+        self._motions = [plane.motions for plane in self.planes]
+        ends = np.cumsum([0] + [len(motions) for motions in self._motions])
+        self.parts = [slice(a, b) for a, b in zip(ends, ends[1:])]
         self.count, self.moved = int(ends[-1]), np.zeros(ends[-1])
-        self.springs = np.concatenate([plane.springs for plane in self._planes])
+        self.plain = not any(plane.curved or plane.spins for plane in self.planes)
         self.axes = [self._axes(contact) for contact in contacts]
+        self._lengths = np.ones(self.count) if self.plain else self._scaled()
+        motions = [motion for motions in self._motions for motion in motions]
+        self.springs = np.array([motion.spring for motion in motions]) / self._lengths**2
+        self.names = [motion.name for motion in motions]
+        self.turns = np.array([motion.turns for motion in motions])
+        self.pressing = np.array([name == "n" for name in self.names])
+        if not self.plain:
+            self.pressing = self._resisted()
 
     def _axes(self, contact) -> np.ndarray:
         points, plane = contact.points, contact.plane
         axes = np.zeros((points.count, points.dim, self.count))
-        for one, part in zip(self._planes, self._parts):
+        for one, part, motions in zip(self.planes, self.parts, self._motions):
             if one is plane:
-                rows = [plane.directions.index(name) for name in plane.free]
-                axes[:, rows, range(part.start, part.stop)] = 1.0
+                for k, motion in enumerate(motions, start=part.start):
+                    axes[:, :, k] = contact.carried_by(motion.axis, motion.turns)
         axes[:, :-1][points.held] = 0.0
         axes[points.closed] = 0.0
         return axes
+
+    def _scaled(self) -> np.ndarray:
+        """Give rotations the dimension of displacements: the largest lever arm of each, or one.  Collective."""
+        lengths = np.ones(self.count)
+        for k, motion in enumerate(motion for motions in self._motions for motion in motions):
+            if motion.turns:
+                arms = [np.linalg.norm(axes[:, :, k], axis=1) for axes in self.axes]
+                lengths[k] = self._body.largest(np.concatenate(arms)) or 1.0
+        for axes in self.axes:
+            axes /= lengths
+        return lengths
+
+    def _resisted(self) -> np.ndarray:
+        """Motions more along normals than across; without friction all that are along normals at all.  Collective."""
+        parts = [np.zeros((2, self.count))]
+        for axes in self.axes:
+            squares = (axes**2).sum(axis=0)
+            parts.append(np.array([squares[-1], squares[:-1].sum(axis=0)]))
+        along, across = self._body.total(np.sum(parts, axis=0))
+        smooth = np.zeros(self.count, dtype=bool)
+        for (_, rough), part in zip(self.rough(), self.parts):
+            smooth[part] = not rough
+        self._loose = smooth & (along <= RESISTING**2 * (along + across)) & (self.springs == 0.0)
+        return (along > across) | (smooth & ~self._loose)
+
+    def check(self) -> None:
+        """Raise a ``ValueError`` on all ranks if nothing would hold a surface that force drives.  Collective."""
+        if self.plain:
+            self._loose = ~self.pressing & (self.springs == 0.0)
+            for (_, rough), part in zip(self.rough() if self._loose.any() else (), self.parts):
+                self._loose[part] &= not rough
+        if self._loose.any():
+            name = self.names[int(np.argmax(self._loose))]
+            raise ValueError(
+                f"plane.free has {name!r}, along or about which nothing holds the plane: there is no friction. Give it "
+                "plane.stiffness, or prescribe its motion."
+            )
+        pulled = [] if self.plain else self._pulled()
+        if pulled:
+            raise ValueError(
+                f"plane.force does not press {self.planes[pulled[0]]} on the body: it pulls the surface off, and nothing "
+                "else holds it. It is the force of the surface on the body; a spring, plane.stiffness, also pulls."
+            )
+
+    def _pulled(self) -> list[int]:
+        """Curved surfaces that their force pulls off the body.  Collective."""
+        found, driving = [], self.driving()
+        for number, (plane, part) in enumerate(zip(self.planes, self.parts)):
+            for k in range(part.start, part.stop) if plane.curved else ():
+                if self.pressing[k] and not self.turns[k] and self.springs[k] == 0.0 != driving[k]:
+                    ways = [np.sign(driving[k]) * axes[:, -1, k] for axes in self.axes]
+                    if self._body.highest(np.concatenate(ways)) <= 0.0:
+                        found.append(number)
+        return found
 
     # -- motions -------------------------------------------------------------------------------
 
     def move_to(self, moved: np.ndarray) -> None:
         """Move the planes by these lengths along their free axes from where they stood at first."""
         self.moved = moved
-        for plane, home, part in zip(self._planes, self._home, self._parts):
-            plane.displacement = home + moved[part] @ plane.free_axes
+        for plane, home, part, motions in zip(self.planes, self._home, self.parts, self._motions):
+            ways = moved[part] / self._lengths[part]
+            turned = [way * motion.axis for way, motion in zip(ways, motions) if motion.turns]
+            along = [motion.axis for motion in motions if not motion.turns]
+            if turned:
+                plane.spin_by(np.sum(turned, axis=0))
+            if along:
+                plane.displacement = home + ways[len(turned) :] @ np.array(along)
 
-    def touch(self, x: np.ndarray) -> None:
+    def touch(self, x: np.ndarray, near: float | None = None) -> bool:
         """Move planes that no node touches at a displacement to where one node alone would carry the force.  Collective.
 
         From further away nothing tells how the forces on the plane change with its motion.
+
+        Args:
+            x: Displacement of owned degrees of freedom.
+            near: If given, planes further away than that are moved to the first node, others stay.
+
+        Returns:
+            Whether any was moved.
         """
-        driving = self.driving()
-        for motion in self.normal_motions:
+        driving, touched = self.driving(), False
+        for motion in np.flatnonzero(self.pressing & ~self.turns):
+            sign = -1.0 if driving[motion] < 0.0 else 1.0
             ways = [np.full((2, 1), np.inf)]  # to the first node; to where it carries the force
             for contact, axes in zip(self._contacts, self.axes):
                 contact.move(x)
-                gap = np.array([contact.gap, contact.gap + driving[motion] / contact.rho])
-                ways.append(gap[:, axes[:, -1, motion] > 0])
+                gap, rate = contact.gap, sign * axes[:, -1, motion]
+                push = 0.0 if near is not None else sign * driving[motion] / contact.rho
+                ways.append(np.array([gap, gap + push])[:, rate > 0] / rate[rate > 0])
             first, far = np.concatenate(ways, axis=1).min(axis=1)
             first, far = (self._body.comm.allreduce(float(way), op=MPI.MIN) for way in (first, far))
-            if driving[motion] > 0.0 <= first < np.inf:
-                self.move_to(self.moved + far * np.eye(self.count)[motion])
+            away = 0.0 <= first if near is None else near < first
+            if driving[motion] != 0.0 and away and first < np.inf:
+                self.move_to(self.moved + sign * far * np.eye(self.count)[motion])
+                touched = True
+        return touched
 
     def at_rest(self, softest: float = 0.0) -> np.ndarray:
         """The motions at which springs hold the planes without reactions.
@@ -118,33 +216,25 @@ class DrivenPlanes:
     @property
     def can_rest(self) -> bool:
         """Whether no plane needs reactions along its normal."""
-        return all(p.free[-1] != "n" or p.springs[-1] > 0 for p in self._planes)
+        return bool((self.springs[self.pressing] > 0).all())
 
     # -- forces --------------------------------------------------------------------------------
 
     def driving(self) -> np.ndarray:
         """Sum of the reactions that the present motions ask for, ``F + k (drive - c)``, ``shape=(m,)``."""
-        return np.concatenate(
-            [
-                plane.free_axes @ _force(plane)
-                + plane.springs * (plane.free_axes @ (plane.drive - plane.displacement))
-                for plane in self._planes
-            ]
-        )
+        both = zip(self.planes, self._motions)
+        return np.concatenate([plane.pulled_by(motions) for plane, motions in both]) / self._lengths
 
     def left(self) -> tuple[np.ndarray, np.ndarray]:
         """Forces out of balance, reactions minus what drives, and the size of their terms, ``shape=(m,)``.  Collective."""
         sums = np.zeros((2, self.count))
         for contact, axes in zip(self._contacts, self.axes):
             sums[0] += np.tensordot(contact.reaction, axes, 2)
-            sums[1] += np.tensordot(np.abs(contact.reaction), axes, 2)
+            sums[1] += np.tensordot(np.abs(contact.reaction), np.abs(axes), 2)
         total, size = self._body.total(sums)
-        terms = [
-            np.abs(plane.free_axes) @ np.abs(_force(plane))
-            + plane.springs * (np.abs(plane.free_axes) @ (np.abs(plane.drive) + np.abs(plane.displacement)))
-            for plane in self._planes
-        ]  # fmt: skip
-        return total - self.driving(), size + np.concatenate(terms)
+        both = zip(self.planes, self._motions)
+        terms = np.concatenate([plane.pulled_by(motions, True) for plane, motions in both])
+        return total - self.driving(), size + terms / self._lengths
 
     def tangent(self, derivatives) -> np.ndarray:
         """Derivative of the forces out of balance by the motions, ``k - D^T R_w D``, ``shape=(m, m)``.  Collective.
@@ -184,51 +274,22 @@ class DrivenPlanes:
         PlaneBalance(self, self._body, x, maps, asked).reach()
 
     @property
-    def normal_motions(self) -> list[int]:
-        """The motions along normals."""
-        both = zip(self._planes, self._parts)
-        return [part.stop - 1 for plane, part in both if plane.free[-1] == "n"]
+    def normal_motions(self) -> np.ndarray:
+        """The motions that normal reactions resist."""
+        return np.flatnonzero(self.pressing)
 
     def rough(self) -> list[tuple]:
         """The planes, and whether there is friction on each.  Collective."""
         known = []
-        for plane in self._planes:
+        for plane in self.planes:
             laws = [c.friction.mu.ravel() for c in self._contacts if c.plane is plane]
             known.append((plane, self._body.largest(np.concatenate(laws)) > 0.0))
         return known
 
-    # -- sliding -------------------------------------------------------------------------------
-
     def beyond(self, given: bool = False) -> str:
-        """Which plane is pushed by more than friction can carry, in words; none is the empty string.  Collective.
+        """Which plane is pushed by more than can be carried, in words; none is the empty string.  Collective.
 
         Args:
             given: Ask before anything is known but the forces that are given, not by the present normal reactions.
         """
-        driving = self.driving()
-        for plane, part in zip(self._planes, self._parts):
-            along = np.array([name != "n" for name in plane.free])
-            if not along.any() or plane.springs[along].any():
-                continue
-            most = self._most(plane, given)
-            pushed = float(np.linalg.norm(driving[part][along]))
-            if pushed > most * (1 - MARGIN if given else 1):
-                return (
-                    f"plane.force pushes {plane} along it by {pushed:.6g}, and friction carries {most:.6g} at most: the "
-                    "plane slides away, no static state exists"
-                )
-        return ""
-
-    def _most(self, plane, given: bool) -> float:
-        """What friction on a plane carries at most; infinite where that is not known yet."""
-        contacts = [contact for contact in self._contacts if contact.plane is plane]
-        if given:
-            largest = self._body.largest(np.concatenate([c.friction.mu.ravel() for c in contacts]))
-            known = plane.free[-1] == "n" and plane.springs[-1] == 0
-            return largest * float(_force(plane) @ plane.frame[-1]) if known else np.inf
-        carried = [(c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c in contacts]
-        return float(self._body.total([sum(carried)])[0])
-
-
-def _force(plane) -> np.ndarray:
-    return np.zeros(plane.point.size) if plane.force is None else plane.force
+        return slides_away(self, self._body, self._contacts, given)

@@ -11,6 +11,7 @@ tangent plane there, see docs/surfaces.md.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from dolfinx_contact.attributes import frozen
 from dolfinx_contact.contact.history import State, Status
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.results import ContactResults
+from dolfinx_contact.contact.surface import cross
 from dolfinx_contact.error import EPSILON
 
 
@@ -32,6 +34,7 @@ class Placed(NamedTuple):
     frame: np.ndarray  # the same in global components
     flat: np.ndarray  # gap less the displacement along the normal, (n,)
     points: ContactPoints
+    arms: np.ndarray | None  # of nodes about the surface's point, (n, gdim), if rotations are free
 
 
 class ContactKinematics(ContactResults):
@@ -54,10 +57,19 @@ class ContactKinematics(ContactResults):
     def _at(self) -> np.ndarray:
         return self.x[:, : self.V.mesh.geometry.dim]
 
+    @property
+    def arms(self) -> np.ndarray:
+        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
+        arms = self._placed.arms
+        return self._at - self.plane.point - self.plane.displacement if arms is None else arms
+
     # -- frames --------------------------------------------------------------------------------
 
-    def place(self, home: np.ndarray | None = None) -> None:
-        """Take frames and gaps at positions relative to the surface; None is where the undeformed body stands."""
+    def place(self, home: np.ndarray | None = None, there: np.ndarray | None = None) -> None:
+        """Take frames and gaps at positions relative to the surface; None is where the undeformed body stands.
+
+        ``there`` are positions in space, with None those of the undeformed body, for lever arms.
+        """
         plane, x = self.plane, self._at
         if home is None:
             home = plane.relative(x) if plane.varies else x
@@ -66,12 +78,16 @@ class ContactKinematics(ContactResults):
         if home is not x:
             flat = flat - _times(own, home - x)[:, -1]
         before = self._placed
-        if before and not plane.curved and np.array_equal(before.rotation, plane.rotation):
+        arms = None
+        if plane.spins:
+            arms = frozen((x if there is None else there) - plane.point - plane.displacement)
+        stands = not plane.curved and arms is None
+        if before and stands and np.array_equal(before.rotation, plane.rotation):
             points = before.points
         else:
             points = self._points_of(frame)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
-        self._placed = Placed(home, plane.rotation, own, frame, flat, points)
+        self._placed = Placed(home, plane.rotation, own, frame, flat, points, arms)
 
     def _points_of(self, frame: np.ndarray) -> ContactPoints:
         n, gdim = self._at.shape
@@ -82,7 +98,10 @@ class ContactKinematics(ContactResults):
     @property
     def follows(self) -> bool:
         """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
-        return self.plane.varies or not np.array_equal(self.plane.rotation, self._placed.rotation)
+        plane = self.plane
+        return (
+            plane.varies or plane.spins or not np.array_equal(plane.rotation, self._placed.rotation)
+        )
 
     def follow(self, u: np.ndarray) -> None:
         """Take frames and gaps for the next step, where the surface is at present.
@@ -93,10 +112,8 @@ class ContactKinematics(ContactResults):
             u: Displacement of owned degrees of freedom with which nodes stand there, that of the last step.
         """
         (placed, last), plane = self._settled, self.plane
-        if not plane.varies:
-            self.place(placed.home)
-        else:
-            self.place(plane.relative(self._at + u[self.points.dofs]))
+        there = self._at + u[self.points.dofs]
+        self.place(plane.relative(there) if plane.varies else placed.home, there)
         now = self._placed
         if plane.curved:
             moved = _turned_back(placed.own, last.displacement)
@@ -129,8 +146,21 @@ class ContactKinematics(ContactResults):
 
     def _moved(self) -> np.ndarray:
         """Motion of the surface at the nodes, local frame: ``shape=(gdim,)`` if it is the same for all."""
-        motion = self.plane.motion(self._at)
+        motion = self._carried()
         return self.frame @ motion if motion.ndim == 1 else _times(self.frame, motion)
+
+    def _carried(self) -> np.ndarray:
+        """Motion of the surface at the nodes, global frame: ``shape=(gdim,)`` if it is the same for all."""
+        motion, spin = self.plane.motion(self._at), self.plane.spin
+        return motion if spin is None else motion + cross(spin, self._placed.arms)
+
+    def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
+        """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
+        shape = (self.points.count, self.points.dim)
+        if turns:
+            return _times(self.frame, cross(axis, self._placed.arms))
+        along = self.frame @ axis  # the axes of a plane are those of its frame
+        return np.broadcast_to(along if self.plane.curved else np.rint(along), shape)
 
     def move(self, u: fem.Function | np.ndarray) -> None:
         """Gaps and slip increments for a displacement, from the last converged step on.
@@ -160,7 +190,7 @@ class ContactKinematics(ContactResults):
         Args:
             u: Displacement of owned degrees of freedom, for which gaps and slips were computed.
         """
-        motion = np.abs(self.plane.motion(self._at))
+        motion = np.abs(self._carried())
         felt = (
             np.abs(self.frame) @ motion if motion.ndim == 1 else _times(np.abs(self.frame), motion)
         )
@@ -177,8 +207,14 @@ class ContactKinematics(ContactResults):
         self._settled = self._placed, self._last
 
     def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
-        """See ``ContactHistory``."""
+        """See ``ContactHistory``; with what a rotation found in the step is beyond the first order."""
         super().settle(work, path, depth)
+        if self.plane.spin is not None:
+            ended = copy(self.plane)
+            ended.end_step()
+            moved = _turned_back(self.frame, self.displacement) + self._carried()
+            turned = ended.relative(self._at + moved) - self._at
+            self._last = self._last._replace(displacement=frozen(_times(self._placed.own, turned)))
         self._settle_here()
 
     def restore(self) -> None:
@@ -194,6 +230,8 @@ class ContactKinematics(ContactResults):
             saved["home"] = placed.home
         if placed.rotation.any():
             saved["rotation_of_plane"] = placed.rotation
+        if self.plane.spins:
+            saved["found_rotation_of_plane"] = self.plane.rotation
         return saved
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
@@ -210,6 +248,7 @@ class ContactKinematics(ContactResults):
             self.place(np.array(saved["home"]) if plane.varies else self._placed.home)
         super().load(saved)
         self._settle_here()
+        plane.rotation = saved.get("found_rotation_of_plane", plane.rotation)
 
     def history(self) -> tuple:
         """See ``ContactHistory``; with the frames."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import finite
-from dolfinx_contact.contact.surface import RigidSurface, unit, vector
+from dolfinx_contact.contact.surface import RigidSurface, unit
 
 
 class RigidPlane(RigidSurface):
@@ -39,14 +39,17 @@ class RigidPlane(RigidSurface):
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.
             Assigned between steps: normal and axis turn with the plane, and slip is relative to it.
         free: Directions of the frame along which a force drives the plane, a tuple of "t1", "t2" and "n", in two
-            dimensions of "t" and "n"; none at first.
+            dimensions of "t" and "n", and rotations about these, "r1", "r2", "rn", in two dimensions "r"; none at first.
         force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Its components along
             directions that are not free do not count: a guide carries the rest.
+        moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
+            dimensions one number, global frame; None is zero.
         stiffness: Of a spring that pulls the plane along the free directions, force per length: a number, or one for
-            each of them; zero, a dead load, at first.
+            each of them, of a rotation moment per radian; zero, a dead load, at first.
         drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
     """
 
+    _settable = ("displacement", "rotation", "free", "force", "moment", "stiffness", "drive")
     _remedy = "make a new RigidPlane and a new Contact; plane.displacement and plane.rotation move a plane."
 
     def __init__(
@@ -62,10 +65,6 @@ class RigidPlane(RigidSurface):
             raise ValueError(f"height must be a function of positions, got {height!r}.")
         self.height, self.varies = height, height is not None
         self.normal = frozen(unit("normal", normal, size))
-        self._drive = frozen(np.zeros(size))
-        self._free: tuple[str, ...] = ()
-        self._force: np.ndarray | None = None
-        self._stiffness = frozen(np.zeros(1))
         if axis is not None:
             along = unit("axis", axis, size)
             across = along - (along @ self.normal) * self.normal
@@ -85,79 +84,14 @@ class RigidPlane(RigidSurface):
         return ("t", "n") if self.point.size == 2 else ("t1", "t2", "n")
 
     @property
-    def free(self) -> tuple[str, ...]:
-        return self._free
+    def drive_axes(self) -> np.ndarray:
+        """The rows of ``frame``."""
+        return self.frame
 
-    @free.setter
-    def free(self, names: Sequence[str]) -> None:
-        known = self.directions
-        if not isinstance(names, (tuple, list)) or any(name not in known for name in names):
-            raise ValueError(
-                f"plane.free must be a tuple of names among {known}, such as ('n',), got {names!r}."
-            )
-        self._free = tuple(name for name in known if name in names)
-
-    @property
-    def force(self) -> np.ndarray | None:
-        return self._force
-
-    @force.setter
-    def force(self, value: ArrayLike | None) -> None:
-        size = self.point.size
-        self._force = None if value is None else frozen(vector("plane.force", value, size))
-
-    @property
-    def stiffness(self) -> np.ndarray:
-        return self._stiffness
-
-    @stiffness.setter
-    def stiffness(self, value: ArrayLike) -> None:
-        array = np.atleast_1d(finite("plane.stiffness", value))
-        if array.ndim != 1 or array.size > self.point.size or not (array >= 0).all():
-            raise ValueError(
-                "plane.stiffness must be a number, or one for each free direction, zero or more, got "
-                f"{value!r}."
-            )
-        self._stiffness = frozen(array)
-
-    @property
-    def drive(self) -> np.ndarray:
-        return self._drive
-
-    @drive.setter
-    def drive(self, value: ArrayLike) -> None:
-        self._drive = frozen(vector("plane.drive", value, self.point.size))
-
-    @property
-    def free_axes(self) -> np.ndarray:
-        """Unit vectors of the free directions, ``shape=(m, gdim)``, global frame."""
-        return self.frame[[self.directions.index(name) for name in self._free]]
-
-    @property
-    def springs(self) -> np.ndarray:
-        """Stiffness of the spring along each free direction, ``shape=(m,)``, force per length."""
-        return np.broadcast_to(self._stiffness, len(self._free))
-
-    def driven(self) -> str:
-        """What drives the plane, in words."""
-        given = (self._free, self._force, self._stiffness, self._drive)
-        return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
-
-    def check_drive(self) -> None:
-        """Raise a ``ValueError`` if no force drives what is free, or the plane would leave the body."""
-        if self._stiffness.size not in (1, len(self._free)):
-            raise ValueError(
-                f"plane.stiffness has {self._stiffness.size} numbers, plane.free {len(self._free)} names."
-            )
-        if not self._free or (self._force is None and self.springs.all()):
-            return
-        if self._force is None:
-            raise ValueError(
-                f"plane.free is {self._free}, but neither plane.force nor plane.stiffness drives all of them: set "
-                "plane.force."
-            )
+    def _check_pressing(self, motion) -> None:
+        """See ``Drive``."""
         pressing = float(self._force @ self.frame[-1])
-        if self._free[-1] == "n" and self.springs[-1] == 0 and pressing <= 0:
+        if motion.name == "n" and motion.spring == 0 and pressing <= 0:
             raise ValueError(
                 f"plane.force {self._force.tolist()} does not press the plane on the body: its component along the "
                 f"normal is {pressing:g}, must be positive, and nothing else holds the plane. It is the force of the "

@@ -19,6 +19,12 @@ TURNED = 0.1
 # Motion over that with which the last node begins to slip, after which all slip in its direction.
 TURNING = 1e3
 
+# Part of a motion that carries a node along its surface; of less the node says nothing about where all slip.
+CARRIED = 0.5
+
+# Of the nodes' stiffness, added where too few touch to hold the plane.
+REGULAR = 1e-10
+
 
 class PlaneBalance:
     """The equilibrium of planes at a displacement, in their motions alone: a few unknowns, products at contact nodes.
@@ -37,8 +43,11 @@ class PlaneBalance:
     def reach(self) -> None:
         """Move the planes into equilibrium, or as near as Newton's method comes.  Collective."""
         planes, limits = self._planes, None
-        for motion in planes.normal_motions:
-            self._press(motion)
+        if planes.plain:
+            for motion in planes.normal_motions:
+                self._press(motion)
+        elif planes.pressing.any():
+            self._press_together()
         left, size = self._response()
         for _ in range(STEPS):
             if (np.abs(left) <= BALANCED * size).all():
@@ -95,19 +104,18 @@ class PlaneBalance:
             springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
             pressure = np.maximum(contact.reaction[:, -1] - map.normal * contact.gap, 0.0)
             bound = contact.friction.mu.max(axis=-1) * pressure
-            node, row, motion = np.nonzero(
-                axes[:, :-1] * (springs * bound[:, None] > 0)[:, :, None]
-            )
-            rate = springs[node, row]
-            middle = contact.slip_increment[node, row] - contact.reaction[node, row] / rate
+            carried = np.where(np.abs(axes[:, :-1]) >= CARRIED, axes[:, :-1], 0.0)
+            node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
+            rate, way = springs[node, row], carried[node, row, motion]
+            middle = (contact.slip_increment[node, row] - contact.reaction[node, row] / rate) / way
             # In three dimensions directions go on turning to that of the motion.
-            width = (1.0 if contact.points.dim == 2 else TURNING) * bound[node] / rate
+            width = (1.0 if contact.points.dim == 2 else TURNING) * bound[node] / (rate * abs(way))
             for side, sign in enumerate((-1, 1)):
                 np.maximum.at(limits[side], motion, width + sign * middle)
         self._body.comm.Allreduce(MPI.IN_PLACE, limits, op=MPI.MAX)
         limits[0] *= -1
         limits += planes.moved
-        endless = ~np.isfinite(limits).all(axis=0) | (planes.springs > 0)
+        endless = ~np.isfinite(limits).all(axis=0) | (planes.springs > 0) | planes.pressing
         limits[:, endless] = np.array([[-np.inf], [np.inf]])
         return limits
 
@@ -137,3 +145,50 @@ class PlaneBalance:
             moved -= left / (slope + spring)
         if moved != 0.0:
             planes.move_to(planes.moved + moved * np.eye(planes.count)[motion])
+
+    def _press_together(self) -> None:
+        """Move planes until predictors ``max(r_n - rho x_n, 0)`` are in balance along all motions that these resist.
+
+        The forces are the gradient of a convex function, the energy of springs ``rho``: Newton's method, in steps along
+        which it falls.
+        """
+        planes, total = self._planes, self._body.total
+        which = planes.normal_motions
+        parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
+        for contact, map, axes in zip(self._asked(), self._maps, planes.axes):
+            contact.move(self._x)
+            parts.append(np.array([contact.reaction[:, -1] - map.normal * contact.gap, map.normal]))
+            columns.append(axes[:, -1, which])
+        (at_first, rho), D = np.concatenate(parts, axis=1), np.concatenate(columns)
+        springs, target, n = planes.springs[which], planes.driving()[which], which.size
+
+        def energy(moved):
+            pressure = np.maximum(at_first + rho * (D @ moved), 0.0)
+            stored = float(total([(pressure**2 / (2 * rho)).sum()])[0])
+            return stored + moved @ (springs * moved / 2 - target), pressure
+
+        most = total(np.einsum("ni,n,nj->ij", D, rho, D)) + np.diag(springs)
+        moved, least = np.zeros(n), energy(np.zeros(n))
+        for _ in range(STEPS):
+            pressure, active = least[1], rho * (least[1] > 0)
+            sums = np.concatenate(
+                (pressure @ D, pressure @ np.abs(D), np.einsum("ni,n,nj->ij", D, active, D).ravel())
+            )
+            force, size, slope = np.split(total(sums), [n, 2 * n])
+            left = force + springs * moved - target
+            if (np.abs(left) <= BALANCED * (size + np.abs(target) + springs * np.abs(moved))).all():
+                break
+            slope = slope.reshape(n, n) + np.diag(springs) + REGULAR * most
+            change, length = -np.linalg.solve(slope, left), 1.0
+            while length > 2.0**-LENGTHS:
+                following = energy(moved + length * change)
+                if following[0] < least[0]:
+                    break
+                length /= 2
+            else:
+                break
+            moved, least = moved + length * change, following
+        if moved.any():
+            whole = np.zeros(planes.count)
+            whole[which] = moved
+            planes.move_to(planes.moved + whole)

@@ -55,6 +55,20 @@ class ContactResults(ContactLaws):
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
 
+    def moment(self) -> np.ndarray:
+        """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
+
+        With the lever arms of the step: from where the point was put before it to where the nodes were then.  After a
+        step it is ``plane.moment`` about the axes that are free.
+        """
+        forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
+        arms = self.arms
+        if arms.shape[1] == 2:
+            moments = (arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]).sum(axis=0)
+        else:
+            moments = np.cross(arms, forces).sum(axis=0)
+        return self.comm.allreduce(moments)
+
     @property
     def area(self) -> np.ndarray:
         """Area of the contact surface that belongs to each node, ``shape=(n,)``, reference state.

@@ -4,28 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import finite
-
-
-def vector(name: str, value, size: int | None = None) -> np.ndarray:
-    """A vector of finite real numbers, as floats."""
-    try:
-        array = np.asarray(value)
-        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
-    except ValueError:  # ragged nesting
-        real = False
-    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
-        wanted = "2 or 3" if size is None else str(size)
-        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {value!r}.")
-    return array.astype(np.float64)
+from dolfinx_contact.contact.drive import Drive, check_guides, vector
 
 
 def unit(name: str, value, size: int) -> np.ndarray:
@@ -38,7 +22,7 @@ def unit(name: str, value, size: int) -> np.ndarray:
     return along / np.linalg.norm(along)
 
 
-class RigidSurface(Guarded):
+class RigidSurface(Drive):
     """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
 
     Such positions are in axes that move with the surface: global components as long as it stands where it was made.
@@ -52,17 +36,17 @@ class RigidSurface(Guarded):
         axis: First principal friction direction, or None.
     """
 
-    _settable = ("displacement", "rotation", "free", "force", "stiffness", "drive")
+    _settable: tuple[str, ...] = (
+        "displacement", "rotation", "free", "force", "moment", "stiffness", "drive", "guides",
+    )  # fmt: skip
     _remedy = "make a new surface and a new Contact; displacement and rotation move it."
     varies = curved = False
     axis: np.ndarray | None = None
 
     def __init__(self, point: ArrayLike) -> None:
-        self.point = frozen(vector("point", point))
-        size = self.point.size
-        self._displacement = frozen(np.zeros(size))
-        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
+        super().__init__(vector("point", point))
         self._turn: np.ndarray | None = None
+        self._guides = frozen(np.eye(self.point.size))
 
     @property
     def displacement(self) -> np.ndarray:
@@ -85,61 +69,30 @@ class RigidSurface(Guarded):
         if array.shape != (size,):
             wanted = "a vector of 3 numbers" if size == 3 else "one angle"
             raise ValueError(f"plane.rotation must be {wanted}, in radians, got {value!r}.")
-        self._rotation = frozen(array.astype(np.float64))
+        self._rotation, self._spin = frozen(array.astype(np.float64)), None
         self._turn = rotation_less_one(self._rotation) if self._rotation.any() else None
 
-    def _refuse(self) -> None:
-        raise ValueError(
-            f"{type(self).__name__} is driven by displacement and rotation alone: force drives planes, no curved surfaces."
-        )
+    @property
+    def guides(self) -> np.ndarray:
+        """Directions "x", "y", "z" of ``free``, rows, ``shape=(gdim, gdim)``, global frame; at first its axes.
+
+        They stay when the surface turns.
+        """
+        return self._guides
+
+    @guides.setter
+    def guides(self, value: ArrayLike) -> None:
+        self._guides = check_guides(value, self.point.size)
 
     @property
-    def free(self) -> tuple[str, ...]:
-        """Directions along which a force drives the surface: that of a plane, no others."""
-        return ()
+    def drive_axes(self) -> np.ndarray:
+        """See ``Drive``."""
+        return self._guides
 
-    @free.setter
-    def free(self, names: Sequence[str]) -> None:
-        self._refuse()
-
-    @property
-    def force(self) -> np.ndarray | None:
-        """Force of the surface on the bodies, see ``RigidPlane``."""
-        return None
-
-    @force.setter
-    def force(self, value: ArrayLike | None) -> None:
-        self._refuse()
-
-    @property
-    def stiffness(self) -> np.ndarray:
-        """Of a spring that pulls the surface, see ``RigidPlane``."""
-        return np.zeros(0)
-
-    @stiffness.setter
-    def stiffness(self, value: ArrayLike) -> None:
-        self._refuse()
-
-    @property
-    def drive(self) -> np.ndarray:
-        """Displacement of the spring's far end, see ``RigidPlane``."""
-        return np.zeros(self.point.size)
-
-    @drive.setter
-    def drive(self, value: ArrayLike) -> None:
-        self._refuse()
-
-    @property
-    def springs(self) -> np.ndarray:
-        """Stiffness of the spring along each free direction, ``shape=(m,)``, force per length."""
-        return np.zeros(0)
-
-    def driven(self) -> str:
-        """What drives the surface, in words."""
-        return "by displacement"
-
-    def check_drive(self) -> None:
-        """Raise a ``ValueError`` if what drives the surface makes no sense."""
+    def end_step(self) -> None:
+        """Add what a step has turned to ``rotation``."""
+        if self._spin is not None:
+            self.rotation = composed(self._spin, self._rotation)
 
     def motion(self, x: np.ndarray) -> np.ndarray:
         """Displacement of its material points that were at ``x``: ``shape=(gdim,)`` if it does not rotate."""
@@ -183,3 +136,22 @@ def rotation_less_one(angle: np.ndarray) -> np.ndarray:
         x, y, z = angle / a
         N = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.sin(a) * N + 2 * np.sin(a / 2) ** 2 * N @ N
+
+
+def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Rotation vector, in two dimensions angle, of one rotation after another."""
+    if after.size == 1:
+        return after + before
+    if not before.any():
+        return after
+    from scipy.spatial.transform import Rotation
+
+    first, second = (Rotation.from_rotvec(angle.copy()) for angle in (before, after))
+    return (second * first).as_rotvec()
+
+
+def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """Velocities of points with these arms, ``shape=(n, gdim)``, in a rotation about a vector, in 2-D by one number."""
+    if angle.size == 1:
+        return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
+    return np.cross(angle, arms)

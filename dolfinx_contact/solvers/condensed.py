@@ -237,7 +237,7 @@ class CondensedBody:
         last = past[-1]
         before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
         starts = [last[1], 2 * last[1] - before]
-        if self._planes.tied and last[0][-1] > 0.0 < q[-1]:  # in balance with the new weight
+        if self._planes.tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
             starts.append(q[-1] / last[0][-1] * last[1])
         scale = np.abs(q[: q.size - self._planes.tied]).max()
         distances = [self._planes.distance(other[0], q) for other in past]

@@ -1,0 +1,237 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What drives a rigid surface: free motions, and the forces, moments and springs that these are balanced with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.checks import finite
+
+# Part by which guides may miss unit length and right angles: half of the digits.
+SQUARE = 1e-8
+
+
+class Motion(NamedTuple):
+    """One free motion of a surface."""
+
+    name: str
+    axis: np.ndarray  # unit vector, global frame; of a rotation in two dimensions one
+    turns: bool
+    spring: float  # force per length, moment per radian
+
+
+def vector(name: str, value, size: int | None = None) -> np.ndarray:
+    """A vector of finite real numbers, as floats."""
+    try:
+        array = np.asarray(value)
+        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
+    except ValueError:  # ragged nesting
+        real = False
+    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
+        wanted = "2 or 3" if size is None else str(size)
+        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {value!r}.")
+    return array.astype(np.float64)
+
+
+class Drive(Guarded):
+    """Forces that drive a surface, which has ``point``, ``displacement``, ``rotation`` and axes of its free motions.
+
+    sum of the reactions = force + stiffness (drive - displacement),
+    sum of their moments about the point = moment - stiffness rotation.
+    """
+
+    def __init__(self, point: np.ndarray) -> None:
+        self.point = frozen(point)
+        size = point.size
+        self._displacement = frozen(np.zeros(size))
+        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
+        self._drive = frozen(np.zeros(size))
+        self._free: tuple[str, ...] = ()
+        self._force: np.ndarray | None = None
+        self._moment: np.ndarray | None = None
+        self._stiffness = frozen(np.zeros(1))
+        self._spin: np.ndarray | None = None
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Names of the directions along which the surface may be free, the rows of ``drive_axes``."""
+        return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
+
+    @property
+    def turnings(self) -> tuple[str, ...]:
+        """Names of the rotations that may be free, about these directions."""
+        return ("r",) if self.point.size == 2 else tuple(f"r{name[-1]}" for name in self.directions)
+
+    @property
+    def drive_axes(self) -> np.ndarray:
+        """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
+        raise NotImplementedError
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Motions that forces drive, see docs/force.md: names among ``directions`` and ``turnings``; none at first."""
+        return self._free
+
+    @free.setter
+    def free(self, names: Sequence[str]) -> None:
+        known = self.directions + self.turnings
+        if not isinstance(names, (tuple, list)) or any(name not in known for name in names):
+            raise ValueError(
+                f"plane.free must be a tuple of names among {known}, such as ({self.directions[-1]!r},), got {names!r}."
+            )
+        self._free = tuple(name for name in known if name in names)
+
+    @property
+    def force(self) -> np.ndarray | None:
+        """Force of the surface on the bodies at its point, ``shape=(gdim,)``, global frame; None is no force."""
+        return self._force
+
+    @force.setter
+    def force(self, value: ArrayLike | None) -> None:
+        size = self.point.size
+        self._force = None if value is None else frozen(vector("plane.force", value, size))
+
+    @property
+    def moment(self) -> np.ndarray | None:
+        """Moment of the surface on the bodies about its point, ``shape=(3,)``, in 2-D one number; None is zero."""
+        return self._moment
+
+    @moment.setter
+    def moment(self, value: ArrayLike | None) -> None:
+        if value is not None:
+            size = self._rotation.size
+            value = frozen(vector("plane.moment", np.atleast_1d(value), size))
+        self._moment = value
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Of springs that pull the surface: a number, or one for each free motion; zero, a dead load, at first."""
+        return self._stiffness
+
+    @stiffness.setter
+    def stiffness(self, value: ArrayLike) -> None:
+        array = np.atleast_1d(finite("plane.stiffness", value))
+        most = self.point.size + self._rotation.size
+        if array.ndim != 1 or array.size > most or not (array >= 0).all():
+            raise ValueError(
+                "plane.stiffness must be a number, or one for each free direction, zero or more, got "
+                f"{value!r}."
+            )
+        self._stiffness = frozen(array)
+
+    @property
+    def drive(self) -> np.ndarray:
+        """Displacement of the springs' far end, ``shape=(gdim,)``, global frame."""
+        return self._drive
+
+    @drive.setter
+    def drive(self, value: ArrayLike) -> None:
+        self._drive = frozen(vector("plane.drive", value, self.point.size))
+
+    @property
+    def springs(self) -> np.ndarray:
+        """Stiffness of the spring of each free motion, ``shape=(m,)``, force per length or moment per radian."""
+        return np.broadcast_to(self._stiffness, len(self._free))
+
+    @property
+    def spins(self) -> bool:
+        """Whether a rotation is free."""
+        return any(name in self.turnings for name in self._free)
+
+    @property
+    def spin(self) -> np.ndarray | None:
+        """Rotation that the step at hand has found, radians, a small one; None if there is none, and between steps."""
+        return self._spin
+
+    def spin_by(self, angle: np.ndarray | None) -> None:
+        """Turn within a step, for which frames stay those of its start."""
+        self._spin = angle
+
+    @property
+    def free_axes(self) -> np.ndarray:
+        """Unit vectors of the free directions, ``shape=(m, gdim)``, global frame."""
+        known = self.directions
+        return self.drive_axes[[known.index(name) for name in self._free if name in known]]
+
+    @property
+    def motions(self) -> list[Motion]:
+        """The free motions, rotations first."""
+        axes = self.drive_axes
+        about = np.ones((1, 1)) if self.point.size == 2 else axes
+        springs = dict(zip(self._free, self.springs.tolist()))
+        turns = [
+            Motion(name, axis, True, springs[name])
+            for name, axis in zip(self.turnings, about)
+            if name in springs
+        ]
+        return turns + [
+            Motion(name, axis, False, springs[name])
+            for name, axis in zip(self.directions, axes)
+            if name in springs
+        ]
+
+    def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
+        """Force or moment that drives each motion where the surface is; or the size of the terms that add up to it."""
+        size = np.abs if magnitudes else np.asarray
+        less = np.add if magnitudes else np.subtract
+        force = np.zeros(self.point.size) if self._force is None else self._force
+        moment = np.zeros(self._rotation.size) if self._moment is None else self._moment
+        stretched = less(size(self._drive), size(self._displacement))
+        turned = size(self._rotation) + (0.0 if self._spin is None else size(self._spin))
+        back = less(np.zeros_like(turned), turned)
+        terms = [(moment, back) if m.turns else (force, stretched) for m in motions]
+        return np.array(
+            [size(m.axis) @ size(f) + m.spring * (size(m.axis) @ way) for m, (f, way) in zip(motions, terms)]
+        )  # fmt: skip
+
+    def driven(self) -> str:
+        """What drives the surface, in words."""
+        given = (self._free, self._force, self._stiffness, self._drive)
+        if self.spins:
+            given += (self._moment,)
+        return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
+
+    def check_drive(self) -> None:
+        """Raise a ``ValueError`` if no force drives what is free, or a plane would leave the body."""
+        count, stiffness = len(self._free), self._stiffness
+        if stiffness.size not in (1, count):
+            raise ValueError(
+                f"plane.stiffness has {stiffness.size} numbers, plane.free {count} names."
+            )
+        if self.spins and stiffness.size == 1 < count and stiffness.any():
+            raise ValueError(
+                f"plane.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
+                "one for each."
+            )
+        moving = [motion for motion in self.motions if not motion.turns]
+        if not moving or (self._force is None and all(motion.spring > 0 for motion in moving)):
+            return
+        if self._force is None:
+            raise ValueError(
+                f"plane.free is {self._free}, but neither plane.force nor plane.stiffness drives all of them: set "
+                "plane.force."
+            )
+        self._check_pressing(moving[-1])
+
+    def _check_pressing(self, motion: Motion) -> None:
+        """Raise a ``ValueError`` if the force pulls a surface off bodies, which that of a plane may say beforehand."""
+
+
+def check_guides(value: ArrayLike, size: int) -> np.ndarray:
+    """Orthonormal directions, ``shape=(size, size)``, orthonormal to the last digit."""
+    rows = finite("plane.guides", value)
+    square = rows.shape == (size, size)
+    if not square or np.abs(rows @ rows.T - np.eye(size)).max() > SQUARE:
+        raise ValueError(
+            f"plane.guides must be {size} directions of unit length at right angles, one a row, got {value!r}."
+        )
+    left, _, right = np.linalg.svd(rows)
+    return frozen(left @ right)
