@@ -139,7 +139,7 @@ def test_a_platen_tilts_as_bending_says(d, solver):
         assert contact.force()[-1] == pytest.approx(weight, rel=1e-9)
     pressing = contact.reaction[:, -1]
     centre = COMM.allreduce(pressing @ contact.x[:, : d - 1])
-    assert centre == pytest.approx(moment, abs=1e-8 * weight)
+    assert centre == pytest.approx(moment, abs=1e-5 * weight)
 
 
 def platen(free, mu=0.0, solver=None, pivot=(0.0, 0, 0), axis=None, p=None, **options):
