@@ -84,7 +84,7 @@ def far_field(x):
 
 
 def press(cells: int):
-    """Press the ball on the block; the contact."""
+    """Press the ball on the block, then leave it to the weight F; the contact after both."""
     domain, top, left, front, far = quarter_block(cells)
     V = functionspace(domain, ("Lagrange", 1, (3,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
@@ -100,7 +100,10 @@ def press(cells: int):
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
     ball.displacement = (0, 0, -DELTA)
     problem.solve()
-    return contact
+    yield contact
+    ball.free, ball.force = ("z",), (0, 0, -FORCE / 4)
+    problem.solve()
+    yield contact
 
 
 # %% [markdown]
@@ -112,12 +115,14 @@ def press(cells: int):
 #    most of it in the cells at the edge.
 # 4. The reaction of every node is along the normal of the sphere there: the force along $x$ on the quarter is
 #    $\sum r_n x / R$, to $(a/R)^2$.
+# 5. `ball.free = ("z",)` leaves the ball to its weight $F$: that is then the force, and the way down is $\delta$ to 1 %.
 
 
 # %%
 def main(cells: int = 20):
     """Solve, print and assert what is claimed above; radius and pressure of the nodes."""
-    contact = press(cells)
+    states = press(cells)
+    contact = next(states)
     force = contact.force()
     x, normal, pressure = everywhere(contact.x, contact.reaction[:, 2], contact.pressure)
     r = np.hypot(x[:, 0], x[:, 1])
@@ -131,6 +136,10 @@ def main(cells: int = 20):
     assert abs(off) < 0.01 and abs(radius) < 0.01
     assert abs(peak) < 0.01 and within < 0.05
     assert np.allclose(force[:2], normal @ x[:, :2] / R, rtol=1e-3)
+    next(states)
+    weighed, way = -4 * contact.force()[2] / FORCE - 1, -contact.plane.displacement[2] / DELTA - 1
+    say(f"under its weight: force {weighed:+.1e}, way down {100 * way:+.2f} %")
+    assert abs(weighed) < 1e-8 and abs(way) < 0.01
     return r / A, pressure / P0
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.contact.curved import RigidCylinder as RigidCylinder
     from dolfinx_contact.contact.curved import RigidSphere as RigidSphere
     from dolfinx_contact.contact.history import Status as Status
+    from dolfinx_contact.contact.level import RigidSurface as RigidSurface
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
     from dolfinx_contact.increments import advance as advance
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
@@ -58,6 +59,7 @@ _NAMES = {  # by their module
     "contact.contact": ["Contact"],
     "contact.curved": ["RigidCylinder", "RigidSphere"],
     "contact.history": ["Status"],
+    "contact.level": ["RigidSurface"],
     "contact.plane": ["RigidPlane"],
     "increments": ["advance"],
     "law.bipotential": ["bipotential_gap"],

@@ -73,6 +73,25 @@ def block(
     return SimpleNamespace(contact=contact, problem=problem, step=step, u=u, V=V, surface=surface)
 
 
+def by_distance(ball, gradient=True):
+    """A ball given by half its distance, with or without the gradient of that."""
+
+    def arms(y):
+        return y - ball.point[:, None]
+
+    def slopes(y):
+        return arms(y) / (2 * np.linalg.norm(arms(y), axis=0))
+
+    found = dc.RigidSurface(
+        lambda y: (np.linalg.norm(arms(y), axis=0) - ball.radius) / 2,
+        ball.point,
+        slopes if gradient else None,
+        ball.axis,
+    )
+    vars(found).update(radius=ball.radius, inside=False)
+    return found
+
+
 def surfaces(d):
     """Of each kind; the body's foot is near the origin."""
     below = np.append(np.zeros(d - 1), -2.0)
@@ -84,6 +103,7 @@ def surfaces(d):
             dc.RigidCylinder(below, slanted, 2.0),
             dc.RigidCylinder(-2 * below, slanted, 4.0, inside=True),
             dc.RigidPlane((0.1, 0.2, -0.05), (0.05, 0.1, 1.0), slanted),
+            by_distance(dc.RigidSphere(below, 2.0, axis=slanted)),
         ]
     return found
 
@@ -117,7 +137,7 @@ def given(contact, displacements):
     return values
 
 
-@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(6))])
+@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(7))])
 def test_gaps_are_distances_at_the_start_of_every_step(d, k):
     """However far nodes and surface have moved and turned before; normals are gradients of the distance."""
     rng, surface = np.random.default_rng(k), surfaces(d)[k]
@@ -140,7 +160,7 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
         contact.advance()
 
 
-@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(6))])
+@pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(7))])
 def test_a_rigid_motion_of_all_changes_nothing(d, k):
     """Body and surface move and turn together, by finite angles: gaps stay, nothing slips, frames turn, too."""
     rng, surface = np.random.default_rng(k), surfaces(d)[k]
@@ -194,6 +214,18 @@ def test_half_a_block_carries_half_the_force(solver):
         assert (slip == 0).all()
     held = COMM.allreduce(int(rows[1].contact.points.held[:, 1].sum()))
     assert held == 5
+
+
+def test_a_function_of_position_is_the_surface_where_it_is_zero():
+    """By differences as by its gradient, to nine digits; forces on a ball given so are those on a ball."""
+    ball, found = dc.RigidSphere((0, 0, -3.0), 3.0, axis=(1, 0, 0)), []
+    for surface in (ball, by_distance(ball), by_distance(ball, gradient=False)):
+        scene = block(surface, (0.3, 0.15), cells=[3, 3, 2])
+        for slide in (0.0, 0.1):
+            scene.step(slide, 0, -0.06)
+        found.append(scene.contact.force())
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+    assert found[2] == pytest.approx(found[0], rel=1e-6)
 
 
 def test_small_rotations_keep_their_digits():
@@ -431,6 +463,10 @@ def test_a_checkpoint_of_another_surface_is_refused(tmp_path):
         (lambda: setattr(dc.RigidPlane((0, 0, 0), (0, 0, 1)), "rotation", 1.0), "vector of 3"),
         (lambda: dc.RigidPlane((0, 0), (0, 1), height=1.0), "height must be a function"),
         (lambda: block(dc.RigidSphere((0, 0, 0), 1.0)), "at the centre"),
+        (lambda: dc.RigidSurface(1.0), "distance must be a function"),
+        (lambda: dc.RigidSurface(len, gradient=2), "gradient must be a function"),
+        (lambda: block(dc.RigidSurface(lambda y: y)), "must give shape"),
+        (lambda: block(dc.RigidSurface(lambda y: 0 * y[0])), "no gradient"),
         (lambda: block(dc.RigidSphere((0, 0, -1), 1.0, axis=(0, 0, 1))), "along the normal"),
         (lambda: block(dc.RigidSphere((0, 0, -1), 1.0), (0.3, 0.1)), "give RigidSphere the first"),
         (lambda: block(dc.RigidPlane((0, 0, 0), (0, 0, 1), height=lambda y: y)), "one value per"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact import compat
-from dolfinx_contact.contact.surface import RigidSurface
+from dolfinx_contact.contact.surface import Surface
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
 
@@ -60,7 +60,7 @@ def checked_facets(facets, index_map, boundary) -> np.ndarray:
 
 def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
     """``directed``: directions of friction are given in space."""
-    if not isinstance(plane, RigidSurface):
+    if not isinstance(plane, Surface):
         raise ValueError(
             f"plane must be a RigidPlane or another rigid surface, got {type(plane).__name__}: {plane!r}."
         )

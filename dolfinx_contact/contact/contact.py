@@ -25,7 +25,7 @@ from dolfinx_contact.contact.fields import contact_nodes
 from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.interface import add_to
 from dolfinx_contact.contact.kinematics import ContactKinematics
-from dolfinx_contact.contact.surface import RigidSurface
+from dolfinx_contact.contact.surface import Surface
 from dolfinx_contact.error import NodalStiffness
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.law.friction import Friction
@@ -70,7 +70,7 @@ class Contact(ContactKinematics):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: RigidSurface, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import positive
 from dolfinx_contact.contact.drive import vector
-from dolfinx_contact.contact.surface import RigidSurface, unit
+from dolfinx_contact.contact.surface import Surface, unit
 
 # Part of the radius within which a position has no direction from the centre; of a direction that has to be tangential.
 NEAR, ALONG = 1e-9, 1e-8
@@ -19,10 +19,47 @@ NEAR, ALONG = 1e-9, 1e-8
 TIES = 9
 
 
-class _Round(RigidSurface):
-    """A surface of given distance from a point or a line."""
+class CurvedSurface(Surface):
+    """A surface with a normal at every position."""
 
     curved = varies = True
+
+    def normals(self, y: np.ndarray) -> np.ndarray:
+        """Unit normals towards the side where the body may be, ``shape=(n, gdim)``."""
+        raise NotImplementedError
+
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
+
+        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
+
+        Raises:
+            ValueError: an axis along the normal of a position.
+        """
+        n = self.normals(y)
+        if n.shape[1] == 2:
+            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
+        axis = (
+            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
+            if self.axis is None
+            else self.axis
+        )
+        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
+        length = np.linalg.norm(t1, axis=1)
+        if (length < ALONG).any():
+            at = y[np.argmin(length)].tolist()
+            raise ValueError(
+                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
+                "another first principal friction direction."
+            )
+        t1 /= length[:, None]
+        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
+        t1 /= np.linalg.norm(t1, axis=1)[:, None]
+        return np.stack((t1, np.cross(n, t1), n), axis=1)
+
+
+class _Round(CurvedSurface):
+    """A surface of given distance from a point or a line."""
 
     def __init__(self, point, radius, inside) -> None:
         super().__init__(point)
@@ -55,35 +92,6 @@ class _Round(RigidSurface):
                 "be those near the surface."
             )
         return arms / (-length if self.inside else length)[:, None]
-
-    def frames(self, y: np.ndarray) -> np.ndarray:
-        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
-
-        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
-
-        Raises:
-            ValueError: an axis along the normal of a position.
-        """
-        n = self.normals(y)
-        if n.shape[1] == 2:
-            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
-        axis = (
-            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
-            if self.axis is None
-            else self.axis
-        )
-        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
-        length = np.linalg.norm(t1, axis=1)
-        if (length < ALONG).any():
-            at = y[np.argmin(length)].tolist()
-            raise ValueError(
-                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
-                "another first principal friction direction."
-            )
-        t1 /= length[:, None]
-        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
-        t1 /= np.linalg.norm(t1, axis=1)[:, None]
-        return np.stack((t1, np.cross(n, t1), n), axis=1)
 
     def _numbers(self, *more) -> np.ndarray:
         sign = -1.0 if self.inside else 1.0

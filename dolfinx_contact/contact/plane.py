@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import finite
-from dolfinx_contact.contact.surface import RigidSurface, unit
+from dolfinx_contact.contact.surface import Surface, unit
 
 
-class RigidPlane(RigidSurface):
+class RigidPlane(Surface):
     """A rigid plane on which bodies press and slide, driven by displacement or by force.
 
     Along the directions in ``free`` the plane moves until its forces are in equilibrium, see docs/force.md:

@@ -22,7 +22,7 @@ def unit(name: str, value, size: int) -> np.ndarray:
     return along / np.linalg.norm(along)
 
 
-class RigidSurface(Drive):
+class Surface(Drive):
     """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
 
     Such positions are in axes that move with the surface: global components as long as it stands where it was made.
