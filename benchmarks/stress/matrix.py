@@ -11,11 +11,14 @@ from time import perf_counter
 import numpy as np
 
 import dolfinx_contact as dc
+from benchmarks.stress.rigs import RigScene
 from benchmarks.stress.scenes import Scene
 from mechanics import judge
 from mechanics.condensed import random_problem
 from mechanics.judge import Verdict
+from mechanics.judge_rigs import RigJudge
 from mechanics.judge_scene import SceneJudge
+from mechanics.rigs import build_rig
 from mechanics.scenes import build, problem_of
 
 REFUSALS = (dc.NotConverged, dc.CondensedNotConverged, dc.LinearSolverError, ValueError)
@@ -38,6 +41,7 @@ def run(scene: Scene, solver) -> dict:
     record = dict(group=scene.group, name=scene.name, outcome="solved", **worst, **sums)
     used = Counter()
     steps = condensed_steps if scene.condensed else body_steps
+    steps = rig_steps if isinstance(scene, RigScene) else steps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dc.RoundingWarning)
         for verdict, step, method in steps(scene, solver, record):
@@ -113,6 +117,24 @@ def body_steps(scene: Scene, solver, record):
             continue
         method = step.tried[-1].branch if step.tried else step.solver.split()[0]
         yield of.verdict(scene.tol), step, method
+
+
+def rig_steps(scene: RigScene, solver, record):
+    """As ``body_steps``, of a surface that force drives."""
+    built = build_rig(**scene.body)
+    of = RigJudge(built, scene.body.get("mu", 0.2), scene.body.get("p"))
+    problem = problem_of(built, solver, scene.tol)
+    for load in scene.tops:
+        asked = built.apply(load)
+        try:
+            step = problem.solve()
+        except REFUSALS as said:
+            return refuse(record, said)
+        yield (
+            of.verdict(asked, scene.tol),
+            step,
+            step.tried[-1].branch if step.tried else step.solver.split()[0],
+        )
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:

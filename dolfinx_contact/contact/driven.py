@@ -33,10 +33,8 @@ def driven_planes(body, contacts) -> DrivenPlanes | None:
 
 def freedom(contacts) -> list[tuple]:
     """Free motions and springs of each contact's plane, which what solvers set up depends on."""
-    return [
-        (contact.plane.free, contact.plane.springs.tolist(), contact.plane.guides.tolist())
-        for contact in contacts
-    ]
+    planes = [contact.plane for contact in contacts]
+    return [(p.free, p.springs.tolist(), p.guides.tolist()) for p in planes]
 
 
 def check_driven(body, contacts) -> None:
@@ -120,16 +118,24 @@ class DrivenPlanes:
 
     def _resisted(self) -> np.ndarray:
         """Motions more along normals than across; without friction all that are along normals at all.  Collective."""
-        parts = [np.zeros((2, self.count))]
-        for axes in self.axes:
-            squares = (axes**2).sum(axis=0)
-            parts.append(np.array([squares[-1], squares[:-1].sum(axis=0)]))
-        along, across = self._body.total(np.sum(parts, axis=0))
+        sums = np.zeros((2, self.count))
+        for contact, axes in zip(self._contacts, self.axes):
+            squares = np.einsum("n,nij->ij", self._loaded(contact), axes**2)
+            sums += squares[-1], squares[:-1].sum(axis=0)
+        along, across = self._body.total(sums)
         smooth = np.zeros(self.count, dtype=bool)
         for (_, rough), part in zip(self.rough(), self.parts):
             smooth[part] = not rough
         self._loose = smooth & (along <= RESISTING**2 * (along + across)) & (self.springs == 0.0)
         return (along > across) | (smooth & ~self._loose)
+
+    def _loaded(self, contact) -> np.ndarray:
+        """Normal reactions of the last step; where there are none, one at the nodes that were nearest.  Collective."""
+        pressing = contact.last.reaction[:, -1]
+        if self._body.largest(pressing) > 0.0:
+            return pressing
+        nearest = -self._body.highest(-contact.last.gap)
+        return (contact.last.gap <= nearest + NEAR * self._body.extent).astype(float)
 
     def check(self) -> None:
         """Raise a ``ValueError`` on all ranks if nothing would hold a surface that force drives.  Collective."""
@@ -143,23 +149,23 @@ class DrivenPlanes:
                 f"plane.free has {name!r}, along or about which nothing holds the plane: there is no friction. Give it "
                 "plane.stiffness, or prescribe its motion."
             )
-        pulled = [] if self.plain else self._pulled()
-        if pulled:
+        pulled = None if self.plain else self._pulled()
+        if pulled is not None:
             raise ValueError(
-                f"plane.force does not press {self.planes[pulled[0]]} on the body: it pulls the surface off, and nothing "
-                "else holds it. It is the force of the surface on the body; a spring, plane.stiffness, also pulls."
+                f"plane.force does not press {pulled} on the body: it pulls the surface off, and nothing else holds it. It "
+                "is the force of the surface on the body; a spring, plane.stiffness, also pulls."
             )
 
-    def _pulled(self) -> list[int]:
-        """Curved surfaces that their force pulls off the body.  Collective."""
-        found, driving = [], self.driving()
-        for number, (plane, part) in enumerate(zip(self.planes, self.parts)):
+    def _pulled(self):
+        """A curved surface that its force pulls off the body, None if there is none.  Collective."""
+        driving = self.driving()
+        for plane, part in zip(self.planes, self.parts):
             for k in range(part.start, part.stop) if plane.curved else ():
                 if self.pressing[k] and not self.turns[k] and self.springs[k] == 0.0 != driving[k]:
                     ways = [np.sign(driving[k]) * axes[:, -1, k] for axes in self.axes]
                     if self._body.highest(np.concatenate(ways)) <= 0.0:
-                        found.append(number)
-        return found
+                        return plane
+        return None
 
     # -- motions -------------------------------------------------------------------------------
 
@@ -272,11 +278,6 @@ class DrivenPlanes:
             asked: Function that yields the contacts, each with the reactions that the body asks for.
         """
         PlaneBalance(self, self._body, x, maps, asked).reach()
-
-    @property
-    def normal_motions(self) -> np.ndarray:
-        """The motions that normal reactions resist."""
-        return np.flatnonzero(self.pressing)
 
     def rough(self) -> list[tuple]:
         """The planes, and whether there is friction on each.  Collective."""

@@ -44,7 +44,7 @@ class PlaneBalance:
         """Move the planes into equilibrium, or as near as Newton's method comes.  Collective."""
         planes, limits = self._planes, None
         if planes.plain:
-            for motion in planes.normal_motions:
+            for motion in np.flatnonzero(planes.pressing):
                 self._press(motion)
         elif planes.pressing.any():
             self._press_together()
@@ -153,7 +153,7 @@ class PlaneBalance:
         which it falls.
         """
         planes, total = self._planes, self._body.total
-        which = planes.normal_motions
+        which = np.flatnonzero(planes.pressing)
         parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
         for contact, map, axes in zip(self._asked(), self._maps, planes.axes):
             contact.move(self._x)

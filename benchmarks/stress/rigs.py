@@ -1,0 +1,76 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Scenes of rigs: planes, balls and rollers that force drives, platens that tilt, nearly sliding and nearly tipping."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from benchmarks.stress.scenes import LAWS, Scene
+from mechanics.rigs import Load
+
+KS = range(1, 7)
+RIGS = {
+    "shear": [Load(), Load(shear=0.5), Load(shear=-0.5), Load(3.0, 0.5), Load(0.1, 0.2)],
+    "stroke": [Load(), Load(stroke=1e-3), Load(2.0, stroke=1e-3), Load(stroke=-1e-3), Load(0.1)],
+    "rocking": [Load(), Load(at=(0.1, 0.05)), Load(at=(0.3, 0.1)), Load(at=(-0.3, 0.0)), Load(2.0), Load(0.1)],
+    **{f"nearly sliding, 1e-{k}": [Load(), Load(shear=1 - 10.0**-k), Load(shear=10.0**-k - 1)] for k in KS},
+    **{f"nearly tipping, 1e-{k}":
+       [Load(), Load(at=(0.5 - 10.0**-k, 0)), Load(at=(0, 10.0**-k - 0.5)), Load(at=(-0.3, 0.3))] for k in KS},
+}  # fmt: skip
+
+
+class RigScene(Scene):
+    """A scene whose ``body`` goes to ``build_rig``."""
+
+    @property
+    def tops(self) -> list[Load]:
+        """The loads, step by step."""
+        return RIGS[self.programme][: self.most_steps]
+
+
+def rig_scenes() -> list[RigScene]:
+    """All of them, in an order that does not change."""
+    found: list[RigScene] = []
+
+    def add(group, name, programme, friction, **body):
+        found.append(RigScene(group, f"{name}, {programme}", programme, body | friction))
+
+    tilting, rolls = ("n", "r1", "r2"), ("x", "z")
+    for (law, mu), k in product(LAWS.items(), range(-6, 4)):
+        add("weights", f"weight 1e{k} {law}", "shear", mu, weight=10.0**k)
+    for (law, mu), k in product(LAWS.items(), KS):
+        add("nearly sliding", f"plane {law}", f"nearly sliding, 1e-{k}", mu)
+        add(
+            "nearly tipping",
+            f"platen {law}",
+            f"nearly tipping, 1e-{k}",
+            mu,
+            free=tilting,
+            weight=1e-3,
+        )
+    for (law, mu), k in product(LAWS.items(), range(-6, 1)):
+        add("tilting platens", f"weight 1e{k} {law}", "rocking", mu, free=tilting, weight=10.0**k)
+    for (law, mu), k, kind in product(LAWS.items(), (-1, 0, 1, 2, 3, 4, 6), ("ball", "roller")):
+        body = dict(kind=kind, radius=10.0**k)
+        for weight in (1e-3, 1.0):
+            add(
+                f"{kind}s",
+                f"R/h 1e{k} weight {weight:g} {law}",
+                "shear",
+                mu,
+                free=rolls,
+                weight=weight,
+                **body,
+            )
+        if k > 0:
+            add(
+                f"{kind}s",
+                f"R/h 1e{k} beside {law}",
+                "stroke",
+                mu,
+                free=("z",),
+                offset=(0.03, 0.02),
+                **body,
+            )
+    return found
