@@ -213,7 +213,7 @@ class ContactKinematics(ContactResults):
             ended = copy(self.plane)
             ended.end_step()
             moved = _turned_back(self.frame, self.displacement) + self._carried()
-            turned = ended.relative(self._at + moved) - self._at
+            turned = ended.moved_past(self._at, moved)
             self._last = self._last._replace(displacement=frozen(_times(self._placed.own, turned)))
         self._settle_here()
 

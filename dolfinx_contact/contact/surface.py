@@ -107,6 +107,11 @@ class Surface(Drive):
         arm = x - self.point - self._displacement
         return self.point + arm + arm @ self._turn
 
+    def moved_past(self, x: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """``relative(x + moved) - x`` with all digits of small motions."""
+        past = moved - self._displacement
+        return past if self._turn is None else past + (x - self.point + past) @ self._turn
+
     def turned(self, frames: np.ndarray) -> np.ndarray:
         """Frames in the surface's axes, in global components."""
         return frames if self._turn is None else frames + frames @ self._turn.T
