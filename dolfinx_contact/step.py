@@ -180,6 +180,8 @@ class LoadStep:
             self._respond(x, self.free(forces), maps)
             self._judge(x, forces)
             self._tell()
+        elif self.planes is not None:  # where they were judged
+            self.planes.move_to(self._measured[2])
         return self.errors
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
@@ -190,7 +192,7 @@ class LoadStep:
         """Whether the errors are those of ``x``, and nobody has moved the contacts since."""
         if self._measured is None:
             return False
-        measured, states = self._measured
+        measured, states, _ = self._measured
         stand = all(contact.present is state for contact, state in zip(self.contacts, states))
         return self.body.same(x, measured if stand else None)  # asked on all ranks
 
@@ -248,7 +250,8 @@ class LoadStep:
     def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
         """Errors of the contacts' present state, ``forces = -F(x)``."""
         self.errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
-        self._measured = x.copy(), [contact.present for contact in self.contacts]
+        moved = None if self.planes is None else self.planes.moved
+        self._measured = x.copy(), [contact.present for contact in self.contacts], moved
 
     def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
         """Errors of the contacts' present state.

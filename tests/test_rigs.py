@@ -335,6 +335,20 @@ def test_steps_back_failures_and_files(kind, tmp_path):
     assert tried.surface.rotation == pytest.approx(plain.surface.rotation, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_surface_stands_where_the_step_was_judged(solver):
+    """Nearly sliding, where motions are large beside what errors allow: gaps and slips are those of its displacement."""
+    scene, plane = platen(("t1", "n"), 0.2, SOLVERS[solver], axis=(1, 0, 0))
+    for part in (0.0, 1 - 1e-5):
+        before = plane.displacement
+        u_before = scene.u.x.array[scene.contact.points.dofs]
+        plane.force = 0.01 * np.array([0.2 * part, 0, 1.0])
+        scene.step(0, 0, 0)
+    slip = scene.u.x.array[scene.contact.points.dofs] - u_before - (plane.displacement - before)
+    largest = COMM.allreduce(np.abs(slip).max(initial=0.0), op=scenes.MPI.MAX)
+    assert np.abs(scene.contact.slip_increment - slip[:, :2]).max(initial=0.0) < 1e-13 * largest
+
+
 MISTAKES = {
     "moment of two": (lambda p: setattr(p, "moment", (1, 2)), "plane.moment must be a vector of 3"),
     "guides that are not orthonormal": (

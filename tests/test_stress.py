@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks.stress import matrix as stress
 from benchmarks.stress.__main__ import main
+from benchmarks.stress.rigs import rig_scenes
 from benchmarks.stress.scenes import hard_scenes, scenes, small
 
 LONG = ("six cycles", "1000 tiny steps")
@@ -30,6 +31,20 @@ def test_default_solves_or_says_so(scene):
     allowed = {"solved"} | ({"refused"} if scene.name in CHAOTIC else set())
     allowed |= {"rounding"} if scene.group in ROUNDED else set()
     assert record["outcome"] in allowed, record
+
+
+@pytest.mark.parametrize(
+    "scene", rig_scenes()[::25], ids=lambda scene: f"{scene.group}: {scene.name}"
+)
+def test_default_solves_rigs(scene):
+    """Surfaces that force drives: the judge confirms body, contact and the balance of the surface."""
+    assert stress.run(scene, None)["outcome"] == "solved"
+
+
+def test_there_are_enough_rigs():
+    """At least 100, no two alike."""
+    every = rig_scenes()
+    assert len(every) >= 100 and len({(s.group, s.name) for s in every}) == len(every)
 
 
 def test_there_are_enough_scenes():
