@@ -31,6 +31,8 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.contact.history import Status as Status
     from dolfinx_contact.contact.level import RigidSurface as RigidSurface
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.discretisation import Estimate as Estimate
+    from dolfinx_contact.discretisation import estimate as estimate
     from dolfinx_contact.increments import advance as advance
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
     from dolfinx_contact.law.friction import Friction as Friction
@@ -61,6 +63,7 @@ _NAMES = {  # by their module
     "contact.history": ["Status"],
     "contact.level": ["RigidSurface"],
     "contact.plane": ["RigidPlane"],
+    "discretisation": ["Estimate", "estimate"],
     "increments": ["advance"],
     "law.bipotential": ["bipotential_gap"],
     "law.friction": ["Friction"],

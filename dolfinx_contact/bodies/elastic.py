@@ -42,7 +42,7 @@ class ElasticBody(OverRanks):
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
         self._residual_form = fem.form(F)
-        self._stiffness_form = fem.form(derivative)
+        self._stiffness_form, self.tangent = fem.form(derivative), derivative
         coefficients = [c for c in derivative.coefficients() if c is not u]
         self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())

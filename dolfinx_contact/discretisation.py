@@ -1,0 +1,162 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""How far results are off because of the mesh: by a second problem with a better space, stepped along the same programme."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from dolfinx_contact import compat
+from dolfinx_contact.checks import positive
+from dolfinx_contact.collective import agree, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+
+class Estimated(NamedTuple):
+    """A quantity of a problem and the estimate of its error, in its own unit."""
+
+    value: float
+    error: float
+
+    @property
+    def relative(self) -> float:
+        """Error over the size of the value; 0 where both are nothing."""
+        return 0.0 if self.error == 0 else float(np.divide(self.error, abs(self.value)))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What ``estimate`` returns.
+
+    Attributes:
+        quantities: By name, ``Estimated``.
+        energy_norm: Of the difference of displacements over that of the reference's, dimensionless: the error of
+            stresses in the mean.  None if the two problems have different meshes.
+        cells: Function of degree 0, the energy norm of the difference on each cell; their squares sum up to that of the
+            body.  None with ``energy_norm``.
+    """
+
+    quantities: dict[str, Estimated]
+    energy_norm: float | None
+    cells: fem.Function | None
+
+    def __getitem__(self, name: str) -> Estimated:
+        return self.quantities[name]
+
+
+def _sum(problem, of) -> float:
+    return sum(problem.body.comm.allreduce(float(of(contact))) for contact in problem.contacts)
+
+
+def _peak(problem) -> float:
+    tops = [contact.pressure.max(initial=0.0) for contact in problem.contacts]
+    return max(problem.body.comm.allgather(float(max(tops))))
+
+
+QUANTITIES = {
+    "normal_force": lambda problem: _sum(problem, lambda of: of.reaction[:, -1].sum()),
+    "tangential_force": lambda problem: _sum(problem, lambda of: np.linalg.norm(of.reaction[:, :-1], axis=1).sum()),
+    "dissipation": lambda problem: _sum(problem, lambda of: of.dissipation.sum()),
+    "peak_pressure": _peak,
+}  # fmt: skip
+
+
+def estimate(
+    problem: ContactProblem,
+    reference: ContactProblem,
+    quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,
+    share: float = 1.0,
+) -> Estimate:
+    """Estimate the discretisation's error of a problem's present state.  Collective.
+
+    ``reference`` is the same body with a better space, which was taken through the same programme: of second order on the
+    same mesh, of a finer mesh, of smaller increments.  The difference of a quantity is its estimated error,
+
+        |J(u) - J(U)| share,
+
+    which is the error itself if the reference's own is small beside it (saturation; R. E. Bank, R. K. Smith, SIAM J.
+    Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
+    all that depends on history are estimated as accumulated.
+
+    Args:
+        problem: Whose error is asked for.
+        reference: The better one.  On the same mesh object, with a space that contains the problem's, cells get indicators.
+        quantities: Functions of a problem that return a number, the same on all ranks, by name.  They come beside
+            ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
+            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.
+        share: The error over the difference.  ``1 / (1 - 2**-p)`` for a reference on cells of half the size where errors fall
+            with order p.
+
+    Raises:
+        ValueError: problems that do not belong together, or quantities that are not finite numbers.
+    """
+    comm = problem.body.comm
+    with raised_together(comm):
+        share = positive("share", share, finite=True)
+        _check_pair(problem, reference)
+    agree(comm, share=share, quantities=sorted(quantities or ()))
+    found = {}
+    for name, of in {**QUANTITIES, **(quantities or {})}.items():
+        with raised_together(comm):
+            value, better = (_number(name, of(which)) for which in (problem, reference))
+        found[name] = Estimated(value, share * abs(better - value))
+    if problem.body.V.mesh is not reference.body.V.mesh:
+        return Estimate(found, None, None)
+    norm, cells = indicators(problem, reference)
+    return Estimate(found, share * norm, cells)
+
+
+def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
+    """Energy norm of the difference of displacements, over that of the reference's, and on each cell.  Collective.
+
+    With the tangent ``a(v, w)`` of the reference at its displacement ``U`` the square on a cell K is ``a_K(e, e)``,
+    ``e = U - u``.  Terms on facets count for their cells.
+    """
+    body = reference.body
+    e, square = fem.Function(body.V), fem.Function(compat.functionspace(body.V.mesh, ("DG", 0)))
+    e.interpolate(problem.u)
+    e.x.array[:] = body.u.x.array - e.x.array
+    test, trial = body.tangent.arguments()
+    q = ufl.TestFunction(square.function_space)
+    form = fem.form(ufl.replace(body.tangent, {test: e * q, trial: e}))
+    own = square.function_space.dofmap.index_map.size_local
+    compat.assemble_into(square.x, form)
+    of_difference = square.x.array.copy()
+    e.x.array[:] = body.u.x.array
+    compat.assemble_into(square.x, form)
+    sums = body.comm.allreduce(np.array([of_difference[:own].sum(), square.x.array[:own].sum()]))
+    square.x.array[:] = np.sqrt(np.maximum(of_difference, 0.0))
+    square.x.scatter_forward()
+    part, whole = np.maximum(sums, 0.0)
+    return float(np.sqrt(part / whole)) if part > 0 else 0.0, square
+
+
+def _check_pair(problem, reference) -> None:
+    if reference is problem or not hasattr(reference, "contacts"):
+        raise ValueError(
+            "reference must be another ContactProblem: the same body with a space of higher order or a finer mesh."
+        )
+    if len(reference.contacts) != len(problem.contacts):
+        raise ValueError(f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
+                         f"{len(reference.contacts)}.")  # fmt: skip
+    orders = [compat.lagrange_degree(of.body.V) for of in (problem, reference)]
+    if problem.body.V.mesh is reference.body.V.mesh and orders[0] >= orders[1]:
+        raise ValueError(
+            f"on the same mesh the reference must be of higher order, got degrees {orders[0]} and {orders[1]}: give the "
+            "problem of lower order first, or a reference on a finer mesh."
+        )
+
+
+def _number(name: str, value) -> float:
+    value = float(value)
+    if not np.isfinite(value):
+        raise ValueError(f"quantity {name!r} must be a finite number, got {value!r}.")
+    return value
