@@ -10,7 +10,9 @@ copyright = "the dolfinx_contact authors, MIT licence"
 version = release = installed("dolfinx_contact")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
-extensions += [f"docs.extension.{name}" for name in ("runs", "gallery", "formulas", "links")]
+extensions += [
+    f"docs.extension.{name}" for name in ("runs", "gallery", "docstrings", "formulas", "links")
+]
 
 root_doc = "docs/index"
 include_patterns = ["docs/**.md", "notes/*.md", "CHANGELOG.md", "CONTRIBUTING.md"]

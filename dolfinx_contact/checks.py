@@ -10,7 +10,11 @@ import numpy as np
 
 
 class RoundingWarning(UserWarning):
-    """An answer is as good as double precision allows, which is less than the tolerance asked for."""
+    """An answer is as good as double precision allows, which is less than the tolerance asked for.
+
+    Example:
+        >>> warnings.simplefilter("error", dc.RoundingWarning)  # a step limited by rounding raises it
+    """
 
 
 def finite(name: str, value) -> np.ndarray:

@@ -38,7 +38,6 @@ def advance(
 
     An increment from one point to the next is tried as a whole.  A step that does not converge is tried again with half
     of it, from the last converged state; after two steps that converge increments are doubled again.  Every point is the end of a step.
-
     ``logging.getLogger("dolfinx_contact")`` tells of halved increments; on a terminal there is a progress bar if tqdm is installed.
 
     Args:
@@ -56,6 +55,10 @@ def advance(
     Raises:
         NotConverged: a step with the smallest increment did not converge; problem and table are at the last one that did.
         ValueError: points that do not rise.
+
+    Example:
+        >>> def programme(t): held.value = (0, 0, -0.01 * t)
+        >>> table = dc.advance(problem, programme, points=[0.5, 1.0])
     """
     comm = problem.body.comm
     with raised_together(comm):

@@ -89,6 +89,12 @@ class ContactProblem(ProblemStates):
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
         NotImplementedError: a tangential direction of a contact node is held that is no axis of its contact.
+
+    Example:
+        >>> other = dc.Contact(V, foot, plane, friction)  # of this problem alone
+        >>> problem = dc.ContactProblem(F, u, [other], bcs=[bc])
+        >>> problem.solve().error <= 1e-8
+        True
     """
 
     def __init__(

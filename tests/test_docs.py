@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The site: scripts of its pages run, on two ranks where a page says so; the reference has every public name."""
 
+import doctest
+import inspect
 import re
 import sys
 from importlib.util import find_spec
@@ -70,6 +72,20 @@ def test_reference_has_every_public_name():
         r"^\.\. auto(?:class|function|exception):: (\w+)$", TEXTS["reference.md"], re.M
     )
     assert sorted(listed) == sorted(dc.__all__)
+
+
+def test_every_public_name_has_an_example_that_runs(tmp_path, monkeypatch):
+    """The docstring of each public name has an example; it runs after the first script of the reference."""
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    exec(SCRIPTS["reference.md"][0], names)
+    runner = doctest.DocTestRunner(verbose=False)
+    for name in dc.__all__:
+        text = inspect.getdoc(getattr(dc, name)) or ""
+        test = doctest.DocTestParser().get_doctest(text, dict(names), name, None, None)
+        assert test.examples, name
+        said: list[str] = []
+        assert runner.run(test, out=said.append).failed == 0, "".join(said)
 
 
 def test_members_of_the_reference_exist():

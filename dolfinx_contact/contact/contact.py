@@ -60,7 +60,12 @@ class Contact(ContactKinematics):
             vertices of tetrahedra of second order, on which an even pressure makes no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
-        friction, wear: The laws; another one may be assigned between steps, on all ranks.
+        friction: The law of friction, and ``wear`` that of wear; another one may be assigned between steps, on all ranks.
+
+    Example:
+        >>> contact = dc.Contact(V, foot, plane, dc.Friction(mu=0.3))
+        >>> contact.x.shape == contact.reaction.shape  # 25 nodes of the block's foot on one rank
+        True
     """
 
     rho: np.ndarray | None

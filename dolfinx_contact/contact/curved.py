@@ -122,6 +122,11 @@ class RigidSphere(_Round):
         free, force, moment, stiffness, drive: As of ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
             dimensions "x", "y", "r", along and about ``guides``.
         guides: Directions of these names, one a row, ``shape=(gdim, gdim)``, global frame; do not turn.
+
+    Example:
+        >>> ball = dc.RigidSphere(centre=(0.5, 0.5, -2), radius=2, axis=(1, 0, 0))
+        >>> on_ball = dc.Contact(V, foot, ball, friction)
+        >>> ball.displacement = (0, 0, 0.01)  # before the next step
     """
 
     def __init__(self, centre: ArrayLike, radius: float, axis: ArrayLike | None = None, inside: bool = False) -> None:  # fmt: skip
@@ -160,6 +165,11 @@ class RigidCylinder(_Round):
             steps.
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``.
         free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+
+    Example:
+        >>> roll = dc.RigidCylinder(point=(0.5, 0, -2), axis=(0, 1, 0), radius=2)
+        >>> rolling = dc.Contact(V, foot, roll, friction)
+        >>> roll.rotation = (0, 0.001, 0)  # radians, before the next step
     """
 
     def __init__(

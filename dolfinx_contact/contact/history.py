@@ -14,7 +14,11 @@ from dolfinx_contact.attributes import Guarded, frozen
 
 
 class Status(IntEnum):
-    """What a contact node does, which is the branch that the projection took."""
+    """What a contact node does, which is the branch that the projection took.
+
+    Example:
+        >>> slipping = contact.x[contact.status == dc.Status.SLIP]  # where the nodes are that slip
+    """
 
     OPEN = 0
     STICK = 1

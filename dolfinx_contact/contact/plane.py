@@ -47,6 +47,11 @@ class RigidPlane(Surface):
         stiffness: Of a spring that pulls the plane along the free directions, force per length: a number, or one for
             each of them, of a rotation moment per radian; zero, a dead load, at first.
         drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
+
+    Example:
+        >>> plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+        >>> plane.displacement = (0, 0, 0.01)  # driven by displacement
+        >>> plane.free, plane.force = ("n",), (0, 0, 500)  # or by force: 500 N on the body
     """
 
     _settable = ("displacement", "rotation", "free", "force", "moment", "stiffness", "drive")

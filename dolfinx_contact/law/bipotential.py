@@ -36,6 +36,11 @@ def bipotential_gap(
 
     Raises:
         ValueError: Wrong shape or type.
+
+    Example:
+        >>> slip = [[-0.01, 0]]  # mm; the reaction is on the cone and against it: the law holds
+        >>> dc.bipotential_gap([[0.3, 0, 1]], [0], slip, dc.Friction(mu=0.3)).round(12)
+        array([0.])
     """
     if not isinstance(friction, Friction):
         raise ValueError(f"friction must be a Friction, not {friction!r}")

@@ -89,6 +89,10 @@ class Friction(Guarded):
         associated: ``p`` is proportional to ``mu`` everywhere.
         field: Something is given as a field; what is above is then known to a contact's ``friction`` alone.
         exponent: ``k`` of a field.
+
+    Example:
+        >>> friction = dc.Friction(mu=(0.30, 0.15), p=(0.05, 0.20))  # along and across the axis
+        >>> lubricated = dc.Friction(mu=lambda x: np.where(x[0] < 0.5, 0.3, 0.05))  # a field
     """
 
     mu: np.ndarray

@@ -57,6 +57,11 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
 
     Raises:
         ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.
+
+    Example:
+        >>> dc.project_cone([[0.1, 0, 1], [0.1, 0, -1]], (0.30, 0.15))
+        array([[0.1, 0. , 1. ],
+               [0. , 0. , 0. ]])
     """
     tau, law = as_nodes("tau", tau, 3), Friction(mu).law(3)
     largest, smallest = (f.reduce(tau, axis=None, initial=0.0) for f in (np.fmax, np.fmin))
@@ -81,5 +86,9 @@ def load_function(r: ArrayLike, mu: ArrayLike) -> np.ndarray:
 
     Raises:
         ValueError: As :func:`project_cone`.
+
+    Example:
+        >>> dc.load_function([[0.1, 0, 1]], (0.30, 0.15)).round(3)  # negative: sticks
+        array([-0.667])
     """
     return Friction(mu).law(3).load_function(as_nodes("r", r, 3))

@@ -23,6 +23,9 @@ class Wear(Guarded):
 
     Raises:
         ValueError: a coefficient that is negative, not finite or not real, or more than two.
+
+    Example:
+        >>> contact.wear = dc.Wear(1e-6)  # mm³ per N mm
     """
 
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."

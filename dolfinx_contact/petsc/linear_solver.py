@@ -68,7 +68,14 @@ def raise_interrupt(failure: BaseException) -> None:
 
 
 class LinearSolverError(RuntimeError):
-    """PETSc's linear solver did not solve; the message has its reason and options."""
+    """PETSc's linear solver did not solve; the message has its reason and options.
+
+    Example:
+        >>> try:
+        ...     step = problem.solve()
+        ... except dc.LinearSolverError as failure:
+        ...     print(failure)
+    """
 
 
 class LinearSolver:

@@ -42,6 +42,12 @@ class History:
     Attributes:
         rows: List of dictionaries, the same on all ranks.
         positions: Of the tracked nodes, ``shape=(m, 3)``, global frame.
+
+    Example:
+        >>> history = dc.History(problem)
+        >>> row = history.record(problem.solve(), way=0.004)
+        >>> history.column("way").tolist()
+        [0.004]
     """
 
     def __init__(

@@ -14,7 +14,12 @@ from dolfinx_contact.checks import RoundingWarning
 
 
 class Counts(NamedTuple):
-    """Number of contact nodes by status, over all ranks."""
+    """Number of contact nodes by status, over all ranks.
+
+    Example:
+        >>> sum(step.counts)  # nodes of the contact
+        25
+    """
 
     open: int
     stick: int
@@ -40,6 +45,11 @@ class Step:
         counts: Contact nodes open, sticking and slipping.
         solver: The solver that was used, and why it was chosen where the user did not.
         tried: What the solver tried, in order, where it has more than one method.
+
+    Example:
+        >>> step = problem.solve()
+        >>> step.error <= 1e-8 and step.counts.open == 0
+        True
     """
 
     error: float
@@ -70,6 +80,12 @@ class NotConverged(RuntimeError):
         step: Record of the step, with what was tried.
         displacement: The best one found, owned degrees of freedom; not a solution.
         reactions: Of each contact in that state, local frame.
+
+    Example:
+        >>> try:
+        ...     step = problem.solve()
+        ... except dc.NotConverged as failure:
+        ...     print(failure.step.error, failure.step.tried)
     """
 
     def __init__(

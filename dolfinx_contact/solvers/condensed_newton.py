@@ -38,6 +38,9 @@ class CondensedNewton:
 
     Raises:
         ValueError: an option is not a positive number.
+
+    Example:
+        >>> solver = dc.CondensedNewton(max_seconds=60)  # for ContactProblem(..., solver=solver)
     """
 
     def __init__(
@@ -131,17 +134,15 @@ def solve_condensed(
 ) -> CondensedResult:
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
-    No body and no DOLFINx is needed: ``W`` is the compliance between ``n`` contacts, ``q`` their
-    displacement without reactions; per contact (t1, t2, n), ``w_n`` the gap at the end of the step
-    and ``w_t`` the slip over it.  In two dimensions (t, n).
+    No body and no DOLFINx is needed: ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without
+    reactions; per contact (t1, t2, n), in two dimensions (t, n): ``w_n`` the gap at the end of the step, ``w_t`` the slip.
 
     The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
 
     - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |r|`` with
       ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
-    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector
-      along ``P^-2 r_t``), ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the
-      contact along that vector.
+    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector along ``P^-2 r_t``),
+      ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that vector.
 
     Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the
     load ``|kappa (q_t, min(q_n, 0))|``, they are relative to that.  An answer whose errors are above ``tol``
@@ -152,9 +153,8 @@ def solve_condensed(
             rank-deficient and slightly unsymmetric.  Stored as a dense matrix; products, sweeps and
             factors leave out its zeros if it couples a contact to few others, however it was given.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
-        friction: A ``Friction``, of coefficients for all contacts or ``shape=(n, 2)`` for each; or an
-            array of one coefficient of isotropic friction per contact, ``shape=(n,)``.  An array is
-            always one per contact, so two contacts are no exception; a pair is ``Friction((a, b))``.
+        friction: A ``Friction``, of coefficients for all contacts or ``shape=(n, 2)`` for each; or an array of one
+            coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
         solver: ``CondensedNewton(...)``; None is one with default options.
         tol: Largest error and, unless the solver says otherwise, slip error.
         r0: Reactions to start from, of the shape of ``q``.
@@ -165,8 +165,11 @@ def solve_condensed(
 
     Raises:
         ValueError: input that makes no sense.
-        CondensedNotConverged: no method reached ``tol``; carries the best state and what was tried.
-            That is also the answer to a problem without solution.
+        CondensedNotConverged: no method reached ``tol``, or there is no solution; carries the best state.
+
+    Example:
+        >>> dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # slips
+        array([[-0.3,  0. ,  1. ]])
     """
     q, W, friction, r0 = checked_problem(q, W, friction, r0)
     solver, tol = _checked_options(solver, tol, max_seconds)

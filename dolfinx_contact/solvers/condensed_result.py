@@ -42,6 +42,11 @@ class CondensedResult:
         tied: Forces of the tied rows of a kernel operator, if it has any.
         unsolvable: Of a failure: it is proved that there is no solution, by trying every state of a
             few contacts in two dimensions.
+
+    Example:
+        >>> found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
+        >>> found.status == dc.Status.SLIP
+        array([ True])
     """
 
     reaction: np.ndarray
@@ -65,6 +70,12 @@ class CondensedNotConverged(RuntimeError):
     Attributes:
         best: The ``CondensedResult`` of the smallest errors found; not a solution.
         tried: What was tried, a tuple of ``Attempt``.
+
+    Example:
+        >>> try:
+        ...     found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
+        ... except dc.CondensedNotConverged as failure:
+        ...     found = failure.best
     """
 
     def __init__(self, best: CondensedResult) -> None:

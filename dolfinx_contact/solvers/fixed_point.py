@@ -58,6 +58,9 @@ class FixedPoint:
 
     Raises:
         ValueError: an unknown map, or a rho, depth or number of iterations that is not positive.
+
+    Example:
+        >>> solver = dc.FixedPoint(max_iterations=2000)  # for ContactProblem(..., solver=solver)
     """
 
     map: str = "return"

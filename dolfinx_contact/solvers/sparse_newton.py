@@ -42,6 +42,9 @@ class SparseNewton:
 
     Raises:
         ValueError: a number that is not positive.
+
+    Example:
+        >>> solver = dc.SparseNewton()  # for ContactProblem(..., solver=solver)
     """
 
     nonlinear: ClassVar[bool] = True
