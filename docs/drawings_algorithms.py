@@ -159,7 +159,92 @@ def multigrid() -> None:
     save(figure, "multigrid.svg")
 
 
+def surface_layer() -> None:
+    """The two layers of nodes next to the plane, then the whole body."""
+    figure, axes = plt.subplots(figsize=(6.4, 2.5), layout="constrained")
+    for left, chosen in ((0.0, 2 * COLUMNS), (2.0, ROWS * COLUMNS)):
+        nodes = body(axes, (left, 0.2), 1.4)
+        plane(axes, left - 0.1, left + 1.5, 0.15)
+        axes.plot(*nodes[:chosen].T, "o", color=SLIP if left == 0 else CONE, ms=5)
+    axes.text(0.7, 1.0, "first: two layers, with the contact", color=SLIP, ha="center")
+    axes.text(2.7, 1.0, "then: the whole body, with springs", color=CONE, ha="center")
+    arrow(axes, (1.55, 0.55), (1.88, 0.55), INK, "")
+    blank(axes, (-0.15, 3.55), (0.1, 1.15))
+    save(figure, "surface_layer.svg")
+
+
+def semismooth() -> None:
+    """Newton's method on a function with a kink: from its own side each tangent leads nearer."""
+    figure, axes = plt.subplots(figsize=(5.4, 2.8), layout="constrained")
+
+    def value(x: float) -> float:
+        return 2.2 * x - 0.4 if x > 0 else 0.5 * x - 0.4 - 0.12 * x**2
+
+    def slope(x: float) -> float:
+        return 2.2 if x > 0 else 0.5 - 0.24 * x
+
+    along = np.linspace(-2.2, 0.75, 300)
+    axes.plot(along, [value(x) for x in along], color=CONE, lw=1.8)
+    axes.axhline(0, color=INK, lw=0.8)
+    axes.plot(0, value(0), "o", color=SLIP, ms=6)
+    axes.annotate("kink: the node changes its state", (0, value(0)), (-10, -20), ha="left",
+                  textcoords="offset points", color=SLIP)  # fmt: skip
+    x = -1.8
+    for number in range(3):
+        following = x - value(x) / slope(x)
+        axes.plot([x, x], [0, value(x)], color=INK, ls=":", lw=1)
+        axes.plot([x, following], [value(x), 0], color=FORCE, lw=1.2)
+        axes.text(x, 0.08, f"$x_{number}$", color=INK, ha="center")
+        x = following
+    axes.set(ylim=(-1.9, 1.4))
+    axes.set_axis_off()
+    save(figure, "semismooth.svg")
+
+
+def fallbacks() -> None:
+    """Ways to a solution, each in the plane of two unknowns."""
+    figure, four = plt.subplots(1, 4, figsize=(8.4, 2.3), layout="constrained")
+    names = "interior point", "continuation", "sweeps", "proximal points"
+    for axes, name in zip(four, names):
+        axes.set_title(name, color=INK, fontsize=10)
+        axes.plot(1, 0.5, "*", color=FORCE, ms=11, zorder=3)
+        blank(axes, (-0.15, 1.25), (-0.15, 1.25))
+    way = np.linspace(0, 1, 9)
+    inside, path, sweeps, proximal = four
+    inside.fill([0, 1, 1.1, 0], [0, 0.5, 1.2, 1.2], color=CONE, alpha=0.18, lw=0)
+    inside.plot([0, 1.2], [0, 0.6], color=CONE)
+    inside.plot(0.25 + 0.75 * way, 1.0 - 0.5 * way**2.5, ".-", color=SLIP)
+    path.plot(way, 0.1 + 0.9 * way - 0.5 * way**2, ".-", color=SLIP)
+    path.text(0.02, -0.1, "easier problem", color=INK, fontsize=9)
+    a, b = np.array([[1.0, 0.75], [0.75, 1.0]]), np.array([1.375, 1.25])  # solved by (1, 0.5)
+    x, corners = np.array([0.0, 0.1]), [np.array([0.0, 0.1])]
+    for _ in range(6):
+        for k in (0, 1):
+            x = x.copy()
+            x[k] = (b[k] - a[k, 1 - k] * x[1 - k]) / a[k, k]
+            corners.append(x)
+    sweeps.plot(*np.array(corners).T, ".-", color=SLIP)
+    sweeps.set(xlim=(-0.15, 1.5))
+    x, centres = np.array([0.0, 1.1]), [np.array([0.0, 1.1])]
+    for _ in range(7):
+        x = np.linalg.solve(a + 0.35 * np.eye(2), b + 0.35 * x)
+        centres.append(x)
+    for centre in centres[:4]:
+        proximal.add_patch(plt.Circle(centre, 0.12, fill=False, color=INK, ls=":"))
+    proximal.plot(*np.array(centres).T, ".-", color=SLIP)
+    save(figure, "fallbacks.svg")
+
+
 if __name__ == "__main__":
     plt.rcParams |= SETTINGS
-    for draw in (fixed_point, anderson, condensed, sparse_newton, multigrid):
+    for draw in (
+        fixed_point,
+        anderson,
+        surface_layer,
+        semismooth,
+        condensed,
+        sparse_newton,
+        multigrid,
+        fallbacks,
+    ):
         draw()

@@ -109,6 +109,18 @@ def test_code_is_marked_by_its_language(page):
     assert "{code-block} python" not in opening
 
 
+MEASURED = re.compile(r"\d ?(?:%|s\b|ms\b|GB\b)|\d times\b")
+MONTHS = "January|February|March|April|May|June|July|August|September|October|November|December"
+DATED = re.compile(rf"\d+ (?:{MONTHS}) 20\d\d")
+
+
+@pytest.mark.parametrize("page", TEXTS)
+def test_page_with_measured_numbers_has_a_date(page):
+    """Where a page's words state times, shares or ratios, it names the day of their record."""
+    words = re.sub(r"^```.*?^```$", "", TEXTS[page], flags=re.DOTALL | re.MULTILINE)
+    assert not MEASURED.search(words) or DATED.search(words)
+
+
 def test_cells_of_demos():
     """Every demo begins with a heading, which is its title in the gallery, and has code."""
     for file in (ROOT / "demos").glob("demo_*.py"):

@@ -168,8 +168,8 @@ def solve_condensed(
         CondensedNotConverged: no method reached ``tol``, or there is no solution; carries the best state.
 
     Example:
-        >>> dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # slips
-        array([[-0.3,  0. ,  1. ]])
+        >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
+        array([[-0.3,  1. ]])
     """
     q, W, friction, r0 = checked_problem(q, W, friction, r0)
     solver, tol = _checked_options(solver, tol, max_seconds)
