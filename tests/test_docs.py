@@ -109,6 +109,15 @@ def test_code_is_marked_by_its_language(page):
     assert "{code-block} python" not in opening
 
 
+def test_reference_has_what_scripts_read_of_a_contact():
+    """Attributes of a contact that scripts of the pages use are members in the reference, or in the class's docstring."""
+    (members,) = re.findall(r"autoclass:: Contact\n   :members: (.+)", TEXTS["reference.md"])
+    known = {*members.split(", "), "x", "plane", "nodes", "rho"}
+    for page in set(SCRIPTS) - {"own_solver.md"}:
+        used = set(re.findall(r"\bcontact\.([a-z]\w*)", "".join(SCRIPTS[page])))
+        assert used <= known, page
+
+
 MEASURED = re.compile(r"\d ?(?:%|s\b|ms\b|GB\b)|\d times\b")
 MONTHS = "January|February|March|April|May|June|July|August|September|October|November|December"
 DATED = re.compile(rf"\d+ (?:{MONTHS}) 20\d\d")

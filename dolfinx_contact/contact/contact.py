@@ -60,7 +60,6 @@ class Contact(ContactKinematics):
             vertices of tetrahedra of second order, on which an even pressure makes no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
-        friction: The law of friction, and ``wear`` that of wear; another one may be assigned between steps, on all ranks.
 
     Example:
         >>> contact = dc.Contact(V, foot, plane, dc.Friction(mu=0.3))
