@@ -42,6 +42,13 @@ class Estimate:
             stresses in the mean.  None if the two problems have different meshes.
         cells: Function of degree 0, the energy norm of the difference on each cell; their squares sum up to that of the
             body.  None with ``energy_norm``.
+
+    Example:
+        What ``estimate`` returns, made by hand:
+
+        >>> found = dc.Estimate(quantities={}, energy_norm=0.01, cells=None)
+        >>> found.energy_norm
+        0.01
     """
 
     quantities: dict[str, Estimated]
@@ -97,6 +104,16 @@ def estimate(
 
     Raises:
         ValueError: problems that do not belong together, or quantities that are not finite numbers.
+
+    Example:
+        >>> W = functionspace(block, ("Lagrange", 2, (3,)))  # the same body in second order
+        >>> U = fem.Function(W)
+        >>> finer_F = ufl.replace(F, {u: U, v: ufl.TestFunction(W)})
+        >>> finer_bc = fem.dirichletbc(held, fem.locate_dofs_topological(W, 2, head), W)
+        >>> finer_contact = dc.Contact(W, foot, plane, friction)
+        >>> finer = dc.ContactProblem(finer_F, U, [finer_contact], bcs=[finer_bc])
+        >>> step = finer.solve()  # and all other steps of the programme
+        >>> off = dc.estimate(problem, finer)["normal_force"].relative
     """
     comm = problem.body.comm
     with raised_together(comm):

@@ -44,6 +44,10 @@ class RigidSurface(CurvedSurface):
     Attributes:
         point, axis: As given, ``axis`` of unit length; read-only.
         displacement, rotation, free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+
+    Example:
+        >>> bump = dc.RigidSurface(lambda x: x[2] + 0.1 * (x[0] ** 2 + 2 * x[1] ** 2), point=(0, 0, 0), axis=(1, 0, 0))
+        >>> on_bump = dc.Contact(V, foot, bump, friction)
     """
 
     def __init__(
