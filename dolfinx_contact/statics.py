@@ -175,7 +175,7 @@ class Statics:
             state = contact.reaction, contact.gap, contact.slip_increment
             by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
             by_motion[contact.reaction[:, -1] <= 0.0] = 0.0
-            motion = (points.B @ self._modes).reshape(points.count, self._dim, -1)
+            motion = (points.B @ self._modes).reshape(points.count, self._dim, self._felt.size)
             changed.append((by_motion @ motion).reshape(-1, self._felt.size))
         changed = np.concatenate(changed) / np.sqrt(self._felt)
         if len(changed) > self._felt.size:  # and not empty, as where a rank has no contact nodes
