@@ -4,7 +4,7 @@
 # make test     a test of every feature: the Python ones that are not marked slow, on 1 and 2 MPI ranks, and
 #               the kernel without Python
 # make test-all all tests: make test, the slow ones, 3 ranks, and the C++ ones
-# make stress   every solver on some 640 scenes, each answer judged from the mechanics in NumPy; resumable
+# make stress   every solver on some 840 scenes, each answer judged from the mechanics in NumPy; resumable
 # make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
 # make report   error against run time: every solver, and the peers beside it;
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
@@ -16,8 +16,8 @@ RANKS = 1 2 3
 # tests of plain arrays, the same on every rank: they run on one alone
 arrays = bipotential condensed_errors condensed_kernel condensed_newton condensed_rigid condensed_tied element_height \
 	friction friction_cone judge return_map
-# whole programs, whose parts have tests of their own: make test has them on one rank
-programs = accuracy demos report stress study
+# whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
+programs = accuracy demos docs report stress structure study
 no_arrays = $(arrays:%=--ignore=tests/test_%.py)
 no_programs = $(programs:%=--ignore=tests/test_%.py)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \

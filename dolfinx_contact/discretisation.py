@@ -86,11 +86,8 @@ def estimate(
 
     ``reference`` is the same body with a better space, which was taken through the same programme: of second order on the
     same mesh, of a finer mesh, of smaller increments.  The difference of a quantity is its estimated error,
-
-        |J(u) - J(U)| share,
-
-    which is the error itself if the reference's own is small beside it (saturation; R. E. Bank, R. K. Smith, SIAM J.
-    Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
+    ``abs(J(u) - J(U)) * share``, which is the error itself if the reference's own is small beside it (saturation;
+    R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
     all that depends on history are estimated as accumulated.
 
     Args:
