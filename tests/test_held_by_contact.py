@@ -64,7 +64,9 @@ class Loose:
         for contact in self.contacts:
             r = contact.reaction @ contact.frame
             force += r.sum(axis=0)
-            moment = moment + np.cross(contact.x[:, : self.dim] - middle, r).sum(axis=0)
+            arm = contact.x[:, : self.dim] - middle
+            turn = np.cross(arm, r) if self.dim == 3 else arm[:, 0] * r[:, 1] - arm[:, 1] * r[:, 0]
+            moment = moment + turn.sum(axis=0)
         return COMM.allreduce(force, op=MPI.SUM), COMM.allreduce(moment, op=MPI.SUM)
 
 
