@@ -84,7 +84,7 @@ def far_field(x, point_force: float):
     """Rigid approach and the displacement of a point force at the origin, ``shape=(2, points)``."""
     r, z = x[0], x[1]
     rho = np.hypot(r, z)
-    rho[rho == 0] = 1.0  # inside the contact, where the value is not used
+    rho[rho + z <= 0] = 1.0  # inside the contact, where the value is not used
     b = point_force * (1 + NU) / (2 * np.pi * E * rho)
     b_r = b * (r * z / rho**2 - (1 - 2 * NU) * r / (rho + z))
     return np.array([b_r, b * (2 * (1 - NU) + z**2 / rho**2) - DELTA])

@@ -93,7 +93,6 @@ class Statics:
         the rays that reach farthest along the rest, one after another, and least squares with weights that are not
         negative.  The last ones are reactions that balance the loads.
         """
-        from scipy.optimize import nnls  # of loose bodies alone
 
         unit = float(np.linalg.norm(self.loads)) or 1.0
         target, rays, weights = -self.loads / unit, np.zeros((self.loads.size, 0)), np.zeros(0)
@@ -108,7 +107,7 @@ class Statics:
                 return self._along_planes(-rest, kept, weights)
             rays = np.column_stack((rays[:, weights > 0], ray))
             kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
-            weights, _ = nnls(rays, target)
+            weights, _ = _cone_weights(rays, target)
             rest = target - rays @ weights
         for weight, (_, reaction) in zip(weights, kept):
             self._balancing += unit * weight * reaction
@@ -246,20 +245,30 @@ class Statics:
         return x
 
 
+def _cone_weights(rays: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+    """Weights, none negative, of columns whose sum is nearest to a target, and its distance.
+
+    By bounded least squares [P. B. Stark, R. L. Parker, Computational Statistics 10 (1995) 129]: SciPy's ``nnls`` is
+    another programme from release to release, and that of 1.15 stops early here.
+    """
+    from scipy.optimize import lsq_linear  # of loose bodies alone
+
+    weights = lsq_linear(rays, target, bounds=(0.0, np.inf), method="bvls", tol=1e-15).x
+    return weights, float(np.linalg.norm(rays @ weights - target))
+
+
 def _touching(normal: np.ndarray, gap: np.ndarray, force: np.ndarray) -> np.ndarray | None:
     """The motion ``c`` with ``gap + normal c >= 0`` that is nearest to a far one against these forces; None if there is none.
 
     Least distance by non-negative least squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974].
     """
-    from scipy.optimize import nnls
-
     against = -force @ normal
     length, most = np.abs(gap).max(), np.linalg.norm(against) * np.linalg.norm(normal, axis=1).max()
     if not length * most > 0.0:
         return None
     far = FAR * length * np.linalg.norm(against) / most * against / np.linalg.norm(against)
     below = -(gap + normal @ far) / length
-    weights, left = nnls(np.vstack((normal.T, below)), np.append(np.zeros(len(far)), 1.0))
+    weights, left = _cone_weights(np.vstack((normal.T, below)), np.append(np.zeros(len(far)), 1.0))
     if not left > 1e-14:
         return None
     rest = np.vstack((normal.T, below)) @ weights - np.append(np.zeros(len(far)), 1.0)
