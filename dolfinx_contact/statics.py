@@ -11,7 +11,7 @@ from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed_input import principal_axes
 
 # Part of the loads whose sum is rounding, part of that sum that may be left, and rays of friction cones that are tried.
-ROUNDING, BALANCED, RAYS = 1e-12, 1e-9, 400
+ROUNDING, BALANCED, RAYS = 1e-12, 1e-7, 400
 
 # What reactions may leave of loads in a state that is no more than rounding away from a solution.
 ROUGH = 1e-3
@@ -19,8 +19,8 @@ ROUGH = 1e-3
 # Part of a motion that is none.
 SMALL = 1e-6
 
-# Directions that take more than so many times the reactions found so far count as none.
-JAMMED = 1e7
+# Balance that takes reactions more than so many times the loads, as of a body jammed between planes, counts as none.
+JAMMED = 1e9
 
 # A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
 # body slides away along it if it changes less than the second number, and loads are not balanced.
@@ -102,12 +102,13 @@ class Statics:
                 break
             reach, ray, *reaction = self._farthest(rest)
             length = float(np.linalg.norm(ray))
-            far = JAMMED * weights.sum() or np.inf
-            if reach <= max(1e-14 * length, rest @ rest / far):
+            if reach <= length * max(1e-14, np.linalg.norm(rest) / JAMMED):
                 return self._along_planes(-rest, kept, weights)
             rays = np.column_stack((rays[:, weights > 0], ray))
             kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
-            weights, _ = _cone_weights(rays, target)
+            weights, _ = self._body.comm.bcast(
+                _cone_weights(rays, target, float(np.linalg.norm(rest)))
+            )
             rest = target - rays @ weights
         for weight, (_, reaction) in zip(weights, kept):
             self._balancing += unit * weight * reaction
@@ -179,7 +180,8 @@ class Statics:
         changed = np.concatenate(changed) / np.sqrt(self._felt)
         if len(changed) > self._felt.size:  # and not empty, as where a rank has no contact nodes
             changed = np.linalg.qr(changed, mode="r")
-        _, values, vectors = np.linalg.svd(np.concatenate(self._body.comm.allgather(changed)))
+        decomposed = np.linalg.svd(np.concatenate(self._body.comm.allgather(changed)))
+        _, values, vectors = self._body.comm.bcast(decomposed)  # to the same bits on all ranks
         small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
         return vectors[small].T / np.sqrt(self._felt)[:, None]
 
@@ -193,6 +195,8 @@ class Statics:
         least = ROUGH * np.linalg.norm(driven) * np.linalg.norm(sizes)
         if driven @ self.loads <= least or abs(driven @ left) <= least:
             return False
+        if np.linalg.norm(left) > np.linalg.norm(self.loads):
+            return False  # reactions of a body that is lost, not of one that slides
         self.said = f"The loads drive {self._body.loose.words(driven)} by more than friction carries: no static state exists"
         return True
 
@@ -245,15 +249,24 @@ class Statics:
         return x
 
 
-def _cone_weights(rays: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+def _cone_weights(
+    rays: np.ndarray, target: np.ndarray, scale: float = 1.0
+) -> tuple[np.ndarray, float]:
     """Weights, none negative, of columns whose sum is nearest to a target, and its distance.
+
+    ``scale`` is about that distance: SciPy compares with its tolerance what is not relative to it.
 
     By bounded least squares [P. B. Stark, R. L. Parker, Computational Statistics 10 (1995) 129]: SciPy's ``nnls`` is
     another programme from release to release, and that of 1.15 stops early here.
     """
     from scipy.optimize import lsq_linear  # of loose bodies alone
 
-    weights = lsq_linear(rays, target, bounds=(0.0, np.inf), method="bvls", tol=1e-15).x
+    lengths = np.linalg.norm(rays, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    found = lsq_linear(
+        rays / lengths, target / scale, bounds=(0.0, np.inf), method="bvls", tol=1e-15
+    )
+    weights = scale * found.x / lengths
     return weights, float(np.linalg.norm(rays @ weights - target))
 
 

@@ -280,4 +280,9 @@ class LoadStep:
             left = np.append(left, on_planes[mine])
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
-        return as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
+        errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
+        if not errors.acts and self.statics is not None and self.statics.loads.any():
+            return errors._replace(
+                error=np.inf
+            )  # the body is lost so far away that rounding hides its loads
+        return errors

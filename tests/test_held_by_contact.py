@@ -258,3 +258,16 @@ def test_whether_loads_can_be_held_is_what_a_linear_programme_says():
         assert (said == "") == (found.status == 0)
         seen.add(found.status)
     assert seen == {0, 2}
+
+
+def test_friction_at_its_limit_is_decided_in_every_direction():
+    """Pushed by a little less or more than mu N along any direction: statics say which, and name the translation."""
+    scene, random = Loose(3), np.random.default_rng(5)
+    for angle in np.append(random.uniform(0.0, 2 * np.pi, 20), [0.0, np.pi / 2, np.pi / 4]):
+        along = np.array([np.cos(angle), np.sin(angle), 0.0])
+        for part in (1 - 1e-7, 1 - 1e-3, 1 + 1e-3, 1 + 1e-5):
+            scene.force.value[:] = 0.3 * part * along - scene.up
+            step, body = scene.problem.load_step(), scene.problem.body
+            said = Statics(body, scene.contacts, step, np.zeros(body.size)).said
+            assert (said == "") == (part < 1)
+            assert part < 1 or "a translation along" in said

@@ -5,6 +5,7 @@
 #include "random_states.h"
 #include <dolfinx_contact/bipotential.h>
 #include <dolfinx_contact/condensed_exact.h>
+#include <dolfinx_contact/condensed_judge.h>
 #include <dolfinx_contact/condensed_operator.h>
 #include <dolfinx_contact/slip_rule.h>
 #include <gtest/gtest.h>
@@ -88,4 +89,31 @@ TEST(CondensedJudge, judge_agrees_with_the_kernel) {
     }
     for (const int count : branches)
         EXPECT_GE(count, 100);
+}
+
+// A loose block, w = r + s over its plane, has to carry its weight, r = 1. However far away it is
+// moved, where rounding hides that weight, a state without that reaction is no solution.
+TEST(CondensedJudge, no_state_is_so_far_away_that_any_reaction_carries_the_load) {
+    MatrixXd W = MatrixXd::Ones(2, 2);
+    W(1, 1) = 0.0;
+    VectorXd q = VectorXd::Zero(2);
+    q[1] = -1.0;
+    const Operator op(W, 1, 1);
+    const AnyLaw<0> law = Uniform<Frictionless>{};
+    dolfinx_contact::condensed::Scales scales;
+    scales.external = 1.0;
+    const condensed::Judge<0> judge(op, law, q, scales, 1e-8);
+    condensed::Solution state;
+    const auto accepted = [&](double r, double s) {
+        state.reaction = VectorXd::Zero(2);
+        state.reaction << r, s;
+        judge.judge(state);
+        return condensed::Judge<0>::accepts(state, 1e-8, 1e-8);
+    };
+    EXPECT_TRUE(accepted(1.0, -1.0));
+    for (double far = 1e-3; far < 1e30; far *= 10) {
+        EXPECT_FALSE(accepted(5.0, far));
+        EXPECT_FALSE(accepted(0.0, far));
+        EXPECT_FALSE(accepted(0.0, -far));
+    }
 }

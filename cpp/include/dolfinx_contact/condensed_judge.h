@@ -44,6 +44,9 @@ template <int P> class Judge {
         }
         loads.tail(op.tied()).array() *= tied_.array();
         load_ = loads.stableNorm();
+        for (Index i = 0; i < n; ++i)
+            loads[D * i + P] = kappa_[i] * q[D * i + P];
+        acts_ = external_ > eps * loads.stableNorm();
     }
 
     /// Displacement, status, errors and rounding of the reactions of a solution. The forces that
@@ -51,7 +54,8 @@ template <int P> class Judge {
     /// grow without bound would solve a problem without solution. With C the size of the terms that
     /// cancel, in the units of a force:
     /// - S > eps C: what is left over S, rounding eps C / S;
-    /// - else nothing acts to rounding: right if no more than eps C is left, and then given over C.
+    /// - else nothing acts to rounding: right if no more than eps C is left, and then given over C;
+    ///   but if the external force acts beside q, the state is so far away that no digit is left.
     void judge(Solution &s) const {
         const bool free = s.reaction.isZero(0.0);
         const VectorXd size = q_.cwiseAbs() + op_.W().magnitudes(s.reaction);
@@ -73,7 +77,8 @@ template <int P> class Judge {
         s.slip_error = ratio(left.slip, s.acting);
         s.rounding = eps * ratio(left.size, s.acting);
         s.slip_rounding = eps * ratio(left.slip_size, s.acting);
-        if (contacts > std::max(load_, external_) / std::sqrt(eps)) // without bound
+        const bool lost = acts_ && external_ <= eps * left.size;
+        if (lost || contacts > std::max(load_, external_) / std::sqrt(eps)) // without bound
             s.error = std::numeric_limits<double>::infinity();
     }
 
@@ -205,7 +210,7 @@ template <int P> class Judge {
     const AnyLaw<P> &law_;
     const VectorXd &q_;
     double external_, tol_, floor_ = 0.0, load_ = 0.0;
-    bool given_;
+    bool given_, acts_;
     VectorXd kappa_, tied_;
     std::vector<Block> blocks_; // tangential stiffness, or compliance if none is given
 };
