@@ -66,7 +66,10 @@ def test_random_problems_of_every_rank():
     and a slip rule at right angles to friction.
     """
     branches = Counter(check(random_problem(seed)).branch for seed in range(150))
-    assert branches["interior point"] > 20 and branches["continuation"] > 2
+    assert (
+        min(branches[by] for by in ("newton, other rho_t", "interior point")) > 10
+        and branches["continuation"] > 2
+    )
 
 
 @pytest.mark.slow

@@ -42,6 +42,10 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;
+        if (T > 0)
+            for (const double tangential : {3.0, 0.3})
+                if (attempt("newton, other rho_t", [&] { this->newton(given, tangential); }))
+                    return;
         constexpr Index pivotable = 64;
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))

@@ -76,8 +76,10 @@ template <int T, int P> class Attempts {
             }
     }
 
-    void newton(VectorXd r) {
+    /// With rho_t times `tangential`: Newton's method goes around in circles elsewhere then.
+    void newton(VectorXd r, double tangential = 1.0) {
         System<T> system = scaling_.make();
+        system.rho_t *= tangential;
         finish(system, r);
     }
 
