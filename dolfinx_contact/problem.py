@@ -88,7 +88,6 @@ class ContactProblem(ProblemStates):
 
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
-        NotImplementedError: a tangential direction of a contact node is held that is no axis of its contact.
 
     Example:
         >>> other = dc.Contact(V, foot, plane, friction)  # of this problem alone

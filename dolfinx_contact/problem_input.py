@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
+from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
@@ -121,9 +122,12 @@ def hold(contacts, body) -> None:
     left_out = [np.zeros((0, 3))]
     with raised_together(body.comm):
         for contact in contacts:
-            held, closed = _held_directions(contact, body.fixed)
-            contact.points.hold(held, closed)
-            left_out.append(contact.x[closed])
+            contact.points.hold(*_held_directions(contact, body.fixed))
+            left_out.append(contact.x[contact.points.closed])
+    for contact in contacts:
+        guided = contact.points.guided
+        some = body.comm.allreduce(guided is not None, op=MPI.LOR)
+        contact.guide((guided or (np.zeros(0, dtype=int), np.zeros((0, 2)))) if some else None)
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     if len(where) == 0:
@@ -142,19 +146,26 @@ def hold(contacts, body) -> None:
     )
 
 
-def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tangential directions that boundary conditions fix, ``shape=(n, gdim - 1)``; nodes whose normal is fixed."""
+def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
+    """What boundary conditions fix, as ``ContactPoints.hold`` takes it."""
     left = contact.points.free_of(fixed)
     closed = left[:, -1] < 1e-12
     # What is left of each local direction without its fixed components: all, nothing, or a part.
     partly = (left > 1e-12) & (left < 1 - 1e-12) & ~closed[:, None]
-    if partly.any():
-        node = np.argmax(partly.any(axis=1))
-        raise NotImplementedError(
-            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along "
-            "none of the axes of its contact: let plane.axis be along or across that direction."
+    held, guided = (left[:, :-1] < 0.5) | closed[:, None], None
+    if partly[:, -1].any():
+        node = np.argmax(partly[:, -1])
+        raise ValueError(
+            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along a direction that is "
+            "oblique to the plane: what the node still can do is neither sliding nor lifting off. Hold it along the plane, or "
+            "take it out of the condition."
         )
-    return (left[:, :-1] < 0.5) | closed[:, None], closed
+    if partly.any():
+        nodes = np.flatnonzero(partly.any(axis=1))
+        free = contact.points.tangents_free_of(fixed)[nodes]
+        longest = free[np.arange(len(nodes)), np.diagonal(free, axis1=1, axis2=2).argmax(axis=1)]
+        held[nodes], guided = False, (nodes, longest / np.linalg.norm(longest, axis=1)[:, None])
+    return held, closed, guided
 
 
 def follow(contacts, body, u: np.ndarray, known: list) -> bool:

@@ -58,7 +58,7 @@ class Statics:
         for contact in contacts:
             points = contact.points
             motion = (points.B @ self._modes).reshape(points.count, self._dim, m)
-            motion[:, :-1][points.held] = 0.0
+            points.without_held(motion[:, :-1])
             motion[points.closed] = 0.0
             turns = principal_axes(contact.friction, points.count, self._dim)
             parts.append(turns @ motion)

@@ -250,17 +250,3 @@ def test_a_quarter_of_the_punch_is_a_quarter_of_the_whole(solver, law):
         same = [np.argmin(np.linalg.norm(x - point, axis=1)) for point in y]
         assert np.linalg.norm(x[same] - y) < 1e-12
         assert np.abs(r[same] - part).max() <= 1e-8 * np.abs(r).max()
-
-
-def test_support_oblique_to_friction_is_refused():
-    """A fixed direction that is no axis of the contact has no meaning in the law: say what to do."""
-    with pytest.raises(NotImplementedError, match="plane.axis"):
-        scene = scenes.block()
-        plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0.5, 0))
-        contact = dc.Contact(scene.V, scene.facets, plane, dc.Friction(0.3))
-        side = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[0], -0.5))
-        Vx = scene.V.sub(0)
-        bc = fem.dirichletbc(
-            fem.Constant(scene.mesh, 0.0), fem.locate_dofs_topological(Vx, 2, side), Vx
-        )
-        dc.ContactProblem(scene.F, scene.u, [contact], bcs=[*scene.bcs, bc])

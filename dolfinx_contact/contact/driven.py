@@ -101,7 +101,7 @@ class DrivenPlanes:
             if one is plane:
                 for k, motion in enumerate(motions, start=part.start):
                     axes[:, :, k] = contact.carried_by(motion.axis, motion.turns)
-        axes[:, :-1][points.held] = 0.0
+        points.without_held(axes[:, :-1])
         axes[points.closed] = 0.0
         return axes
 

@@ -26,6 +26,28 @@ def on_nodes(contact, friction: Friction) -> Friction:
     return Friction(mu, p, k, axes=_axes(contact, given["axes"]))
 
 
+def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
+    """The law of nodes some of which can slide along one direction alone.
+
+    The cone is cut along that direction ``s``: ``|r_s| <= r_n / |M^-1 s|``.  What the support carries across it is no
+    reaction of the plane.  Slip is along ``s``, whatever the slip rule.
+
+    Args:
+        friction: The law given, with coefficients or arrays of them.
+        count: Number of this rank's nodes.
+        nodes, along: These nodes, and unit vectors in the tangential part of the local frame, ``shape=(k, 2)``.
+    """
+    mu, p = (np.broadcast_to(part, (count, 2)).copy() for part in (friction.mu, friction.p))
+    axes = np.tile([1.0, 0.0], (count, 1)) if friction.axes is None else friction.axes.copy()
+    (cos, sin), (x, y) = axes[nodes].T, along.T
+    principal = np.column_stack((cos * x + sin * y, cos * y - sin * x))
+    with np.errstate(divide="ignore", invalid="ignore"):  # no friction at some nodes
+        cut = 1.0 / np.linalg.norm(principal / mu[nodes], axis=1)
+    mu[nodes] = p[nodes] = np.where((mu[nodes] > 0.0).all(axis=1), cut, 0.0)[:, None]
+    axes[nodes] = along
+    return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
+
+
 def directed(friction: Friction, gdim: int) -> bool:
     """Whether the axes may be directions in space, which need no axis of the plane."""
     return friction.field and gdim == 3 and is_field(friction.given()["axes"])

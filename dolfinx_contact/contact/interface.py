@@ -23,6 +23,8 @@ class ContactPoints:
         B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  There is neither
             slip nor friction in them: what the support carries is no reaction of the plane.
+        guided: Points that can slide along one tangential direction alone, which is none of the frame's, and the
+            tangential components of that unit vector, ``shape=(k,)`` and ``(k, 2)``; None if there are none.
         closed: Points whose motion along the normal is given, ``shape=(n,)``: they never touch.
     """
 
@@ -38,9 +40,17 @@ class ContactPoints:
             np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
         )
 
-    def hold(self, held: np.ndarray, closed: np.ndarray) -> None:
-        """Take note of what boundary conditions fix: directions ``held``, points ``closed``."""
-        self.held, self.closed = held, closed
+    def hold(self, held: np.ndarray, closed: np.ndarray, guided: tuple | None = None) -> None:
+        """Take note of what boundary conditions fix: directions ``held``, points ``closed``, others ``guided``."""
+        self.held, self.closed, self.guided = held, closed, guided
+
+    def without_held(self, tangential: np.ndarray) -> None:
+        """Take from tangential components, ``shape=(n, gdim - 1, ...)``, in place, what boundary conditions hold."""
+        tangential[self.held] = 0.0
+        if self.guided is not None:
+            points, along = self.guided
+            part = np.einsum("ni,ni...->n...", along, tangential[points])
+            tangential[points] = np.einsum("ni,n...->ni...", along, part)
 
     def motion(self, u: np.ndarray) -> np.ndarray:
         """Local components of the points' motion, ``shape=(n, gdim)``, from owned degrees of freedom."""
@@ -72,6 +82,11 @@ class ContactPoints:
         """Length of what boundary conditions leave of each local direction, ``shape=(n, gdim)``: 1, 0 or a part."""
         free = ~np.isin(self.dofs, fixed)
         return np.linalg.norm(self.frames * free[:, None, :], axis=2)
+
+    def tangents_free_of(self, fixed: np.ndarray) -> np.ndarray:
+        """Products of the tangential directions without their fixed components, ``shape=(n, gdim - 1, gdim - 1)``."""
+        free = self.frames[:, :-1] * ~np.isin(self.dofs, fixed)[:, None, :]
+        return free @ free.transpose(0, 2, 1)
 
     def stiffness(self, K) -> NodalStiffness:
         """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective."""

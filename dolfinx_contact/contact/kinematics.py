@@ -172,7 +172,7 @@ class ContactKinematics(ContactResults):
         displacement = self.points.motion(values[: self.points.size]) - self._moved()
         gap = self._placed.flat + self.wear_depth + displacement[:, -1]
         slip = (displacement - self.last.displacement)[:, :-1]
-        slip[self.points.held] = 0.0
+        self.points.without_held(slip)
         closed = self.points.closed
         gap[closed] = np.maximum(gap[closed], self._apart)
         self.take(displacement=displacement, gap=gap, slip_increment=slip)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
-from dolfinx_contact.contact.friction_field import directed, on_nodes
+from dolfinx_contact.contact.friction_field import directed, guided, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
@@ -19,9 +19,14 @@ from dolfinx_contact.law.wear import Wear
 class ContactLaws(ContactHistory):
     """Friction and wear of a ``Contact``, which has space, plane, frame and nodes."""
 
+    _guides: tuple | None = None
+
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then."""
+        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then.
+
+        Where a support lets a node slide along one direction alone, which is none of the frame's, it has the coefficient of that direction.
+        """
         return self._friction
 
     @friction.setter
@@ -34,7 +39,15 @@ class ContactLaws(ContactHistory):
                 check_law(self.plane, friction, gdim, turned)
         else:
             check_law(self.plane, friction, gdim)
-        self._friction, self._law = friction, friction.law(gdim)
+        self._given = friction
+        self.guide(self._guides)
+
+    def guide(self, guides: tuple | None) -> None:
+        """From now on some nodes slide along one direction alone, see ``ContactPoints.guided``; on all ranks or on none."""
+        self._guides, friction = guides, self._given
+        if guides is not None and not friction.frictionless:
+            friction = guided(friction, self.nodes.size, *guides)
+        self._friction, self._law = friction, friction.law(self.V.mesh.geometry.dim)
 
     @property
     def law(self):

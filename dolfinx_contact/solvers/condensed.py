@@ -172,7 +172,9 @@ class CondensedBody:
             free = ~np.isin(points.dofs, self._body.fixed)
             dofs.append(np.repeat(points.dofs, self.dim, axis=0))
             turns.append(principal_axes(contact.friction, points.count, gdim)[:, -self.dim :])
-            frames.append((turns[-1] @ points.frames * free[:, None, :]).reshape(-1, gdim))
+            rows = turns[-1] @ points.frames * free[:, None, :]
+            rows[np.linalg.norm(rows, axis=2) < 1e-12] = 0.0  # fixed but for rounding
+            frames.append(rows.reshape(-1, gdim))
         self._turns = np.concatenate(turns)
         return Rows(self.comm, np.concatenate(dofs), np.concatenate(frames))
 

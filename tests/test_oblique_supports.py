@@ -1,0 +1,138 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Supports along a tangential direction that is none of the frame's: the law of the direction that is left."""
+
+import numpy as np
+import pytest
+import scenes
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
+
+COMM = scenes.COMM
+SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint}
+AXES = [(1.0, 0.0, 0.0), (1.0, 0.6, 0.0), (0.2, -1.0, 0.0), (1.0, 1.0, 0.0)]
+
+
+def block(friction, axis, solver, held="side", length=1.0, E=210e3):
+    """A cube on a plane with a given axis; a driven head; of its side x = 0 or of its foot the displacement along y or x is zero.
+
+    Returns:
+        The problem, its contact, the Function that holds the head's displacement, and what the support holds.
+    """
+    domain = mesh.create_box(COMM, [np.zeros(3), np.ones(3)], [3, 4, 2], mesh.CellType.hexahedron)
+    domain.geometry.x[:] *= length
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, v, head = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
+    top, foot, side = (
+        mesh.locate_entities_boundary(
+            domain, 2, lambda x, i=i, at=at: np.isclose(x[i], at * length, atol=1e-9 * length)
+        )
+        for i, at in ((2, 1.0), (2, 0.0), (0, 0.0))
+    )
+    bcs = [fem.dirichletbc(head, fem.locate_dofs_topological(V, 2, top))]
+    component, where = (V.sub(0), side) if held == "side" else (V.sub(1), foot)
+    across = fem.Constant(domain, 0.0)
+    bcs.append(fem.dirichletbc(across, fem.locate_dofs_topological(component, 2, where), component))
+    contact = dc.Contact(V, foot, dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=axis), friction)
+    F = scenes.elasticity(u, v, E, 0.3)
+    return (
+        dc.ContactProblem(F, u, [contact], bcs=bcs, solver=SOLVERS[solver](), tol=1e-10),
+        contact,
+        head,
+        across,
+    )
+
+
+def reactions(contact):
+    """Places and reactions of all nodes, global components."""
+    x, r = scenes.gathered(contact)
+    return x, r @ contact.frame
+
+
+def drive(head, *displacement):
+    head.x.array.reshape(-1, 3)[:] = displacement
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e9)])
+def test_isotropic_friction_does_not_see_the_axes_of_the_frame(solver, units):
+    """Half a cube behind its plane of symmetry: the same reactions in space whatever the plane's axis."""
+    length, E = units
+    found = []
+    for axis in AXES:
+        problem, contact, head, _ = block(dc.Friction(0.3), axis, solver, length=length, E=E)
+        for step in ((0.0, 0.0, -0.01), (0.0, 0.004, -0.01), (0.0, -0.002, -0.012)):
+            drive(head, *np.multiply(step, length))
+            problem.solve()
+        found.append(reactions(contact)[1])
+        slip = COMM.allreduce(contact.slip_path.sum(), op=MPI.SUM)
+        found.append(np.full((1, 3), slip * E * length))
+    size = np.abs(found[0]).max()
+    for r, path in zip(found[2::2], found[3::2]):
+        assert np.abs(r - found[0]).max() < 1e-7 * size
+        assert np.abs(path - found[1]).max() < 1e-6 * np.abs(found[1]).max()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    "law", [dict(mu=(0.4, 0.1)), dict(mu=(0.4, 0.1), p=(0.05, 0.2)), dict(mu=(0.2, 0.2))]
+)
+@pytest.mark.parametrize("angle", [0.3, 2.5])
+def test_a_guided_foot_slides_with_the_coefficient_of_its_direction(solver, law, angle):
+    """Every node slides along x: friction is the normal force times the cone's extent along x, 1 / |M^-1 x|, at any angle."""
+    axis = (np.cos(angle), np.sin(angle), 0.0)
+    problem, contact, head, across = block(dc.Friction(**law), axis, solver, held="foot")
+    drive(head, 0.0, 0.0, -0.01)
+    problem.solve()
+    for way in (1.0, -1.0):
+        drive(head, 0.5 * way, 0.0, -0.01)
+        across.value = 0.02 * way  # the support carries the nodes along: no slip
+        step = problem.solve()
+        x, r = reactions(contact)
+        expected = 1.0 / np.hypot(np.cos(angle) / law["mu"][0], np.sin(angle) / law["mu"][1])
+        touching = r[:, 2] > 0.0
+        assert step.counts.stick == 0 and touching.sum() > 10
+        assert np.abs(r[:, 0] + way * expected * r[:, 2]).max() < 1e-8 * r[:, 2].max()
+        assert np.abs(r[:, 1]).max() < 1e-12 * r[:, 2].max()
+        assert max(step.error, step.slip_error) < 1e-10
+        done = COMM.allreduce((contact.reaction[:, :2] * contact.slip_increment).sum(), op=MPI.SUM)
+        assert done < 0.0
+
+
+def test_another_law_is_cut_too():
+    """Laws exchanged between steps, fields of friction, nodes without any: the cut is that of the law at hand."""
+    problem, contact, head, _ = block(
+        dc.Friction((0.4, 0.1)), (1.0, 1.0, 0.0), "condensed", held="foot"
+    )
+    drive(head, 0.5, 0.0, -0.01)
+    for law, at in (
+        (dc.Friction((0.4, 0.1)), lambda x: 0.0 * x[:, 0] + 1.0 / np.hypot(1 / 0.4, 1 / 0.1)),
+        (dc.Friction((0.2, 0.3)), lambda x: 0.0 * x[:, 0] + 1.0 / np.hypot(1 / 0.2, 1 / 0.3)),
+        (dc.Friction(lambda x: 0.1 + 0.2 * x[1]), lambda x: np.sqrt(0.5) * (0.1 + 0.2 * x[:, 1])),
+        (dc.Friction(lambda x: 0.4 * (x[1] > 0.4)), lambda x: np.sqrt(0.5) * 0.4 * (x[:, 1] > 0.4)),
+        (dc.Friction(0.0), lambda x: 0.0 * x[:, 0]),
+    ):
+        problem.reset()
+        contact.friction = law
+        problem.solve()
+        x, r = reactions(contact)
+        expected = at(x) * np.sqrt(2.0)
+        assert np.abs(r[:, 0] + expected * r[:, 2]).max() < 1e-7 * r[:, 2].max()
+
+
+def test_a_support_oblique_to_the_plane_is_refused():
+    """Held along a direction that is neither in the plane nor its normal, a node can neither slide nor lift off freely."""
+    scene = scenes.block()
+    plane = dc.RigidPlane((0, 0, 0), (0.3, 0, 1), axis=(0, 1, 0))
+    contact = dc.Contact(scene.V, scene.facets, plane, dc.Friction(0.3))
+    side = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[0], -0.5))
+    Vx = scene.V.sub(0)
+    bc = fem.dirichletbc(
+        fem.Constant(scene.mesh, 0.0), fem.locate_dofs_topological(Vx, 2, side), Vx
+    )
+    with pytest.raises(ValueError, match="oblique to the plane"):
+        dc.ContactProblem(scene.F, scene.u, [contact], bcs=[*scene.bcs, bc])
