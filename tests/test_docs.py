@@ -5,7 +5,6 @@
 import doctest
 import inspect
 import re
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +14,6 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from docs.extension.gallery import cells
-from docs.extension.headers import INCLUDE, declarations
 from docs.extension.links import dead_links
 from docs.extension.runs import APART, blocks, run
 
@@ -68,48 +66,6 @@ def test_a_script_that_fails_is_seen(tmp_path):
     assert run(["x = 1\n", "print(x)\n"], tmp_path) == ["", "1"]
 
 
-SHELL = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-
-
-def test_commands_of_pages_are_those_of_ci_or_run(tmp_path):
-    """Every line of a block for the shell is a line of .ci/run, or passes here, with its files in an empty folder."""
-    checked, seen = {line.strip() for line in (ROOT / ".ci/run").read_text().splitlines()}, 0
-    for text in (*TEXTS.values(), (ROOT / "README.md").read_text()):
-        for block in SHELL.findall(text):
-            lines = [line.split("  #")[0].strip() for line in block.splitlines()]
-            seen += len(lines)
-            if set(lines) <= checked:
-                continue
-            script = block.replace("build/", f"{tmp_path}/build/").replace("~/", f"{tmp_path}/")
-            done = subprocess.run(
-                ["sh", "-e"], input=script, cwd=ROOT, capture_output=True, text=True
-            )
-            assert done.returncode == 0, f"{block}\n{done.stderr}"
-    assert seen >= 4
-
-
-def test_reference_of_the_kernel_has_every_header():
-    """All headers but the parts of the condensed solver; each has declarations with comments."""
-    listed = re.findall(r"^```\{header\} (\S+)$", TEXTS["cpp_reference.md"], re.MULTILINE)
-    entry = {"condensed_operator.h", "condensed_solution.h"}
-    parts = {file.name for file in INCLUDE.glob("condensed*.h")} - entry
-    assert set(listed) == {file.name for file in INCLUDE.glob("*.h")} - parts
-    names = " ".join(
-        one.signature for header in listed for one in declarations(header) if one.comment
-    )
-    for name in (
-        "bipotential_map",
-        "load_function",
-        "project",
-        "return_map",
-        "slip_defect",
-        "for_each_node",
-        "Operator",
-        "solve",
-    ):
-        assert re.search(rf"\b{name}\b", names), name
-
-
 def test_reference_has_every_public_name():
     """Names of ``dolfinx_contact`` and of the reference are the same."""
     listed = re.findall(
@@ -147,7 +103,9 @@ def test_code_is_marked_by_its_language(page):
     fences = re.findall(r"^ *(`{3,})(.*)$", TEXTS[page], re.MULTILINE)
     assert len(fences) % 2 == 0
     opening = [says for _, says in fences[::2]]
-    assert all(re.match(r"(python|sh|text|\{[\w:-]+\}.*)$", says) for says in opening), opening
+    assert all(re.match(r"(python|sh|cmake|text|\{[\w:-]+\}.*)$", says) for says in opening), (
+        opening
+    )
     assert "{code-block} python" not in opening
 
 
