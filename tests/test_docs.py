@@ -4,16 +4,22 @@
 
 import doctest
 import inspect
+import os
 import re
+import shlex
+import shutil
+import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from test_packaging import clean_environment
 
 import dolfinx_contact as dc
 from docs.extension.gallery import cells
+from docs.extension.headers import HEADERS, declarations, without_bodies
 from docs.extension.links import dead_links
 from docs.extension.runs import APART, blocks, run
 
@@ -103,10 +109,126 @@ def test_code_is_marked_by_its_language(page):
     fences = re.findall(r"^ *(`{3,})(.*)$", TEXTS[page], re.MULTILINE)
     assert len(fences) % 2 == 0
     opening = [says for _, says in fences[::2]]
-    assert all(re.match(r"(python|sh|cmake|text|\{[\w:-]+\}.*)$", says) for says in opening), (
-        opening
+    assert all(re.match(r"(python|sh|\{[\w:-]+\}.*)$", says) for says in opening), opening
+    assert not any(says.startswith("{code-block}") for says in opening)
+    indented = re.findall(
+        r"^\n {4}(\S+)", TEXTS[page], re.MULTILINE
+    )  # formulas, not commands and scripts
+    assert not {"make", "python", "pip", "cmake", "mpirun", "import", "for", "from"} & set(indented)
+
+
+def commands(text: str) -> list[str]:
+    """Commands of the ``sh`` blocks of a page, without comments."""
+    found = re.findall(r"^```sh\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    lines = "".join(found).replace("\\\n", " ").splitlines()
+    return [line for each in lines if (line := re.sub(r"\s+#.*", "", each).strip())]
+
+
+PAGES = TEXTS | {name: (ROOT / name).read_text() for name in ("README.md", "CONTRIBUTING.md")}
+PAGES |= {file.name: file.read_text() for file in (ROOT / "notes").glob("*.md")}
+COMMANDS = sorted({line for text in PAGES.values() for line in commands(text)})
+
+
+def command_that_make_runs(line: str) -> str:
+    """The last command of a line with make, which has to have that target."""
+    said = subprocess.run(["make", "--dry-run", "--assume-old=.venv/ready", *shlex.split(line)[1:]],
+                          cwd=ROOT, env=clean_environment(), capture_output=True, text=True)  # fmt: skip
+    assert said.returncode == 0, said.stderr
+    return said.stdout.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_command_of_page_is_one_that_is_run(line):
+    """A command of a page is run by CI or, if it is a program of ours, has options that the program knows."""
+    if line.startswith("cmake "):
+        assert line in commands(TEXTS["howto/cpp.md"])  # run by the test below
+    elif line == "pip install .":
+        assert re.search(r'/pip" wheel .* \. ', (ROOT / "tools" / "check-wheel").read_text())
+        assert "tools/check-wheel" in (ROOT / ".ci" / "run").read_text()
+    elif line in ("make punch", "make test"):  # of the README: in CI, and in minimal systems
+        assert "make punch && make test" in (ROOT / "tools" / "prove-minimal-root").read_text()
+        assert "make test\n" in (ROOT / ".ci" / "run").read_text() and command_that_make_runs(line)
+    else:
+        words = shlex.split(command_that_make_runs(line) if line.startswith("make ") else line)
+        at = words.index("-m") + 1
+        said = subprocess.run([sys.executable, "-m", *words[at:], "--help"], cwd=ROOT,
+                              env=clean_environment(), capture_output=True, text=True)  # fmt: skip
+        assert said.returncode == 0, said.stderr
+        known = set(re.findall(r"--[\w-]+", said.stdout))
+        assert {word for word in words[at:] if word.startswith("--")} <= known
+
+
+@pytest.mark.slow
+def test_kernel_is_installed_as_the_page_says(tmp_path):
+    """The commands of the page on C++ configure and install the kernel, and a project finds it as the page says."""
+    clone, home = tmp_path / "clone", tmp_path / "home"
+    clone.mkdir()
+    for name in ("CMakeLists.txt", "pyproject.toml", "cpp"):
+        (clone / name).symlink_to(ROOT / name)
+    lines = commands(TEXTS["howto/cpp.md"])
+    assert len(lines) == 2
+    (project,) = re.findall(r"configured with `(cmake [^`]*)`", TEXTS["howto/cpp.md"])
+    path = f"{Path(sys.prefix) / 'bin'}:{os.environ['PATH']}"
+    shutil.copytree(ROOT / "cpp" / "example", tmp_path / "project")
+    for line, folder in [*((line, clone) for line in lines), (project, tmp_path / "project")]:
+        done = subprocess.run(["sh", "-c", line], cwd=folder, capture_output=True, text=True,
+                              env=clean_environment() | {"HOME": str(home), "PATH": path})  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert {file.name for file in home.rglob("*.h")} == {file.name for file in HEADERS.glob("*.h")}
+
+
+def test_cpp_reference_has_every_public_header():
+    """Each header is on the page, but for parts of the condensed solver, which the page names as such."""
+    listed = re.findall(r"^```\{cpp-header\} (\S+)$", TEXTS["cpp.md"], re.MULTILINE)
+    parts = {file.name for file in HEADERS.glob("condensed*.h")}
+    parts -= {"condensed_operator.h", "condensed_solution.h"}
+    assert sorted([*listed, *parts]) == sorted(file.name for file in HEADERS.glob("*.h"))
+
+
+# what a program calls; the other functions are parts of these
+CALLED = """normalised_q make_law project load_function against_slip slip_defect predictor bipotential_map scaled_map
+    return_map bipotential_jacobian scaled_jacobian return_jacobian bipotential_gap for_each_node Operator Options Solution
+    solve Inputs Outputs Tangent Local Branch NonAssociated BipotentialMap""".split()
+
+
+def test_cpp_reference_has_every_declaration():
+    """What begins in the first column of a public header is on the page, with words; what is called has an example."""
+    listed = re.findall(r"^```\{cpp-header\} (\S+)$", TEXTS["cpp.md"], re.MULTILINE)
+    shown: set[str] = set()
+    for name in listed:
+        text = (HEADERS / name).read_text()
+        says, found = declarations(text)
+        assert says and all(one.says for one in found), name
+        names = {each for one in found for each in one.names}
+        text = re.sub(r"^namespace detail.*?^\} // namespace detail", "", text, flags=re.S | re.M)
+        text = re.sub(r"^template <[^<>]*>\s+", "", text, flags=re.MULTILINE)
+        types = re.findall(r"^(?:struct|class|enum class|using) (\w+)", text, re.MULTILINE)
+        functions = re.findall(
+            r"^(?!using|//|inline constexpr)\w[^\n(=;{]*?\b(\w+)\(", text, re.MULTILINE
+        )
+        assert names >= {*types, *functions}, {*types, *functions} - names
+        shown |= names
+    programs = [
+        ROOT / "cpp" / "example" / "functions.cpp",
+        ROOT / "cpp" / "tests" / "test_condensed.cpp",
+    ]
+    example = (
+        programs[0].read_text()
+        + programs[1].read_text().split("docs/cpp.md begins")[1].split("docs/cpp.md ends")[0]
     )
-    assert "{code-block} python" not in opening
+    assert set(CALLED) <= shown & set(re.findall(r"\w+", example))
+
+
+def test_declarations_are_those_of_a_header():
+    """Bodies and private members are left out, comments kept; what stands in detail namespaces is not shown."""
+    says, found = declarations(
+        "/// @file a.h\n/// Says this.\n#pragma once\nnamespace a {\nnamespace detail {\nint hidden();\n"
+        "} // namespace detail\n/// Adds.\ntemplate <int N>\nint add(int a) {\n    return a + N;\n}\n} // namespace a\n"
+    )
+    assert says == ["Says this."]
+    assert found == [(["add"], "template <int N>\nint add(int a);", ["Adds."])]
+    text = "class A {\n  public:\n    A(int a)\n        : a_(a) {\n        f();\n    }\n    int b = {};\n\n  private:\n    int a_;\n};"
+    assert without_bodies(text) == "class A {\n  public:\n    A(int a);\n    int b = {};\n\n};"
 
 
 def test_reference_has_what_scripts_read_of_a_contact():

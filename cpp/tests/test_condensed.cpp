@@ -132,6 +132,23 @@ TEST(Condensed, sliding_block) {
     }
 }
 
+// The same from the functions alone, as docs/cpp.md shows it.
+TEST(Condensed, example) {
+    // docs/cpp.md begins
+    const Eigen::Vector3d compliance(1 / 3.0, 1 / 3.0, 1 / 2.0); // mm/N: along the plane, normal
+    const MatrixXd W = compliance.asDiagonal();
+    const Eigen::Vector3d q(0.06, 0.08, -0.5); // mm: slip and gap without reactions
+    const auto law = make_law<2>({{0.2, 0.2}}, {{1.0, 1.0}}, true); // mu, p, the same everywhere
+    Options options;
+    options.tol = 1e-10;
+    const Operator op(W, 3); // three rows for each contact
+    const Solution found = condensed::solve<2>(op, law, q, {}, options);
+    // docs/cpp.md ends
+    ASSERT_TRUE(found.converged);
+    EXPECT_LE((found.reaction - Eigen::Vector3d(-0.12, -0.16, 1.0)).norm(), 1e-9);
+    EXPECT_EQ(found.status[0], Branch::slip);
+}
+
 // All laws, regular and rank-deficient W, in three and two dimensions.
 TEST(Condensed, isotropic) { solve_random<2>({0.3, 0.3}, {1.0, 1.0}, false); }
 TEST(Condensed, associated) { solve_random<2>({0.3, 0.1}, {0.3, 0.1}, false); }
