@@ -11,7 +11,8 @@ version = release = installed("dolfinx_contact")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 extensions += [
-    f"docs.extension.{name}" for name in ("runs", "gallery", "docstrings", "headers", "formulas", "links")
+    f"docs.extension.{name}"
+    for name in ("runs", "gallery", "docstrings", "headers", "formulas", "links")
 ]
 
 root_doc = "docs/index"

@@ -70,5 +70,8 @@ def _cell(value) -> str:
         return "<td>–</td>"
     if isinstance(value, (int, float)):
         return f"<td>{value if isinstance(value, int) else format(value, '.4g')}</td>"
+    if isinstance(value, (list, tuple)) and all(isinstance(each, (int, float)) for each in value):
+        size = max(map(abs, value), default=0)  # rounding beside the others is zero
+        value = ", ".join(format(x if abs(x) > 1e-12 * size else 0.0, ".4g") for x in value)
     text = str(value).replace("_", " ")
     return f'<td class="text{" long" if len(text) > LONG else ""}">{html.escape(text)}</td>'

@@ -22,6 +22,7 @@ from mpi4py import MPI
 pytest.importorskip("gmsh")
 pytest.importorskip("matplotlib")
 pytest.importorskip("tqdm")
+from studies import page
 from studies.punch import Parameters, Punch, programme
 from studies.punch import __main__ as study_punch
 from studies.punch.contact_map import ContactMap
@@ -142,6 +143,11 @@ def test_every_statement_is_decided_by_the_data(study):
         held, of = (sum(int(part[k]) for part in parts) for k in (0, 1))
         expected = "holds in all" if held == of else "depends" if held else "holds in none"
         assert verdict["verdict"] == expected
+
+
+def test_lists_in_tables_are_short():
+    """A list of numbers is shown to four digits, what is rounding beside its largest entry as zero."""
+    assert ">5.193, -1, 0<" in page.table([{"point": [5.192815424335428, -1, 1.7e-16]}])
 
 
 @pytest.mark.skipif(not ALONE, reason="one rank says it all")

@@ -1,4 +1,4 @@
-// Every function of one node, and a loop over nodes: what docs/cpp.md shows.
+// Functions of one node, and a loop over nodes: what docs/cpp.md shows.
 #include <cmath>
 #include <dolfinx_contact/batch.h>
 #include <iostream>
