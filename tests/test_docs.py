@@ -137,7 +137,13 @@ def command_that_make_runs(line: str) -> str:
     return said.stdout.strip().splitlines()[-1]
 
 
-@pytest.mark.parametrize("line", COMMANDS)
+PROGRAMS = [line for line in COMMANDS if "-m" in line or "study" in line]  # these are started
+
+
+@pytest.mark.parametrize(
+    "line",
+    [pytest.param(line, marks=pytest.mark.slow if line in PROGRAMS else []) for line in COMMANDS],
+)
 def test_command_of_page_is_one_that_is_run(line):
     """A command of a page is run by CI or, if it is a program of ours, has options that the program knows."""
     if line.startswith("cmake "):
