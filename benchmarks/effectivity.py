@@ -21,20 +21,8 @@ from helpers import hooke, rounded_body, say
 
 def ball_on_flat(scene, order: int) -> dc.ContactProblem:
     """The sphere of demo_ball_on_flat on a quarter of the block, pressed."""
-    domain, top, left, front, far = scene
-    V = functionspace(domain, ("Lagrange", order, (3,)))
-    u, v = fem.Function(V), ufl.TestFunction(V)
-    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), flat.E, flat.NU), ufl.grad(v)) * ufl.dx
-    held, zero = fem.Function(V), fem.Constant(domain, 0.0)
-    held.interpolate(flat.far_field)
-    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, far))]
-    for k, facets in enumerate((left, front)):
-        dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
-        bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
-    surface = dc.RigidSphere(centre=(0, 0, flat.R), radius=flat.R, axis=(1, 0, 0))
-    contact = dc.Contact(V, top, surface, dc.Friction(mu=0.0))
-    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
-    surface.displacement = (0, 0, -flat.DELTA)
+    problem, contact = flat.ball_on_flat(*scene, order=order)
+    contact.plane.displacement = (0, 0, -flat.DELTA)
     problem.solve()
     return problem
 
@@ -70,7 +58,7 @@ def compare(name: str, cells: int, pair, true: dict) -> None:
 
 if __name__ == "__main__":
     for cells in (8, 12):
-        scene = flat.quarter_block(cells)
+        scene = flat.scene(cells)
         pair = [ball_on_flat(scene, order) for order in (1, 2)]
         true = dict(normal_force=flat.FORCE / 4, peak_pressure=flat.P0)
         compare("ball on flat, 3-D", cells, pair, true)

@@ -31,18 +31,23 @@
 #
 # ## Code
 #
-# A quarter of the block, its cells fine at the contact. On the two planes of symmetry the normal displacement is zero:
+# A quarter of the block, its cells fine at the contact (`quarter_block` in `helpers.py`). On the two planes of symmetry the normal displacement is zero:
 # supports that fix a tangential direction of contact nodes, along which `axis` and what is across it lie.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.compat import functionspace
 
 # isort: split
 import numpy as np
-import ufl
-from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import (
+    elastic,
+    everywhere,
+    picture,
+    point_force_field,
+    quarter_block,
+    quarter_supports,
+    say,
+)
 
 E, NU = 210e3, 0.3
 E_STAR = E / (1 - NU**2)
@@ -53,51 +58,24 @@ FORCE = 4 / 3 * E_STAR * np.sqrt(R) * DELTA**1.5
 P0 = 2 * E_STAR * A / (np.pi * R)
 
 
-def quarter_block(cells: int):
-    """The mesh; facets of the top within 1.5 A; facets at x = 0, y = 0, and far away."""
-    domain = mesh.create_unit_cube(COMM, cells, cells, cells, mesh.CellType.hexahedron)
-    x, n = domain.geometry.x, 2.2  # widths of cells grow like cosh
-
-    def graded(s):
-        return SIZE * np.sinh(n * s) / np.sinh(n)
-
-    x[:, :2], x[:, 2] = graded(x[:, :2]), -graded(1 - x[:, 2])
-
-    def near(y):
-        return np.isclose(y[2], 0.0) & (np.maximum(y[0], y[1]) < 1.5 * A)
-
-    def far(y):
-        return np.isclose(y[0], SIZE) | np.isclose(y[1], SIZE) | np.isclose(y[2], -SIZE)
-
-    places = (near, lambda y: np.isclose(y[0], 0.0), lambda y: np.isclose(y[1], 0.0), far)
-    return domain, *(mesh.locate_entities_boundary(domain, 2, where) for where in places)
+def scene(cells: int):
+    """The mesh of a quarter and its facets, see ``quarter_block``."""
+    return quarter_block(cells, SIZE, (2.2, 2.2, 2.2), (1.5 * A, 1.5 * A))
 
 
-def far_field(x):
-    """Displacement of a half space z < 0 under a point force down at the origin, ``shape=(3, points)``."""
-    r, z = np.hypot(x[0], x[1]), -x[2]
-    rho = np.hypot(r, z)
-    rho[rho == 0] = 1.0  # inside the contact, where the value is not used
-    b = FORCE * (1 + NU) / (2 * np.pi * E * rho)
-    outwards = b * (z / rho**2 - (1 - 2 * NU) / (rho + z))
-    return np.array([outwards * x[0], outwards * x[1], -b * (2 * (1 - NU) + z**2 / rho**2)])
+def ball_on_flat(domain, top, *boundary, order: int = 1):
+    """The problem and its contact, for displacements of an order."""
+    V, u, F = elastic(domain, E, NU, order)
+    bcs = quarter_supports(V, *boundary, lambda x: point_force_field(x, FORCE, E, NU))
+    ball = dc.RigidSphere(centre=(0, 0, R), radius=R, axis=(1, 0, 0))
+    contact = dc.Contact(V, top, ball, dc.Friction(mu=0.0))
+    return dc.ContactProblem(F, u, [contact], bcs=bcs), contact
 
 
 def press(cells: int):
     """Press the ball on the block, then leave it to the weight F; the contact after both."""
-    domain, top, left, front, far = quarter_block(cells)
-    V = functionspace(domain, ("Lagrange", 1, (3,)))
-    u, v = fem.Function(V), ufl.TestFunction(V)
-    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, NU), ufl.grad(v)) * ufl.dx
-    held, zero = fem.Function(V), fem.Constant(domain, 0.0)
-    held.interpolate(far_field)
-    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, far))]
-    for k, facets in enumerate((left, front)):
-        dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
-        bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
-    ball = dc.RigidSphere(centre=(0, 0, R), radius=R, axis=(1, 0, 0))
-    contact = dc.Contact(V, top, ball, dc.Friction(mu=0.0))
-    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
+    problem, contact = ball_on_flat(*scene(cells))
+    ball = contact.plane
     ball.displacement = (0, 0, -DELTA)
     problem.solve()
     yield contact

@@ -40,13 +40,20 @@
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.compat import functionspace
 
 # isort: split
 import numpy as np
-import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import (
+    COMM,
+    elastic,
+    everywhere,
+    picture,
+    point_force_field,
+    quarter_block,
+    quarter_supports,
+    say,
+)
 from scipy.special import ellipe, ellipk
 
 E, NU = 210e3, 0.3
@@ -71,56 +78,11 @@ def surface(turned: float = 0.0) -> dc.RigidSurface:
     )
 
 
-def quarter_block(cells: int):
-    """The mesh; facets of the top near the contact; facets at x = 0, y = 0, and far away."""
-    domain = mesh.create_unit_cube(COMM, cells, cells, cells, mesh.CellType.hexahedron)
-    x, top = domain.geometry.x, 1.3 * np.array([A, B])
-
-    def graded(s, n):  # widths of cells grow like cosh
-        return SIZE * np.sinh(n * s) / np.sinh(n)
-
-    for k, n in ((0, 2.6), (1, 3.2)):
-        x[:, k] = graded(x[:, k], n)
-    x[:, 2] = -graded(1 - x[:, 2], 3.0)
-
-    def near(y):
-        return np.isclose(y[2], 0.0) & (y[0] < top[0]) & (y[1] < top[1])
-
-    def far(y):
-        return np.isclose(y[0], SIZE) | np.isclose(y[1], SIZE) | np.isclose(y[2], -SIZE)
-
-    places = (near, lambda y: np.isclose(y[0], 0.0), lambda y: np.isclose(y[1], 0.0), far)
-    return domain, *(mesh.locate_entities_boundary(domain, 2, where) for where in places)
-
-
-def far_field(x):
-    """Displacement of a half space z < 0 under a point force down at the origin, ``shape=(3, points)``."""
-    r, z = np.hypot(x[0], x[1]), -x[2]
-    rho = np.hypot(r, z)
-    rho[rho == 0] = 1.0  # inside the contact, where the value is not used
-    b = FORCE * (1 + NU) / (2 * np.pi * E * rho)
-    outwards = b * (z / rho**2 - (1 - 2 * NU) / (rho + z))
-    return np.array([outwards * x[0], outwards * x[1], -b * (2 * (1 - NU) + z**2 / rho**2)])
-
-
-def elastic(domain):
-    """Space, displacement and weak form."""
-    V = functionspace(domain, ("Lagrange", 1, (3,)))
-    u, v = fem.Function(V), ufl.TestFunction(V)
-    F = ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, NU), ufl.grad(v)) * ufl.dx
-    return V, u, F
-
-
 def press(cells: int):
     """Let a quarter of the weight press the surface on a quarter of the block; the contact."""
-    domain, top, left, front, far = quarter_block(cells)
-    V, u, F = elastic(domain)
-    held, zero = fem.Function(V), fem.Constant(domain, 0.0)
-    held.interpolate(far_field)
-    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, far))]
-    for k, facets in enumerate((left, front)):
-        dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
-        bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
+    domain, top, *boundary = quarter_block(cells, SIZE, (2.6, 3.2, 3.0), (1.3 * A, 1.3 * B))
+    V, u, F = elastic(domain, E, NU)
+    bcs = quarter_supports(V, *boundary, lambda x: point_force_field(x, FORCE, E, NU))
     body = surface()
     contact = dc.Contact(V, top, body, dc.Friction(mu=0.0))
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
@@ -138,7 +100,7 @@ def drag(angle: float, grooves: float):
         mesh.locate_entities_boundary(domain, 2, lambda x, z=z: np.isclose(x[2], z))
         for z in (0.0, -half)
     )
-    V, u, F = elastic(domain)
+    V, u, F = elastic(domain, E, NU)
     bc = fem.dirichletbc(np.zeros(3), fem.locate_dofs_topological(V, 2, foot), V)
     body = surface(grooves)
     contact = dc.Contact(V, top, body, dc.Friction(mu=MU, p=P))

@@ -1,14 +1,14 @@
-"""What the demos share: where they print and draw, Hooke's law, a body with a rounded face."""
+"""What the demos share: where they print and draw, Hooke's law, a body with a rounded face, a quarter of a block."""
 
 import sys
 
 import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
-from dolfinx_contact.compat import second_order
+from dolfinx_contact.compat import functionspace, second_order
 
 # isort: split
 import numpy as np
 import ufl
-from dolfinx import mesh
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
 COMM = MPI.COMM_WORLD
@@ -95,3 +95,58 @@ def along_face(contact, *arrays) -> list[np.ndarray]:
     x, *arrays = everywhere(contact.x[:, 0], *arrays)
     order = np.argsort(x, kind="stable")
     return [array[order] for array in (x, *arrays)]
+
+
+def quarter_block(cells: int, size: float, grading, near):
+    """A quarter of a block below z = 0, its hexahedra fine at the origin: widths along axis k grow like ``cosh(n_k s)``.
+
+    Args:
+        cells: Along each edge.
+        size: Of the edges, length units.
+        grading: ``n`` of each axis.
+        near: Half lengths along x and y of the rectangle on the top that may touch.
+
+    Returns:
+        The mesh; the facets that may touch; those at x = 0, at y = 0, and far away.
+    """
+    domain = mesh.create_unit_cube(COMM, cells, cells, cells, mesh.CellType.hexahedron)
+    x, n = domain.geometry.x, np.array(grading)
+    x[:, 2] = 1 - x[:, 2]
+    x[:] = size * np.sinh(n * x) / np.sinh(n) * (1, 1, -1)
+
+    def touching(y):
+        return np.isclose(y[2], 0.0) & (y[0] < near[0]) & (y[1] < near[1])
+
+    def far(y):
+        return np.isclose(y[0], size) | np.isclose(y[1], size) | np.isclose(y[2], -size)
+
+    places = (touching, lambda y: np.isclose(y[0], 0.0), lambda y: np.isclose(y[1], 0.0), far)
+    return domain, *(mesh.locate_entities_boundary(domain, 2, where) for where in places)
+
+
+def point_force_field(x, force: float, E: float, nu: float):
+    """Displacement of a half space z < 0 under a point force down at the origin, ``shape=(3, points)``."""
+    r, z = np.hypot(x[0], x[1]), -x[2]
+    rho = np.hypot(r, z)
+    rho[rho == 0] = 1.0  # inside the contact, where the value is not used
+    b = force * (1 + nu) / (2 * np.pi * E * rho)
+    outwards = b * (z / rho**2 - (1 - 2 * nu) / (rho + z))
+    return np.array([outwards * x[0], outwards * x[1], -b * (2 * (1 - nu) + z**2 / rho**2)])
+
+
+def elastic(domain, E: float, nu: float, order: int = 1):
+    """Space, displacement and weak form of a body in three dimensions."""
+    V = functionspace(domain, ("Lagrange", order, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    return V, u, ufl.inner(hooke(ufl.sym(ufl.grad(u)), E, nu), ufl.grad(v)) * ufl.dx
+
+
+def quarter_supports(V, left, front, far, field) -> list:
+    """Symmetry at x = 0 and y = 0; far away the displacement ``field``, a function of the coordinates."""
+    held, zero = fem.Function(V), fem.Constant(V.mesh, 0.0)
+    held.interpolate(field)
+    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, far))]
+    for k, facets in enumerate((left, front)):
+        dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
+        bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
+    return bcs
