@@ -57,7 +57,7 @@ class Statics:
         parts, coefficients = [np.zeros((0, self._dim, m))], [np.zeros((0, self._dim - 1))]
         for contact in contacts:
             points = contact.points
-            motion = (points.B @ self._modes).reshape(points.count, self._dim, m)
+            motion = points.motion(self._modes)
             points.without_held(motion[:, :-1])
             motion[points.closed] = 0.0
             turns = principal_axes(contact.friction, points.count, self._dim)
@@ -76,14 +76,12 @@ class Statics:
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
         escape = self._escape()
         self.start, self._last, self.placed = last, last, False
-        self.said = (
-            ""
-            if escape is None
-            else (
+        self.said = ""
+        if escape is not None:
+            self.said = (
                 f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
                 "hold: no static state exists"
             )
-        )
 
     def _escape(self) -> np.ndarray | None:
         """A motion along which the loads push the body and no reaction can hold it, ``shape=(m,)``; None if there is none.
@@ -171,12 +169,13 @@ class Statics:
         """
         changed = [np.zeros((0, self._felt.size))]
         for contact, of in zip(self._contacts, step.stiffness):
-            map, points = ReturnMap(of.normal, of.normal), contact.points
+            map = ReturnMap(of.normal, of.normal)
             state = contact.reaction, contact.gap, contact.slip_increment
             by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
             by_motion[contact.reaction[:, -1] <= 0.0] = 0.0
-            motion = (points.B @ self._modes).reshape(points.count, self._dim, self._felt.size)
-            changed.append((by_motion @ motion).reshape(-1, self._felt.size))
+            changed.append(
+                (by_motion @ contact.points.motion(self._modes)).reshape(-1, self._felt.size)
+            )
         changed = np.concatenate(changed) / np.sqrt(self._felt)
         if len(changed) > self._felt.size:  # and not empty, as where a rank has no contact nodes
             changed = np.linalg.qr(changed, mode="r")

@@ -55,10 +55,8 @@ def held_by_contact(body, contacts, step, last, undetermined: str, solve) -> Sol
     found = None
     if not statics.loads.any():
         found = _floating(body, contacts, step, last)
-    if (
-        not body.largest(np.concatenate([contact.last.reaction[:, -1] for contact in contacts]))
-        > 0.0
-    ):
+    pressed = np.concatenate([contact.last.reaction[:, -1] for contact in contacts])
+    if not body.largest(pressed) > 0.0:
         statics.place()
     found = found or solve(step)
     if not step.errors.within(step.tol):

@@ -13,11 +13,8 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.collective import raised_together
-from dolfinx_contact.contact.plane_balance import PlaneBalance
+from dolfinx_contact.contact.plane_balance import REGULAR, PlaneBalance
 from dolfinx_contact.contact.sliding import slides_away
-
-# Part of the nodes' stiffness that is added to the tangent of planes: where all nodes slip it has none of its own.
-REGULAR = 1e-10
 
 # Part of a motion that has to be along normals for these to resist it.
 RESISTING = 1e-8

@@ -53,8 +53,8 @@ class ContactPoints:
             tangential[points] = np.einsum("ni,n...->ni...", along, part)
 
     def motion(self, u: np.ndarray) -> np.ndarray:
-        """Local components of the points' motion, ``shape=(n, gdim)``, from owned degrees of freedom."""
-        return (self.B @ u).reshape(self.count, self.dim)
+        """Local components of the points' motion, ``shape=(n, gdim, ...)``, for displacements ``(owned dofs, ...)``."""
+        return (self.B @ u).reshape(self.count, self.dim, *u.shape[1:])
 
     def magnitudes(self, u: np.ndarray) -> np.ndarray:
         """Size of the terms that ``motion`` adds up, ``shape=(n, gdim)``."""

@@ -22,7 +22,7 @@ TURNING = 1e3
 # Part of a motion that carries a node along its surface; of less the node says nothing about where all slip.
 CARRIED = 0.5
 
-# Of the nodes' stiffness, added where too few touch to hold the plane.
+# Part of the nodes' stiffness that is added to tangents: where all nodes slip, or too few touch, these have none.
 REGULAR = 1e-10
 
 

@@ -35,11 +35,8 @@ class Border:
     """
 
     def __init__(self, body, contacts, A, stiffened, springs):
-        self._body, self._loose, planes = (
-            body,
-            body.loose is not None,
-            driven_planes(body, contacts),
-        )
+        self._body, self._loose = body, body.loose is not None
+        planes = driven_planes(body, contacts)
         columns, s = [], np.zeros((0, 0))
         if planes is not None:
             columns.append(planes.columns(springs))

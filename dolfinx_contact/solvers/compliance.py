@@ -106,13 +106,18 @@ def _available() -> float:
         return np.inf
 
 
+def _available_first(comm) -> float:
+    """What rank 0 has free, which holds W, on all ranks.  Collective."""
+    return comm.bcast(_available() if comm.rank == 0 else None)
+
+
 def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
     """Whether W would fit into half of the memory that rank 0 has free."""
-    return 2 * bytes_needed(nodes, dim, unknowns) <= comm.bcast(_available(), root=0)
+    return 2 * bytes_needed(nodes, dim, unknowns) <= _available_first(comm)
 
 
 def check_memory(comm, needed: int) -> None:
-    available = comm.bcast(_available(), root=0)
+    available = _available_first(comm)
     if needed > available:
         raise MemoryError(
             f"the condensed operator needs about {needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are "

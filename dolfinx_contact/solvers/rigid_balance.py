@@ -138,8 +138,7 @@ class RigidBalance:
         step.know(x, forces)
         derivatives = step.derivatives(x, maps)
         for k, (contact, both) in enumerate(zip(self._contacts, derivatives)):
-            shape = contact.points.count, contact.points.dim, n
-            Z, KZ = ((contact.points.B @ part).reshape(shape) for part in (self.modes, self.forces))
+            Z, KZ = (contact.points.motion(part) for part in (self.modes, self.forces))
             change = both[0] @ KZ + both[1] @ Z
             slope -= np.tensordot(Z, change, ((0, 1), (0, 1)))
             if planes is not None:

@@ -22,27 +22,17 @@ def measure(case: str, divisions: int, layers: int, tol: float = 1e-8) -> dict:
     pair, seconds = [], []
     for order in (1, 2):
         start = process_time()
-        pair.append(
-            Punch(
-                parameters,
-                solver=dc.CondensedNewton(),
-                petsc_options=FACTORISED,
-                order=order,
-                **mesh,
-            )
-        )
+        options = dict(mesh, petsc_options=FACTORISED, order=order)
+        pair.append(Punch(parameters, solver=dc.CondensedNewton(), **options))
         seconds.append(process_time() - start)
-    found = {}
+    loading, found = parameters.loading, {}
+    ends = {loading: "loaded", loading + parameters.unloading: "unloaded"}
     for number, displacement in enumerate(programme(parameters), start=1):
         for which, punch in enumerate(pair):
             start = process_time()
             punch.press(displacement)
             seconds[which] += process_time() - start
-        name = {
-            parameters.loading: "loaded",
-            parameters.loading + parameters.unloading: "unloaded",
-        }.get(number)
-        if name:
+        if name := ends.get(number):
             of = dc.estimate(*(punch.problem for punch in pair))
             found[name] = {key: [q.value, q.error] for key, q in of.quantities.items()}
             found[name]["reference"] = {
