@@ -80,7 +80,7 @@ def surface(turned: float = 0.0) -> dc.RigidSurface:
 
 def press(cells: int):
     """Let a quarter of the weight press the surface on a quarter of the block; the contact."""
-    domain, top, *boundary = quarter_block(cells, SIZE, (2.6, 3.2, 3.0), (1.3 * A, 1.3 * B))
+    domain, top, *boundary = quarter_block(cells, SIZE, (3.0, 3.6, 3.2), (1.3 * A, 1.3 * B))
     V, u, F = elastic(domain, E, NU)
     bcs = quarter_supports(V, *boundary, lambda x: point_force_field(x, FORCE, E, NU))
     body = surface()
@@ -131,7 +131,7 @@ def guided(angle: float, grooves: float) -> np.ndarray:
     return way / np.linalg.norm(way / MU) @ turn
 
 
-def main(cells: int = 24):
+def main(cells: int = 16):
     """Solve, print and assert what is claimed above; places and pressure of the nodes."""
     contact = press(cells)
     x, normal, pressure = everywhere(contact.x, contact.reaction[:, 2], contact.pressure)
