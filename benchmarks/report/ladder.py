@@ -111,8 +111,6 @@ def evaluate(results: dict) -> dict:
             counts={key: value / steps for key, value in last["counts"].items()},
         )  # fmt: skip
         if other:
-            row["step_ratio"] = row["step"]["median"] / other["step"]["median"]
-            row["set_up_ratio"] = row["set_up"]["median"] / other["set_up"]["median"]
             row["bytes_ratio"] = row["bytes"] / other["bytes"] if other["bytes"] else None
     return dict(rows=list(rows.values()))
 

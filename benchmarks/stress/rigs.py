@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from itertools import product
 
-from benchmarks.stress.scenes import LAWS, Scene
+from benchmarks.stress.scenes import Family, Scene
 from mechanics.rigs import Load
 
 KS = range(1, 7)
@@ -31,46 +31,21 @@ class RigScene(Scene):
 
 def rig_scenes() -> list[RigScene]:
     """All of them, in an order that does not change."""
-    found: list[RigScene] = []
-
-    def add(group, name, programme, friction, **body):
-        found.append(RigScene(group, f"{name}, {programme}", programme, body | friction))
-
-    tilting, rolls = ("n", "r1", "r2"), ("x", "z")
-    for (law, mu), k in product(LAWS.items(), range(-6, 4)):
-        add("weights", f"weight 1e{k} {law}", "shear", mu, weight=10.0**k)
-    for (law, mu), k in product(LAWS.items(), KS):
-        add("nearly sliding", f"plane {law}", f"nearly sliding, 1e-{k}", mu)
-        add(
-            "nearly tipping",
-            f"platen {law}",
-            f"nearly tipping, 1e-{k}",
-            mu,
-            free=tilting,
-            weight=1e-3,
-        )
-    for (law, mu), k in product(LAWS.items(), range(-6, 1)):
-        add("tilting platens", f"weight 1e{k} {law}", "rocking", mu, free=tilting, weight=10.0**k)
-    for (law, mu), k, kind in product(LAWS.items(), (-1, 0, 1, 2, 3, 4, 6), ("ball", "roller")):
-        body = dict(kind=kind, radius=10.0**k)
+    found = Family(RigScene)
+    add, tilting = found.add, dict(free=("n", "r1", "r2"))
+    for k in range(-6, 4):
+        add("weights", f"weight 1e{k}", "shear", weight=10.0**k)
+    for k in KS:
+        add("nearly sliding", "plane", f"nearly sliding, 1e-{k}")
+        add("nearly tipping", "platen", f"nearly tipping, 1e-{k}", weight=1e-3, **tilting)
+    for k in range(-6, 1):
+        add("tilting platens", f"weight 1e{k}", "rocking", weight=10.0**k, **tilting)
+    for k, kind in product((-1, 0, 1, 2, 3, 4, 6), ("ball", "roller")):
+        group, of = f"{kind}s", dict(kind=kind, radius=10.0**k)
         for weight in (1e-3, 1.0):
             add(
-                f"{kind}s",
-                f"R/h 1e{k} weight {weight:g} {law}",
-                "shear",
-                mu,
-                free=rolls,
-                weight=weight,
-                **body,
+                group, f"R/h 1e{k} weight {weight:g}", "shear", free=("x", "z"), weight=weight, **of
             )
         if k > 0:
-            add(
-                f"{kind}s",
-                f"R/h 1e{k} beside {law}",
-                "stroke",
-                mu,
-                free=("z",),
-                offset=(0.03, 0.02),
-                **body,
-            )
+            add(group, f"R/h 1e{k} beside", "stroke", free=("z",), offset=(0.03, 0.02), **of)
     return found

@@ -94,10 +94,15 @@ def small(scene: Scene) -> Scene:
 class Family(list):
     """Scenes; a body that is added is given each law and programme, whose names become part of its own."""
 
+    def __init__(self, kind=Scene):
+        self._kind = kind
+
     def add(self, group, name, *programmes, laws=LAWS, tol=1e-8, goes_on=False, **body):
         for (law, friction), programme in product(laws.items(), programmes or ["press"]):
             full = f"{name} {law}".strip() + f", {programme}"
-            self.append(Scene(group, full, programme, body | friction, tol=tol, goes_on=goes_on))
+            self.append(
+                self._kind(group, full, programme, body | friction, tol=tol, goes_on=goes_on)
+            )
 
 
 def scenes() -> list[Scene]:
