@@ -71,11 +71,12 @@ def test_limit_of_rounding_is_a_warning_that_names_it():
     assert 1e-12 < max(found.error, found.slip_error) <= found.rounding
 
 
-def test_errors_are_never_less_than_true():
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.slow)])
+def test_errors_are_never_less_than_true(count):
     """W of condition up to 1e14, one to three contacts: a claimed error differs from the true one by
     less than tol/100 or rounding's tenth, and an accepted true one is within tol or rounding."""
     rng, accepted, limited = np.random.default_rng(5), 0, 0
-    for _ in range(300):
+    for _ in range(count):
         n = rng.integers(1, 4)
         B = np.linalg.qr(rng.normal(size=(3 * n, 3 * n)))[0]
         W = (B * 10 ** rng.uniform(-14, 0, size=3 * n)) @ B.T
@@ -91,7 +92,7 @@ def test_errors_are_never_less_than_true():
         for claimed, true in zip((found.error, found.slip_error), errors):
             assert abs(claimed - true) <= max(TOL / 100, found.rounding / 10)
             assert true <= 1.01 * max(TOL, found.rounding)
-    assert accepted >= 250 and limited >= 5
+    assert accepted >= 5 / 6 * count and limited >= count / 60
 
 
 @pytest.mark.parametrize("spring", [1e-2, 1e-5, 1e-8])
