@@ -156,8 +156,7 @@ def compute(parameters, solver, shown, output) -> tuple:
                     maps.append((f"{shown[index]}, {record['displacement']:g} mm", gather(punch)))
         except dc.NotConverged as error:  # what was computed before is kept
             failure = f"Step {len(records) + 1}: {error}"
-    work = punch.comm.allreduce(float(punch.contact.dissipation.sum()))
-    return {"dissipation": work, "steps": records}, punch, maps, failure
+    return {"dissipation": punch.dissipation(), "steps": records}, punch, maps, failure
 
 
 def compute_accurately(parameters, accuracy, shown) -> tuple:

@@ -20,7 +20,7 @@ pytest.importorskip("tqdm")
 import demo_punch
 
 from studies.punch import Parameters, Punch
-from studies.punch.accuracy import DIVISIONS, Found, NotAccurate, accurate, difference, mesh_options
+from studies.punch.accuracy import Found, NotAccurate, accurate, difference, mesh_options
 from studies.punch.contact_map import gather
 from studies.punch.mesh import CONTACT, punch_mesh
 
@@ -38,15 +38,16 @@ def directory():
         shutil.rmtree(made)
 
 
-@pytest.mark.parametrize("divisions", DIVISIONS[:3])
-def test_the_rim_is_a_circle(divisions):
+@pytest.mark.parametrize("divisions, parts", [(2, 1), (3, 1), (4, 1), (4, 4)])
+def test_the_rim_is_a_circle(divisions, parts):
     """The disc of second order has the circle's area to the fourth order, 5e-5 with four divisions, in any unit."""
-    punch = punch_mesh(COMM, radius=3e-6, height=1e-6, **mesh_options(divisions))
+    options = mesh_options(divisions) | dict(quarter=parts > 1)
+    punch = punch_mesh(COMM, radius=3e-6, height=1e-6, **options)
     ds = ufl.Measure("ds", domain=punch.mesh, subdomain_data=punch.facet_tags)
     area = COMM.allreduce(
         fem.assemble_scalar(fem.form(fem.Constant(punch.mesh, 1.0) * ds(CONTACT)))
     )
-    assert abs(area / (np.pi * 9e-12) - 1) < 5.1e-5 * (4 / divisions) ** 4
+    assert abs(parts * area / (np.pi * 9e-12) - 1) < 5.1e-5 * (4 / divisions) ** 4
 
 
 def test_cells_shrink_towards_the_rim():
@@ -61,6 +62,21 @@ def test_cells_shrink_towards_the_rim():
     assert widths[:-1] / widths[1:] == pytest.approx(widths[0] / widths[1], rel=1e-6)
     with pytest.raises(ValueError, match="rim must be less than a 4th"):
         punch_mesh(COMM, divisions=4, layers=1, rim=0.3)
+
+
+def test_a_quarter_is_the_whole():
+    """Forces, work and what is at P are those of the whole punch, and so they are after a restart with another case."""
+    parameters = Parameters(case="C", lowest=0.6, loading=1, unloading=2)
+    whole, quarter = (Punch(parameters, quarter=part, **mesh_options(2)) for part in (False, True))
+    with pytest.raises(ValueError, match="divisions must be even for a quarter, got 3"):
+        punch_mesh(COMM, quarter=True, **mesh_options(3))
+    for case in "CA":
+        whole.restart(case=case), quarter.restart(case=case)
+        for displacement in (0.1, 0.06, 0.02):
+            a, b = whole.press(displacement), quarter.press(displacement)
+            for name in ("normal_reaction", "tangential_reaction_sum", "point_slip_increment"):
+                assert b[name] == pytest.approx(a[name], rel=1e-6, abs=1e-9), name
+        assert quarter.dissipation() == pytest.approx(whole.dissipation(), rel=1e-6)
 
 
 def test_the_drawn_disc():
@@ -96,14 +112,14 @@ def test_accuracy_that_is_asked_for():
     found = accurate(Parameters(case="A", tol=1e-8), 0.04)
     assert found.error <= 0.04
     assert abs(found.dissipation / LIMIT_A - 1) <= 1.5 * found.dissipation_error
-    assert found.tried[-1][:2] == (3, 1) and len(found.tried) == 3
+    assert found.tried[-1][:2] == (4, 1) and len(found.tried) == 3
     with pytest.raises(ValueError, match="accuracy must be between 0 and 1"):
         accurate(Parameters(), 1.0)
 
 
 def test_what_cannot_be_reached_is_said(monkeypatch):
     """With the finest mesh used up the best run comes with the failure."""
-    monkeypatch.setattr("studies.punch.accuracy.DIVISIONS", (2, 3))
+    monkeypatch.setattr("studies.punch.accuracy.DIVISIONS", (2, 4))
     monkeypatch.setattr("studies.punch.accuracy.HALVINGS", 0)
     few = Parameters(case="A", tol=1e-8, loading=1, unloading=1)
     with pytest.raises(NotAccurate, match="more than 0.001") as caught:
@@ -121,7 +137,7 @@ def test_command(directory, capsys):
     assert (
         content["dissipation"] > 0 and content["seconds"] > 0 and content["processor_seconds"] > 0
     )
-    assert len(content["steps"]) % 3 == 0 and content["head"]["unknowns"] == 7527
+    assert len(content["steps"]) % 3 == 0 and content["head"]["unknowns"] == 4947
     assert (directory / "punch.png").stat().st_size > 50_000
     printed = capsys.readouterr().out
     assert bool(printed) == (COMM.rank == 0) and ("estimated error" in printed) == (COMM.rank == 0)

@@ -1,4 +1,5 @@
-"""The punch to an accuracy that is asked for: bricks of 27 nodes, graded and curved, refined until two differences are small.
+"""The punch to an accuracy that is asked for: bricks of 27 nodes on a quarter of it, graded and curved, refined until two
+differences are small.
 
 Both errors are estimated from runs that are made anyway or cost little:
 
@@ -19,7 +20,8 @@ from studies.punch.model import Parameters, Punch, programme
 # isort: split
 import numpy as np
 
-DIVISIONS = (2, 3, 4, 6, 8)  # of the meshes, one after another
+DIVISIONS = (2, 4, 6, 8, 10)  # of the meshes, one after another
+SHARE = 0.7  # of the accuracy that is left to the increments
 HALVINGS = 6  # of the increments, at most
 FACTORISED = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
@@ -68,16 +70,23 @@ def accurate(parameters: Parameters, accuracy: float, shown=(), comm=None) -> Fo
     if not 0 < accuracy < 1:
         raise ValueError(f"accuracy must be between 0 and 1, got {accuracy!r}.")
     runs: dict[tuple[int, int], Found] = {}
+    punches: dict[int, Punch] = {}
 
     def at(level: int, halvings: int) -> Found:
         if (level, halvings) not in runs:
-            runs[level, halvings] = run(parameters, DIVISIONS[level], 2**halvings, shown, comm)
+            if level not in punches:
+                punches[level] = build(parameters, DIVISIONS[level], comm)
+            runs[level, halvings] = run(punches[level], parameters, 2**halvings, shown)
         return runs[level, halvings]
 
     level, halvings = 1, 0
     while True:
+        # increments first, on the coarser mesh, where they cost little
         coarse = at(level - 1, halvings)
         increments = difference(coarse, at(level - 1, halvings + 1))
+        if 2 * max(increments) > SHARE * accuracy and halvings < HALVINGS:
+            halvings += 1
+            continue
         found = at(level, halvings)
         mesh = difference(found, coarse)
         found.dissipation_error, found.force_error = (
@@ -88,12 +97,8 @@ def accurate(parameters: Parameters, accuracy: float, shown=(), comm=None) -> Fo
         )
         if found.error <= accuracy:
             return found
-        # the larger of both is reduced
-        if max(mesh) >= 2 * max(increments) and level + 1 < len(DIVISIONS):
-            level += 1
-        elif halvings < HALVINGS and 2 * max(increments) > 0.1 * accuracy:
-            halvings += 1
-        else:
+        level += 1
+        if level == len(DIVISIONS):
             raise NotAccurate(
                 f"the estimated error is {found.error:.1e}, of the mesh {max(mesh):.1e}, of the increments "
                 f"{2 * max(increments):.1e}: more than {accuracy:g}, and the finest mesh is reached.",
@@ -101,23 +106,27 @@ def accurate(parameters: Parameters, accuracy: float, shown=(), comm=None) -> Fo
             )
 
 
-def run(parameters: Parameters, divisions: int, factor: int, shown=(), comm=None) -> Found:
-    """One run, with ``factor`` times as many increments."""
-    finer = dict(loading=factor * parameters.loading, unloading=factor * parameters.unloading)
+def build(parameters: Parameters, divisions: int, comm=None) -> Punch:
+    """The punch on a mesh of so many divisions: a quarter of it, where the point P lies in that and the mesh can be divided."""
     lowest = parameters.height / (2 * divisions) ** 2
-    parameters = replace(parameters, refine=0, lowest=lowest, **finer)
     given = {} if comm is None else {"comm": comm}
     # the compliance of the contact nodes takes thousands of solves: by a factorisation, on fine meshes, too
     given |= dict(solver=dc.CondensedNewton(), petsc_options=FACTORISED)
-    punch = Punch(parameters, **given, **mesh_options(divisions))
+    quarter = min(parameters.target) >= 0 and divisions % 2 == 0
+    parameters = replace(parameters, refine=0, lowest=lowest)
+    return Punch(parameters, **given, **mesh_options(divisions), quarter=quarter)
+
+
+def run(punch: Punch, parameters: Parameters, factor: int, shown=()) -> Found:
+    """One run, with ``factor`` times as many increments, from the undeformed punch."""
+    punch.restart(loading=factor * parameters.loading, unloading=factor * parameters.unloading)
     records, maps = [], []
-    for index, displacement in enumerate(programme(parameters), start=1):
+    for index, displacement in enumerate(programme(punch.parameters), start=1):
         records.append(punch.press(displacement))
         name = dict(shown).get(index // factor - 1) if index % factor == 0 else None
         if name is not None:
             maps.append((f"{name}, {displacement:g} mm", gather(punch)))
-    dissipation = punch.comm.allreduce(float(punch.contact.dissipation.sum()))
-    return Found(punch, records, maps, dissipation)
+    return Found(punch, records, maps, punch.dissipation())
 
 
 def column(records: list, name: str, every: int) -> np.ndarray:

@@ -8,7 +8,7 @@ orthotropic with the associated slip rule (B), or orthotropic with one of its ow
 anisotrope", 18e Congrès Français de Mécanique, 2007.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -19,7 +19,7 @@ from dolfinx_contact.compat import version as dolfinx_version
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import locate_entities
+from dolfinx.mesh import locate_entities, locate_entities_boundary
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -64,7 +64,8 @@ class Punch:
     """Body, plane, friction and supports; ``press`` computes one load step after another.
 
     ``solver``, ``petsc_options`` as in ``dc.ContactProblem``; ``friction``: arguments of ``dc.Friction`` in place of the case's;
-    ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.
+    ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.  With ``quarter=True`` only a quarter is computed, planes of symmetry
+    hold it, and the sums of forces and work that ``press`` and ``dissipation`` return are those of the whole.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class Punch:
     ):
         self.parameters, self.comm = parameters, comm
         self.friction = friction or CASES[parameters.case]
+        self.parts = 4 if mesh_options.get("quarter") else 1  # of the whole punch
         shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
         punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
         self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
@@ -90,7 +92,7 @@ class Punch:
         dx = ufl.dx(domain=self.mesh, metadata={"quadrature_degree": 2 * order + 1})
         v = ufl.TestFunction(self.V)
         self.F = elasticity(self.u, v, parameters.young, parameters.poisson, dx)
-        self.bcs = self._supports()
+        self.bcs = self._supports() + (self._symmetry() if self.parts > 1 else [])
 
         plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
         friction = dc.Friction(**self.friction)
@@ -127,6 +129,30 @@ class Punch:
             return [down, fix(0, 0, centre), fix(1, 0, centre), fix(1, 0, rim)]
         raise ValueError(f'top must be "bonded" or "free", got {self.parameters.top!r}.')
 
+    def _symmetry(self):
+        """The planes x = 0 and y = 0 of a quarter: no displacement across."""
+        zero, near, bcs = (
+            fem.Constant(self.mesh, PETSc.ScalarType(0)),
+            1e-9 * self.parameters.radius,
+            [],
+        )
+        for k in range(2):
+            facets = locate_entities_boundary(self.mesh, 2, lambda x, k=k: np.abs(x[k]) < near)
+            bcs.append(
+                fem.dirichletbc(
+                    zero, fem.locate_dofs_topological(self.V.sub(k), 2, facets), self.V.sub(k)
+                )
+            )
+        return bcs
+
+    def restart(self, **changed) -> None:
+        """Back to the undeformed punch, with other ``parameters`` of case and increments; what is known of its stiffness stays."""
+        self.parameters = replace(self.parameters, **changed)
+        if "case" in changed:
+            self.friction = CASES[self.parameters.case]
+            self.contact.friction = dc.Friction(**self.friction)
+        self.problem.reset()
+
     def move_top(self, displacement: float) -> None:
         """Move the top face to ``displacement`` mm below its first position."""
         self.approach.value = -displacement
@@ -139,8 +165,8 @@ class Punch:
         tangential = np.linalg.norm(contact.reaction[:, :2], axis=1).sum()
         return {
             "displacement": displacement,
-            "normal_reaction": float(contact.force() @ contact.plane.normal),
-            "tangential_reaction_sum": float(self.comm.allreduce(tangential)),
+            "normal_reaction": self.parts * float(contact.force() @ contact.plane.normal),
+            "tangential_reaction_sum": self.parts * float(self.comm.allreduce(tangential)),
             **{name: int(count) for name, count in step.counts._asdict().items()},
             "error": float(step.error),
             "bipotential_gap": float(step.bipotential_gap),
@@ -149,6 +175,10 @@ class Punch:
             "point_reaction": self._at_point(contact.reaction),
             "point_slip_increment": self._at_point(contact.slip_increment),
         }
+
+    def dissipation(self) -> float:
+        """Work of friction up to here, on all ranks."""
+        return self.parts * self.comm.allreduce(float(self.contact.dissipation.sum()))
 
     def _at_point(self, values) -> list[float]:
         """Row of P, on all ranks."""
