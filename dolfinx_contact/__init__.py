@@ -31,6 +31,8 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.contact.history import Status as Status
     from dolfinx_contact.contact.level import RigidSurface as RigidSurface
     from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.convergence import Converged as Converged
+    from dolfinx_contact.convergence import converge as converge
     from dolfinx_contact.discretisation import Estimate as Estimate
     from dolfinx_contact.discretisation import estimate as estimate
     from dolfinx_contact.increments import advance as advance
@@ -63,6 +65,7 @@ _NAMES = {  # by their module
     "contact.history": ["Status"],
     "contact.level": ["RigidSurface"],
     "contact.plane": ["RigidPlane"],
+    "convergence": ["Converged", "converge"],
     "discretisation": ["Estimate", "estimate"],
     "increments": ["advance"],
     "law.bipotential": ["bipotential_gap"],
