@@ -24,15 +24,15 @@ import ufl
 from dolfinx import fem, mesh
 from helpers import hooke, rounded_body
 
-LIMITS = dict(A=395.5, B=353.5, C=509.0)  # N mm, work of friction in the limit of increments
+LIMITS = dict(A=395.6, B=353.0, C=511.7)  # N mm, work of friction in the limit of increments
 ASKED = (0.05, 0.02, 0.01, 0.005)
-FINEST = 128  # cells
+FINEST = 64  # cells
 
 
 def solved(V, F, u, face, held, far, mu: float) -> tuple[dc.ContactProblem, dc.Contact]:
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(mu))
-    return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10), contact
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, solver=dc.CondensedNewton()), contact
 
 
 def body(scene, order: int):
@@ -72,7 +72,7 @@ def flat_punch(cells: int, parts: int, order: int = 1) -> float:
 
 def ball(cells: int, parts: int) -> float:
     problem = ball_on_flat(flat.quarter_block(cells), 1)
-    return float(problem.contacts[0].force()[2])
+    return abs(float(problem.contacts[0].force()[2]))
 
 
 def paper(case: str):
@@ -84,14 +84,14 @@ def paper(case: str):
 
 def scenes() -> dict:
     """Function, meshes, halvings and true value."""
-    cells = (8, 16, 32, 64)
-    slipped = cylinder(FINEST // 2, 16, 0.3, 2)[1]
+    cells = (4, 8, 16, 32)
+    slipped = cylinder(FINEST, 16, 0.3, 2)[1]
     return {
         "cylinder of Hertz, 2-D: force": (
             lambda n, k: cylinder(n, k)[0],
             cells,
             0,
-            cylinder(FINEST // 2, 1, order=2)[0],
+            cylinder(FINEST, 1, order=2)[0],
         ),
         "partial slip, 2-D: work": (lambda n, k: cylinder(n, k, 0.3)[1], cells, 5, slipped),
         "flat punch, 2-D: moment": (flat_punch, cells, 0, flat_punch(FINEST, 1, 2)),

@@ -103,8 +103,10 @@ def plan() -> list[Run]:
     runs = []
     for case in "ABC":
         of = dict(case=case)
-        runs += [graded(n, factor=k, **of) for n in (2, 4, 6, 8, 10, 12) for k in (1, 2, 4, 8, 16)]
-        runs += [uniform(n, order=1, factor=k, **of) for n in (4, 8, 16, 32) for k in (1, 4)]
+        runs += [graded(n, factor=k, **of) for n in (2, 4, 6, 8) for k in (1, 2, 4, 8, 16)]
+        runs += [graded(10, factor=k, **of) for k in (1, 4)]
+        runs += [graded(n, order=1, factor=k, **of) for n in (4, 8, 12, 16) for k in (1, 4)]
+        runs += [uniform(n, order=1, factor=k, **of) for n in (4, 8, 16) for k in (1, 4)]
         runs += [uniform(n, order=2, factor=k, **of) for n in (2, 4, 8) for k in (1, 4)]
         runs += [
             replace(graded(n, **of), rim=rim, factor=4)
