@@ -16,6 +16,8 @@ Mesh = TypeVar("Mesh")
 
 # Differences from mesh to mesh are taken to shrink at least and at most by these factors: the rest may be chance.
 SHRINK = 2.0, 4.0
+# An estimate falls by this factor from one mesh to the next, at most.
+FALL = 8.0
 # Part of the accuracy that is left to the increments.
 SHARE = 0.5
 
@@ -61,9 +63,9 @@ def converge(
     - increments: twice the change that halving them makes on the mesh before, which is their error if it falls with the first order;
     - mesh: the change from the mesh before, over ``s - 1``, where ``s`` is the factor by which changes shrank last, but 2 at
       least and 4 at most.  With cells of half the size ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226
-      (1927) 299).  With two meshes s = 2.
+      (1927) 299).  With two meshes s = 2.  From mesh to mesh the estimate falls to an eighth at most, since two values may agree by chance.
 
-    Estimates, no bounds: values that oscillate may agree by chance.
+    Estimates, no bounds.
 
     Args:
         compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that takes the programme with every
@@ -99,7 +101,7 @@ def converge(
             tried[key] = value
         return tried[key]
 
-    halved = 0
+    halved, of_mesh = 0, 0.0
     for level in range(1, len(meshes)):
         increments = 0.0
         if halvings:
@@ -114,7 +116,8 @@ def converge(
         shrunk = SHRINK[0]
         if level > 1 and change > 0:
             shrunk = np.clip(abs(last - at(level - 2, halved)) / change, *SHRINK)
-        errors = [float(error / abs(value)) for error in (change / (shrunk - 1), increments)]
+        of_mesh = max(change / (shrunk - 1), of_mesh / FALL)
+        errors = [float(error / abs(value)) for error in (of_mesh, increments)]
         if sum(errors) <= accuracy:
             break
     return Converged(value, *errors, sum(errors) <= accuracy, tried)
