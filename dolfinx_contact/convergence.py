@@ -91,26 +91,11 @@ def converge(
     tried: dict[tuple, float] = {}
 
     def at(level: int, halved: int) -> float:
-        key = (meshes[level], 2**halved)
-        if key not in tried:
-            value = float(compute(*key))
-            if not np.isfinite(value) or value == 0:
-                raise ValueError(
-                    f"compute must return a finite number other than zero, got {value!r} for {key}."
-                )
-            tried[key] = value
-        return tried[key]
+        return _value(compute, tried, (meshes[level], 2**halved))
 
     halved, of_mesh = 0, 0.0
     for level in range(1, len(meshes)):
-        increments = 0.0
-        if halvings:
-            while True:
-                before, half = at(level - 1, halved), at(level - 1, halved + 1)
-                increments = 2 * abs(half - before)
-                if increments <= SHARE * accuracy * abs(half) or halved == halvings:
-                    break
-                halved += 1
+        halved, increments = _halve(lambda k, of=level - 1: at(of, k), halved, halvings, accuracy)
         last, value = at(level - 1, halved), at(level, halved)
         change = abs(value - last)
         shrunk = SHRINK[0]
@@ -121,3 +106,28 @@ def converge(
         if sum(errors) <= accuracy:
             break
     return Converged(value, *errors, sum(errors) <= accuracy, tried)
+
+
+def _halve(
+    at: Callable[[int], float], halved: int, halvings: int, accuracy: float
+) -> tuple[int, float]:
+    """How often increments must be halved on one mesh, and the error that is left to them."""
+    while halvings:
+        before, half = at(halved), at(halved + 1)
+        error = 2 * abs(half - before)
+        if error <= SHARE * accuracy * abs(half) or halved == halvings:
+            return halved, error
+        halved += 1
+    return 0, 0.0
+
+
+def _value(compute, tried: dict[tuple, float], key: tuple) -> float:
+    """Of a run, which is made once."""
+    if key not in tried:
+        value = float(compute(*key))
+        if not np.isfinite(value) or value == 0:
+            raise ValueError(
+                f"compute must return a finite number other than zero, got {value!r} for {key}."
+            )
+        tried[key] = value
+    return tried[key]
