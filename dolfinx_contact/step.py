@@ -8,6 +8,7 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.driven import driven_planes
+from dolfinx_contact.contact.shared import shared_nodes
 from dolfinx_contact.error import (
     EPSILON,
     Errors,
@@ -55,6 +56,7 @@ class LoadStep:
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
         self.planes = driven_planes(body, contacts)
+        self._shared = shared_nodes(contacts, stiffness, body.fixed)
         self.statics = None
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before = None  # reactions of the state judged before
@@ -139,8 +141,9 @@ class LoadStep:
         """Of the new reactions of each contact, by the reactions before and by the motion."""
         forces = self.forces(x)
         self._balance_planes(x, forces, maps)
-        both = zip(self._asked(forces), maps)
-        return [contact.respond_with_derivatives(x, map) for contact, map in both]
+        both = zip(self._asked(x, forces), maps)
+        derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
+        return derivatives if self._shared is None else self._shared.coupled(derivatives)
 
     def along(self, x: np.ndarray, dx: np.ndarray, maps):
         """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
@@ -220,20 +223,24 @@ class LoadStep:
         if self.monitored:
             self.tell(self.errors.largest, counts(self.body, self.contacts))
 
-    def _asked(self, forces: np.ndarray):
-        """The contacts, each with the reactions that balance the forces at its nodes."""
-        for contact in self.contacts:
+    def _asked(self, x: np.ndarray, forces: np.ndarray):
+        """The contacts, each with the reactions that balance the forces at its nodes, of shared ones with its own part."""
+        if self._shared is not None:
+            self._shared.split(x, -forces)
+        for k, contact in enumerate(self.contacts):
             contact.take_reaction(-forces)
+            if self._shared is not None:
+                self._shared.give(k)
             yield contact
 
     def _balance_planes(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
         if self.planes is not None:
-            self.planes.balance(x, maps, lambda: self._asked(forces))
+            self.planes.balance(x, maps, lambda: self._asked(x, forces))
 
     def _respond(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
         """Give contacts the reactions that maps make of those which balance the forces."""
         self._balance_planes(x, forces, maps)
-        for contact, map in zip(self._asked(forces), maps):
+        for contact, map in zip(self._asked(x, forces), maps):
             contact.respond(x, map)
 
     def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:

@@ -175,6 +175,14 @@ class Friction(Guarded):
         """Diagonal of Q = P M^-1, largest entry 1, same shape as ``mu``; zero where ``mu`` is."""
         return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
 
+    def at(self, nodes: np.ndarray) -> Friction:
+        """The law of some of the nodes, of indices ``shape=(k,)``; coefficients for all of them stay what they are."""
+        if self.mu.ndim == 1 and self.axes is None:
+            return self
+        mu, p = (rows if rows.ndim == 1 else rows[nodes] for rows in (self.mu, self.p))
+        axes = None if self.axes is None else self.axes[nodes]
+        return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
+
     def along_axes(self, t: np.ndarray) -> np.ndarray:
         """Components of tangential vectors along the principal friction directions, ``shape=(n, 2)`` or ``(n, 1)``."""
         if self.axes is None:
