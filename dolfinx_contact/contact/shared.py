@@ -15,6 +15,7 @@ contact has ``r = R(F p, w)``.
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
 from dolfinx_contact.error import EPSILON
 from dolfinx_contact.law.maps import ReturnMap
@@ -42,6 +43,14 @@ def shared_nodes(contacts, stiffness, fixed: np.ndarray) -> SharedNodes | None:
     nodes, counts = np.unique(np.concatenate([c.nodes for c in contacts]), return_counts=True)
     nodes = nodes[counts > 1]
     return SharedNodes(contacts, stiffness, fixed, nodes) if nodes.size else None
+
+
+def any_shared(contacts) -> bool:
+    """Whether any node of any rank belongs to several contacts.  Collective."""
+    if len(contacts) < 2:
+        return False
+    nodes = np.concatenate([contact.nodes for contact in contacts])
+    return contacts[0].comm.allreduce(np.unique(nodes).size < nodes.size, op=MPI.LOR)
 
 
 class SharedNodes:
@@ -128,7 +137,12 @@ class SharedNodes:
                 trial_left, trial_slope = self._left(trial)
                 trial_size = np.linalg.norm(trial_left, axis=1)
             done = size <= ROUNDED * scale
-            for one, other in ((trial, r), (trial_left, left), (trial_slope, slope), (trial_size, size)):
+            for one, other in (
+                (trial, r),
+                (trial_left, left),
+                (trial_slope, slope),
+                (trial_size, size),
+            ):
                 one[done] = other[done]
             r, left, slope, size = trial, trial_left, trial_slope, trial_size
         return r

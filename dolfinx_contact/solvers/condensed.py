@@ -12,15 +12,18 @@ from mpi4py import MPI
 
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank, raised_together
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.contact.shared import any_shared
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance, tie
-from dolfinx_contact.solvers.condensed_input import principal_axes
+from dolfinx_contact.solvers.condensed_input import joint_friction, principal_axes
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 
 FEW = 3000  # iterations for a loose body that seems to slide away
+
+# Part of the errors that a solution may have which tells how far another one was off, of nodes in several contacts.
+NEARER = 0.1
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -53,7 +56,7 @@ class CondensedBody:
         self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
-        self._held_by = body.anchors or body
+        self._held_by, self._shared = body.anchors or body, any_shared(self._contacts)
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
@@ -76,7 +79,7 @@ class CondensedBody:
                 del W  # copied
                 self.operator.prepare()  # pays after some ten iterations
         self._axes = [contact.friction.axes for contact in self._contacts]
-        self.friction = self._gathered_friction()
+        self.friction = joint_friction(self._contacts, self.gather)
         self._scales = self._gathered_stiffness(stiffness) | {
             "tied_stiffness": np.append(a, np.ones(self._planes.tied))
         }
@@ -90,7 +93,7 @@ class CondensedBody:
         turned = not all(map(np.array_equal, now, self._axes))
         if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
             return False
-        self.friction = self._gathered_friction()
+        self.friction = joint_friction(self._contacts, self.gather)
         return True
 
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
@@ -142,9 +145,21 @@ class CondensedBody:
             moved = (result.displacement.ravel(), anchored, self._planes.driving(step))
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result = best
+        change, goal = result.change, NEARER * max(result.error, result.slip_error)
+        if self._shared and step.measure(x).largest <= step.tol < change:
+            # Newton's step moves reactions between contacts of a node, which changes nothing else.
+            found = self._reactions(
+                step, q + rounding, goal, [force - placed], acting, {"max_iterations": FEW}
+            )
+            iterations += found.iterations
+            if max(found.error, found.slip_error) <= goal:
+                nearer = placed + np.concatenate((found.reaction.ravel(), found.tied))
+                size = max(self._body.norm(self._nodal(force)), acting)
+                change = self._body.norm(self._nodal(nearer - force)) / size
+                force, x = nearer, self.displacement(base, nearer - known)
         self._planes.move(step, force)
         self.past.append((rows, force, self._tied))
-        forward = max(result.change, step.measure(x).largest)
+        forward = max(change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
 
     def _placed(self, step, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -265,25 +280,6 @@ class CondensedBody:
             turned = np.einsum("nij,njk,nlk->nil", turns, blocks, turns)
             gathered["tangential_stiffness"] = self.gather(turned)
         return gathered
-
-    def _gathered_friction(self) -> Friction:
-        """The law of all nodes; contacts with the same coefficients stay one uniform law."""
-        laws = [contact.friction for contact in self._contacts]
-        first = laws[0]
-        if first.mu.ndim == 1 and all(
-            np.array_equal(f.mu, first.mu) and np.array_equal(f.p, first.p) for f in laws
-        ):
-            return Friction(first.mu, np.where(first.mu > 0, first.p, 1.0))
-        sizes = [len(contact.nodes) for contact in self._contacts]
-        mu, p = (
-            self.gather(
-                np.concatenate(
-                    [np.broadcast_to(getattr(f, name), (n, 2)) for f, n in zip(laws, sizes)]
-                )
-            )
-            for name in ("mu", "p")
-        )
-        return Friction(mu, np.where(mu > 0, p, 1.0))
 
 
 def components(contacts) -> int:

@@ -65,3 +65,26 @@ def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
         turns[:, 0, 0], turns[:, 0, 1] = cos, sin
         turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
     return turns
+
+
+def joint_friction(contacts, gather) -> Friction:
+    """The law of all nodes; contacts with the same coefficients stay one uniform law.
+
+    Args:
+        contacts: The contacts of a body.
+        gather: Function that gathers rows of nodes from all ranks.  Collective.
+    """
+    laws = [contact.friction for contact in contacts]
+    first = laws[0]
+    if first.mu.ndim == 1 and all(
+        np.array_equal(f.mu, first.mu) and np.array_equal(f.p, first.p) for f in laws
+    ):
+        return Friction(first.mu, np.where(first.mu > 0, first.p, 1.0))
+    sizes = [len(contact.nodes) for contact in contacts]
+    mu, p = (
+        gather(
+            np.concatenate([np.broadcast_to(getattr(f, name), (n, 2)) for f, n in zip(laws, sizes)])
+        )
+        for name in ("mu", "p")
+    )
+    return Friction(mu, np.where(mu > 0, p, 1.0))

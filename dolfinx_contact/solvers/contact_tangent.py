@@ -30,7 +30,7 @@ class ContactTangent:
         free[body.fixed] = 0.0
         self._free = sparse.diags(free)
         dofs = [np.zeros(0, dtype=int), *(points.dofs.ravel() for points in self._points)]
-        rows = np.concatenate(dofs)
+        rows = np.unique(np.concatenate(dofs))  # of nodes in several contacts once
         self._rows = rows[free[rows] > 0]
 
     def destroy(self) -> None:
