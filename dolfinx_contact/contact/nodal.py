@@ -1,0 +1,130 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+r"""The contact problem of a node by itself, on a spring, with several surfaces at once.
+
+.. math:: r_c = R_c(F_c (p - \sum_{d \ne c} F_d^T r_d), w_c)
+
+with the force ``p`` on the node, return maps ``R_c``, frames ``F_c``, gaps and slips ``w_c``.  The spring, the same for all
+contacts, moves the node by ``(sum F^T r - p) / spring``.  Semismooth Newton, and Gauss-Seidel sweeps over the contacts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dolfinx_contact.error import EPSILON
+from dolfinx_contact.law.maps import ReturnMap
+
+# Newton's steps at most, and sweeps over the contacts after one that does not help.
+MOST, SWEEPS = 30, 4
+
+# A residual that is rounding, over the size of its terms, and what a step has to leave at most.
+ROUNDED, HELPS = 64 * EPSILON, 0.5
+
+# Directions of reactions that change nothing, over the largest: the shortest step leaves them as they are.
+SINGULAR = 1e-11
+
+
+class Part(NamedTuple):
+    """One of ``n`` contacts at ``k`` of ``m`` nodes."""
+
+    slots: np.ndarray  # which nodes, (k,)
+    law: object  # the kernel's, of these nodes
+    spring: np.ndarray  # (k,)
+    gap: np.ndarray  # (k,)
+    slip: np.ndarray  # (k, gdim - 1)
+
+
+class NodalProblems:
+    """The problems of ``m`` nodes.  Reactions of all contacts are stacked, ``shape=(m, n gdim)``, local frames.
+
+    Args:
+        parts: Of each contact.
+        frames: ``shape=(m, n, gdim, gdim)``, zero where a contact has not the node.
+        force: ``p``, ``shape=(m, gdim)``, global frame.
+    """
+
+    def __init__(self, parts: list[Part], frames: np.ndarray, force: np.ndarray):
+        self._parts, self._shape = parts, frames.shape[:3]
+        m, n, dim = self._shape
+        self.stacked = frames.reshape(m, n * dim, dim)
+        others = 1.0 - np.kron(np.eye(n), np.ones((dim, dim)))
+        self.coupling = self.stacked @ self.stacked.transpose(0, 2, 1) * others
+        self._force, self._all = force, times(self.stacked, force)
+        self._terms = np.linalg.norm(force, axis=1)
+        for part in parts:
+            lengths = np.abs(part.gap) + np.abs(part.slip).sum(axis=1)
+            self._terms[part.slots] += part.spring * lengths
+
+    def asked(self, r: np.ndarray) -> np.ndarray:
+        """What reactions of the others leave to each contact."""
+        return self._all - times(self.coupling, r)
+
+    def unsolved(self, r: np.ndarray) -> np.ndarray:
+        """What is left of the problem and what it moves the node, as forces, at least rounding: ``shape=(m,)``."""
+        left, _ = self._left(r)
+        moved = times(self.stacked.transpose(0, 2, 1), r) - self._force
+        return np.linalg.norm(left, axis=1) + np.linalg.norm(moved, axis=1) + self._rounding(r)
+
+    def _rounding(self, r: np.ndarray) -> np.ndarray:
+        return ROUNDED * (self._terms + np.linalg.norm(r, axis=1))
+
+    def balanced(self, r: np.ndarray) -> np.ndarray:
+        """Reactions that solve the problems, from a start."""
+        left, slope = self._left(r)
+        size = np.linalg.norm(left, axis=1)
+        for _ in range(MOST):
+            goes_on = ~(size <= self._rounding(r))
+            if not goes_on.any():
+                break
+            trial = r + times(np.linalg.pinv(slope, SINGULAR), left)
+            trial_left, trial_slope = self._left(trial)
+            trial_size = np.linalg.norm(trial_left, axis=1)
+            stays = goes_on & ~(trial_size <= HELPS * size)
+            if stays.any():
+                swept = r
+                for _ in range(SWEEPS):
+                    swept = self._swept(swept)
+                trial[stays] = swept[stays]
+                trial_left, trial_slope = self._left(trial)
+                trial_size = np.linalg.norm(trial_left, axis=1)
+            r, left = (
+                np.where(goes_on[:, None], trial, r),
+                np.where(goes_on[:, None], trial_left, left),
+            )
+            slope = np.where(goes_on[:, None, None], trial_slope, slope)
+            size = np.where(goes_on, trial_size, size)
+        return r
+
+    def _left(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the maps make of ``r`` minus ``r``, and minus its derivative."""
+        made, by_asked, _ = self.linearised(self.asked(r))
+        return made - r, np.eye(r.shape[1]) + by_asked @ self.coupling
+
+    def linearised(self, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Reactions that the maps make, and derivatives by what is asked and by the motion, block diagonal."""
+        m, n, dim = self._shape
+        made, blocks = np.zeros(self._shape), np.zeros((2, m, n, dim, n, dim))
+        for k, (slots, law, spring, gap, slip) in enumerate(self._parts):
+            mine, map = asked.reshape(self._shape)[slots, k], ReturnMap(spring, spring)
+            made[slots, k], _, *derivatives = map.linearised(law, mine, gap, slip)
+            for block, derivative in zip(blocks, derivatives):
+                block[slots, k, :, k] = derivative
+        by_asked, by_motion = blocks.reshape(2, m, n * dim, n * dim)
+        return made.reshape(m, -1), by_asked, by_motion
+
+    def _swept(self, r: np.ndarray) -> np.ndarray:
+        """One sweep: each contact's reactions, the others' given."""
+        r = r.copy()
+        for k, (slots, law, spring, gap, slip) in enumerate(self._parts):
+            asked = self.asked(r).reshape(self._shape)[slots, k]
+            made, _ = ReturnMap(spring, spring)(law, asked, gap, slip)
+            r.reshape(self._shape)[slots, k] = made
+        return r
+
+
+def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Products of a matrix and a vector each."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
