@@ -64,14 +64,16 @@ class CornerJudge:
             normal, moved = scene.normals[k], np.array(contact.plane.displacement)
             point = -scene.gap * normal if hasattr(scene, "gap") else np.zeros(d)
             tangents = np.linalg.svd(normal[None, :])[2][1:]
-            if d == 3:  # the plane's axis first
+            if d == 3 and scene.axes is not None:  # the plane's axis first
                 first = np.array(scene.axes[2])
                 tangents = np.array([first, np.cross(normal, first)])
             nodes = contact.nodes
             force = contact.reaction @ contact.frame
             r = np.column_stack((force @ tangents.T, force @ normal))
             gap = (self.x[nodes] + u[nodes] - point - moved) @ normal
-            slip = (u[nodes] - self.before[nodes] - moved + self.moved[k]) @ tangents.T
+            way = u[nodes] - self.before[nodes] - moved + self.moved[k]
+            way[fixed.reshape(-1, d)[nodes]] = 0.0  # what supports hold neither slips nor rubs
+            slip = way @ tangents.T
             self.moved[k] = moved
             mu = np.broadcast_to(scene.mu[k], d - 1).astype(float)
             p = mu if scene.p[k] is None else np.broadcast_to(scene.p[k], d - 1).astype(float)

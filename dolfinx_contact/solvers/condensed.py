@@ -19,11 +19,9 @@ from dolfinx_contact.solvers.condensed_input import joint_friction, principal_ax
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
+from dolfinx_contact.solvers.contact_tangent import next_change
 
 FEW = 3000  # iterations for a loose body that seems to slide away
-
-# Part of the errors that a solution may have which tells how far another one was off, of nodes in several contacts.
-NEARER = 0.1
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -145,18 +143,10 @@ class CondensedBody:
             moved = (result.displacement.ravel(), anchored, self._planes.driving(step))
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result = best
-        change, goal = result.change, NEARER * max(result.error, result.slip_error)
+        change = result.change
         if self._shared and step.measure(x).largest <= step.tol < change:
-            # Newton's step moves reactions between contacts of a node, which changes nothing else.
-            found = self._reactions(
-                step, q + rounding, goal, [force - placed], acting, {"max_iterations": FEW}
-            )
-            iterations += found.iterations
-            if max(found.error, found.slip_error) <= goal:
-                nearer = placed + np.concatenate((found.reaction.ravel(), found.tied))
-                size = max(self._body.norm(self._nodal(force)), acting)
-                change = self._body.norm(self._nodal(nearer - force)) / size
-                force, x = nearer, self.displacement(base, nearer - known)
+            # The kernel's moves reactions between contacts of a node, which changes nothing else.
+            change = min(change, next_change(step, x))
         self._planes.move(step, force)
         self.past.append((rows, force, self._tied))
         forward = max(change, step.measure(x).largest)

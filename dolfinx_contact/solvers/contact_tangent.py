@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact.contact.interface import assembled
+from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
 
@@ -103,3 +104,25 @@ class ContactTangent:
                 if last:
                     raise
         raise AssertionError
+
+
+def next_change(step, x: np.ndarray) -> float:
+    """How much Newton's next step would still change the sums of reactions at nodes, over the forces that act.  Collective.
+
+    Args:
+        step: A ``LoadStep`` without planes that force drives, else infinite.
+        x: Displacement of owned degrees of freedom.
+    """
+    if step.planes is not None:
+        return np.inf
+    body, tangent = step.body, ContactTangent(step.body, step.contacts)
+    maps = [ReturnMap(of.normal, of.normal) for of in step.stiffness]
+    try:
+        tangent.linearise(step.derivatives(x, maps))
+        dx = tangent.solve(step.free(step.out_of_balance(x, maps)))
+    except (LinearSolverError, PETSc.Error):
+        return np.inf
+    finally:
+        tangent.destroy()
+    acting = max(step.size(step.forces(x)), body.norm(step.external))
+    return step.size(body.multiply(dx)) / acting if acting > 0.0 else np.inf
