@@ -85,18 +85,22 @@ def build_corner(
         for side, n, one, q in zip(sides[1::-1], normals, mus, ps)
     ]
 
-    def apply(push: Push) -> None:
-        """Move what is held."""
-        at = V.tabulate_dof_coordinates()[:, :d]
-        way = push.across * axes[0] - push.down * axes[1]
-        if d == 3:
-            way = way + push.along * axes[2]
-        turn = np.outer(at @ axes[0], axes[1]) - np.outer(at @ axes[1], axes[0])
-        moved = STRAIN * (length * way + push.turn * turn)
-        top.x.array[: moved.size] = moved.ravel()
-        top.x.scatter_forward()
-
-    return SimpleNamespace(
+    built = SimpleNamespace(
         V=V, u=u, F=F, bcs=bcs, held=top, force=force, contacts=contacts, normals=normals, axes=axes, mesh=domain, apply=apply,
         mu=mus, p=ps, E=E, length=length, angle=angle, sides=sides, gap=gap * length, cells=cells,
     )  # fmt: skip
+    built.apply = lambda push: move(built, push)
+    return built
+
+
+def move(scene, push: Push) -> None:
+    """Move what is held."""
+    d, axes = len(scene.cells), scene.axes
+    at = scene.V.tabulate_dof_coordinates()[:, :d]
+    way = push.across * axes[0] - push.down * axes[1]
+    if d == 3:
+        way = way + push.along * axes[2]
+    turn = np.outer(at @ axes[0], axes[1]) - np.outer(at @ axes[1], axes[0])
+    moved = STRAIN * (scene.length * way + push.turn * turn)
+    scene.held.x.array[: moved.size] = moved.ravel()
+    scene.held.x.scatter_forward()

@@ -90,7 +90,10 @@ class CornerJudge:
             terms.append(self.stiff * (np.abs(self.x[nodes]) + np.abs(u[nodes]) + np.abs(moved)))
         left[fixed] = 0.0
         farthest = scene.V.mesh.comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
-        cancelling = np.full(left.size, 10 * self.stiff * farthest) + acting
+        thin = np.sin(
+            np.deg2rad(getattr(scene, "angle", 90.0))
+        )  # stiffnesses of slivers are as much larger
+        cancelling = np.full(left.size, 10 * self.stiff / thin * farthest) + acting
         external = np.where(fixed, supports, 0.0)
         scale = max(self._norm(*reactions), self._norm(external))
         defects = {name: self._norm(*values) for name, values in parts.items()}
