@@ -86,7 +86,7 @@ def build_corner(
     ]
 
     built = SimpleNamespace(
-        V=V, u=u, F=F, bcs=bcs, held=top, force=force, contacts=contacts, normals=normals, axes=axes, mesh=domain, apply=apply,
+        V=V, u=u, F=F, bcs=bcs, held=top, force=force, contacts=contacts, normals=normals, axes=axes, mesh=domain,
         mu=mus, p=ps, E=E, length=length, angle=angle, sides=sides, gap=gap * length, cells=cells,
     )  # fmt: skip
     built.apply = lambda push: move(built, push)
