@@ -56,7 +56,7 @@ class ContactProblem(ProblemStates):
             body, see docs/nonlinear.md.
         u: Displacement, a Function.  Holds the solution after a step; at the start of one, the first too, it is
             only a guess, the last converged state is kept inside.
-        contacts: The contacts; no node in two of them.
+        contacts: The contacts; a node of an edge may belong to several.
         bcs: Dirichlet conditions; their values may change between steps.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
         solver: ``CondensedNewton(...)`` or ``FixedPoint(...)``; None takes the first for small
