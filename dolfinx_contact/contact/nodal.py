@@ -79,7 +79,8 @@ class NodalProblems:
             goes_on = ~(size <= self._rounding(r))
             if not goes_on.any():
                 break
-            trial = r + times(np.linalg.pinv(slope, SINGULAR), left)
+            trial = r.copy()
+            trial[goes_on] += times(np.linalg.pinv(slope[goes_on], SINGULAR), left[goes_on])
             trial_left, trial_slope = self._left(trial)
             trial_size = np.linalg.norm(trial_left, axis=1)
             stays = goes_on & ~(trial_size <= HELPS * size)
