@@ -19,7 +19,7 @@ from benchmarks.measurement import commit, now
 from benchmarks.stress import matrix
 from benchmarks.stress.matrix import SOLVERS, pairs
 from benchmarks.stress.picture import draw, summary
-from benchmarks.stress.rigs import rig_scenes
+from benchmarks.stress.rigs import corner_scenes, rig_scenes
 from benchmarks.stress.scenes import scenes, small
 
 SHOWN = ("outcome", "solver", "group", "name", "said", "error", "slip_error", "reactions")
@@ -38,9 +38,9 @@ def main(argv=None) -> list[dict]:
     log = options.output / f"{name}.jsonl"
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(r["group"], r["name"], r["solver"]) for r in records}
-    chosen = [s for s in scenes() + rig_scenes() if options.group in (None, s.group)][
-        :: options.every
-    ]
+    chosen = [
+        s for s in scenes() + rig_scenes() + corner_scenes() if options.group in (None, s.group)
+    ][:: options.every]
     if options.small:
         chosen = list(map(small, chosen))
     todo = [

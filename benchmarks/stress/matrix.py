@@ -11,11 +11,13 @@ from time import perf_counter
 import numpy as np
 
 import dolfinx_contact as dc
-from benchmarks.stress.rigs import RigScene
+from benchmarks.stress.rigs import CornerScene, RigScene
 from benchmarks.stress.scenes import Scene
 from mechanics import judge
 from mechanics.condensed import random_problem
+from mechanics.corners import build_corner
 from mechanics.judge import Verdict
+from mechanics.judge_corners import CornerJudge
 from mechanics.judge_rigs import RigJudge
 from mechanics.judge_scene import SceneJudge
 from mechanics.rigs import build_rig
@@ -42,6 +44,7 @@ def run(scene: Scene, solver) -> dict:
     used = Counter()
     steps = condensed_steps if scene.condensed else body_steps
     steps = rig_steps if isinstance(scene, RigScene) else steps
+    steps = corner_steps if isinstance(scene, CornerScene) else steps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dc.RoundingWarning)
         for verdict, step, method in steps(scene, solver, record):
@@ -135,6 +138,21 @@ def rig_steps(scene: RigScene, solver, record):
             step,
             step.tried[-1].branch if step.tried else step.solver.split()[0],
         )
+
+
+def corner_steps(scene: CornerScene, solver, record):
+    """As ``body_steps``, of a body whose edge belongs to two contacts.  No distance of reactions: shares are not unique."""
+    built = build_corner(**scene.body)
+    of = CornerJudge(built)
+    problem = dc.ContactProblem(built.F, built.u, built.contacts, built.bcs, solver=solver, tol=scene.tol)  # fmt: skip
+    for push in scene.tops:
+        built.apply(push)
+        try:
+            step = problem.solve()
+        except REFUSALS as said:
+            return refuse(record, said)
+        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+        yield of.verdict(), step, method
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from itertools import product
 
 from benchmarks.stress.scenes import Family, Scene
+from mechanics.corners import Push
 from mechanics.rigs import Load
 
 KS = range(1, 7)
@@ -18,6 +19,29 @@ RIGS = {
     **{f"nearly tipping, 1e-{k}":
        [Load(), Load(at=(0.5 - 10.0**-k, 0)), Load(at=(0, 10.0**-k - 0.5)), Load(at=(-0.3, 0.3))] for k in KS},
 }  # fmt: skip
+
+
+PUSHES = {
+    "dragged": [Push(), Push(across=0.3), Push(across=-0.3, down=1.2, along=0.2), Push(turn=0.3, down=0.8), Push(down=-0.2),
+                Push(across=0.1, down=0.5)],
+}  # fmt: skip
+
+
+class CornerScene(Scene):
+    """A scene whose ``body`` goes to ``build_corner``."""
+
+    @property
+    def tops(self) -> list[Push]:
+        """The displacements, step by step."""
+        return PUSHES[self.programme][: self.most_steps]
+
+
+def corner_scenes() -> list[CornerScene]:
+    """Grooves of 1 to 170 degrees, whose edge belongs to two contacts."""
+    found = Family(CornerScene)
+    for angle in (1, 3, 10, 30, 60, 90, 120, 150, 170):
+        found.add("corners", f"{angle} degrees", "dragged", angle=angle, cells=(4, 4, 2))
+    return found
 
 
 class RigScene(Scene):
