@@ -296,3 +296,16 @@ def test_contacts_that_share_no_node_have_no_nodal_problems():
     twice = scene.contacts[:1] * 2
     with pytest.raises(ValueError, match="same Contact twice"):
         dc.ContactProblem(scene.F, scene.u, twice, scene.bcs)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_face_of_the_groove_may_be_driven_by_force(mu):
+    """The force of its contact, nodes of the edge among it, is the given one along the normal."""
+    scene = build_corner(90, (3, 3), mu=mu)
+    problem, plane = problem_of(scene), scene.contacts[0].plane
+    plane.free = ("n",)
+    for force in (50.0, 80.0, 20.0):
+        plane.force = force * scene.normals[0]
+        scene.apply(Push(down=0.05))
+        problem.solve()
+        assert scene.contacts[0].force() @ scene.normals[0] == pytest.approx(force, rel=1e-7)
