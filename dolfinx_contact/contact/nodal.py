@@ -72,9 +72,10 @@ class NodalProblems:
         return ROUNDED * (self._terms + np.linalg.norm(r, axis=1))
 
     def balanced(self, r: np.ndarray) -> np.ndarray:
-        """Reactions that solve the problems, from a start."""
+        """Reactions that solve the problems, from a start; where the search fails the best of its states."""
         left, slope = self._left(r)
         size = np.linalg.norm(left, axis=1)
+        best, smallest = r, size
         for _ in range(MOST):
             goes_on = ~(size <= self._rounding(r))
             if not goes_on.any():
@@ -97,7 +98,9 @@ class NodalProblems:
             )
             slope = np.where(goes_on[:, None, None], trial_slope, slope)
             size = np.where(goes_on, trial_size, size)
-        return r
+            better = size < smallest
+            best, smallest = np.where(better[:, None], r, best), np.where(better, size, smallest)
+        return best
 
     def _left(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the maps make of ``r`` minus ``r``, and minus its derivative."""

@@ -63,7 +63,7 @@ class SharedNodes:
             self._rows.append(rows)
             self._slots.append(slots)
         self._spring = springs.sum(axis=1) / (springs > 0).sum(axis=1)
-        copies = ((c.friction, np.tile(rows, n + 1)) for c, rows in zip(contacts, self._rows))
+        copies = ((c.friction, np.tile(rows, n + 2)) for c, rows in zip(contacts, self._rows))
         self._laws = [friction.at(rows).law(dim) for friction, rows in copies]
         self._law = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._rows)]
 
@@ -71,27 +71,29 @@ class SharedNodes:
         """Find what each contact is asked for, for ``give``.  Moves the contacts.
 
         With friction a node may have several solutions: that one is taken which moves it least, of equal ones that from
-        the last reactions.
+        the last reactions.  Where none is found so, the present ones may lead to one: those of a solver that knows them.
 
         Args:
             x: Displacement of owned degrees of freedom.
             forces: Forces on the body at the nodes, owned degrees of freedom.
         """
         m, n, dim = self._shape
-        last, self._motions = np.zeros(self._shape), []
+        known, self._motions = np.zeros((2, *self._shape)), []
         for k, (contact, rows) in enumerate(zip(self._contacts, self._rows)):
             contact.move(x)
             self._motions.append((contact.gap[rows], contact.slip_increment[rows]))
-            last[self._slots[k], k] = contact.last.reaction[rows]
+            for start, reaction in zip(known, (contact.last.reaction, contact.reaction)):
+                start[self._slots[k], k] = reaction[rows]
         self._force = forces[self._dofs]
         alone = np.eye(n)[:, None, :, None] * (self._frames @ self._force[:, None, :, None])[..., 0]
-        starts = np.concatenate((last[None], alone)).reshape(-1, n * dim)
-        problems = self._problems(n + 1, self._laws)
+        starts = np.concatenate((known, alone)).reshape(-1, n * dim)
+        problems = self._problems(n + 2, self._laws)
         r = problems.balanced(starts)
-        unsolved = problems.unsolved(r).reshape(n + 1, m)
+        unsolved = problems.unsolved(r).reshape(n + 2, m)
         unsolved[0] /= 2
+        unsolved[1] *= 2
         chosen = np.nan_to_num(unsolved, nan=np.inf).argmin(axis=0)
-        self._asked = problems.asked(r).reshape(n + 1, m, n * dim)[chosen, np.arange(m)]
+        self._asked = problems.asked(r).reshape(n + 2, m, n * dim)[chosen, np.arange(m)]
 
     def _problems(self, copies: int, laws: list) -> NodalProblems:
         """The nodal problems, so many times."""

@@ -124,6 +124,8 @@ class CondensedBody:
                 force = placed + np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
                 self._planes.move(step, force)
+                if self._shared:
+                    self._tell_shares(result.reaction)
                 error = step.measure(x).largest
                 solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
                 if solved or (step.planes is not None and step.planes.beyond()):
@@ -151,6 +153,16 @@ class CondensedBody:
         self.past.append((rows, force, self._tied))
         forward = max(change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+
+    def _tell_shares(self, reaction: np.ndarray) -> None:
+        """Give contacts their reactions: at nodes of several ``x`` tells no more than the sums."""
+        counts = self.comm.allgather(len(self._turns))
+        first = sum(counts[: self.comm.rank])
+        mine = reaction[first : first + len(self._turns)]
+        local, of = np.einsum("nij,ni->nj", self._turns, mine), 0
+        for contact in self._contacts:
+            contact.take(reaction=local[of : of + contact.points.count])
+            of += contact.points.count
 
     def _placed(self, step, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of a loose body: q where it stands at first, and the forces of all rows that hold it there."""
