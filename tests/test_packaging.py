@@ -21,8 +21,10 @@ pytestmark = pytest.mark.skipif(
 
 
 def clean_environment() -> dict[str, str]:
-    """Without what an MPI launcher left, which would make a new interpreter one of its ranks."""
-    return {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PRTE_"))}
+    """Without what an MPI launcher left, which would make a new interpreter one of its ranks, and what make left."""
+    return {
+        k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMI", "PRTE_", "MAKE"))
+    }
 
 
 def run(*arguments, cwd=None, **environment):
