@@ -10,7 +10,7 @@
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress report docs test test-rest test-all test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress report docs test test-rest test-ranks test-all test-cpp test-python test-wheel format stubs clean
 
 RANKS = 1 2 3
 # tests of plain arrays, the same on every rank: they run on one alone
@@ -44,10 +44,12 @@ test: .venv/ready
 	tools/ctest example
 
 # what make test leaves out; it needs make test to come first
-test-rest: test-cpp
+test-rest: test-cpp test-ranks
+
+test-ranks: .venv/ready
 	tools/mpitest .venv 2 -m "not slow" $(programs:%=tests/test_%.py)
 	for n in 1 2; do tools/mpitest .venv $$n -m slow || exit 1; done
-	tools/mpitest .venv 3 -m "not slow" $(no_arrays)
+	tools/mpitest .venv 3 -m "not slow" $(no_arrays) $(no_programs)
 
 test-all: test
 	$(MAKE) test-rest
@@ -58,10 +60,10 @@ test-cpp: .venv/ready
 test-python: .venv/ready
 	for n in $(RANKS); do tools/mpitest .venv $$n $(ARGS) || exit 1; done
 
-# the same Python tests on the newest DOLFINx on PyPI
+# those of the Python tests that touch DOLFINx, on the newest one on PyPI
 test-wheel: .venv-wheel/ready
-	tools/mpitest .venv-wheel 1 -m "not slow" $(ARGS)
-	tools/mpitest .venv-wheel 3 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
+	tools/mpitest .venv-wheel 1 -m "not slow" $(no_arrays) $(ARGS)
+	tools/mpitest .venv-wheel 2 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
 
 format: .venv/ready
 	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')

@@ -23,11 +23,12 @@ def interrupted(seconds: float):
     """Ctrl-C after so many seconds, which has to arrive as what it is.
 
     Python drops what is raised while it frees objects, and other tests leave problems to be freed: they are freed before.
+    NumPy drops what is raised while it looks for an attribute: as a user would, it is pressed again some time later.
     """
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
     gc.collect()
     gc.disable()
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 30.0)
     try:
         with pytest.raises(KeyboardInterrupt):
             yield

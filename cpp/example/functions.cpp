@@ -27,7 +27,7 @@ bool one_node() {
     std::cout << "r = " << r.transpose() << " N, f = " << f << " N\nd r / d (slip, gap), N/mm:\n"
               << returned.by_motion << '\n';
     const double small = 1e-12 * r.norm();
-    const auto fixed = [&](const dc::Local<2> &again) { return (again - r).norm() < small; };
+    const auto fixed = [&, r = r](const dc::Local<2> &again) { return (again - r).norm() < small; };
     return branch == dc::Branch::slip && std::abs(f) < small && left < 1e-15 &&
            std::abs(gap) < small && fixed(same.r) &&
            fixed(dc::bipotential_map(law, r, 0.0, slip, rho).r) && fixed(bipotential.value.r) &&

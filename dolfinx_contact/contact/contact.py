@@ -219,7 +219,7 @@ class Contact(ContactKinematics):
 
     def release(self) -> None:
         """No reactions: all nodes open."""
-        status = np.full_like(self.status, Status.OPEN)
+        status = np.full_like(self.status, int(Status.OPEN))
         self.take(reaction=np.zeros_like(self.reaction), status=status)
 
     def assemble_reaction(self, b: PETSc.Vec | np.ndarray) -> None:
@@ -236,7 +236,7 @@ class Contact(ContactKinematics):
 
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
-        before, slipped = self.last.reaction, self.last.status == Status.SLIP
+        before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
         work = work_of_friction(
             self.friction, before, slipped, self.reaction, self.slip_increment, self._settled_by
         )

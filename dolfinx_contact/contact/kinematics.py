@@ -139,7 +139,7 @@ class ContactKinematics(ContactResults):
                 np.zeros((n, gdim)),
                 self._placed.flat - moved[:, -1],
                 np.zeros((n, gdim - 1)),
-                np.full(n, Status.OPEN, dtype=np.uint8),
+                np.full(n, int(Status.OPEN), dtype=np.uint8),
             )
         )
         self._settle_here()

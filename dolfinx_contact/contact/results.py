@@ -45,8 +45,9 @@ class ContactResults(ContactLaws):
         slip, mu = self.slip_increment, self.friction.mu[..., :1]
         against = self.friction.against_slip(self.reaction[:, :-1])
         length = np.linalg.norm(slip, axis=1, keepdims=True)
-        slips = (self.status == Status.SLIP)[:, None]
-        bound = (self.status != Status.OPEN)[:, None] & (mu > 0)
+        # Compared with an enum, NumPy looks for attributes that enums do not have, and drops a Ctrl-C that comes then.
+        slips = (self.status == int(Status.SLIP))[:, None]
+        bound = (self.status != int(Status.OPEN))[:, None] & (mu > 0)
         return np.where(bound, slip + slips * length * against, 0.0)
 
     def force(self) -> np.ndarray:
