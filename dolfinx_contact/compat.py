@@ -17,7 +17,8 @@ import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from dolfinx import fem, graph, la
-from dolfinx.mesh import create_mesh
+from dolfinx.mesh import create_interval, create_mesh
+from mpi4py import MPI
 from petsc4py import PETSc
 
 if np.issubdtype(PETSc.ScalarType, np.complexfloating):
@@ -243,3 +244,15 @@ def option_was_read(name: str) -> bool:
     used.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.POINTER(ctypes.c_int)]
     found = ctypes.c_int(0)
     return used(None, name.encode(), ctypes.byref(found)) != 0 or bool(found.value & 1)
+
+
+def intervals(n: int) -> Any:
+    """A mesh of ``n`` intervals on this rank alone."""
+    return create_interval(MPI.COMM_SELF, n, [0.0, 1.0])
+
+
+def cell_values(expression: fem.Expression, mesh: Any, cells: np.ndarray) -> np.ndarray:
+    """Values of an ``Expression`` with one point, a row for each cell."""
+    if "mesh" in signature(expression.eval).parameters:
+        return expression.eval(mesh, cells).reshape(cells.size, -1)
+    return expression.eval(cells).reshape(cells.size, -1)

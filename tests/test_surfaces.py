@@ -9,10 +9,12 @@ import pytest
 import scenes
 import ufl
 from dolfinx import fem, mesh
+from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.ufl_distance import by_ufl
 from mechanics.material import elasticity
 
 COMM = scenes.COMM
@@ -92,10 +94,27 @@ def by_distance(ball, gradient=True):
     return found
 
 
+def coordinates(d):
+    """Of some mesh that has nothing to do with the body."""
+    unit = mesh.create_unit_square if d == 2 else mesh.create_unit_cube
+    domain = unit(MPI.COMM_SELF, *[1] * d)
+    return domain, ufl.SpatialCoordinate(domain)
+
+
+def by_expression(ball):
+    """A ball given in UFL by half its distance, with a radius that may be changed."""
+    domain, x = coordinates(ball.point.size)
+    arm, radius = x - ufl.as_vector(ball.point), fem.Constant(domain, ball.radius)
+    found = dc.RigidSurface((ufl.sqrt(ufl.dot(arm, arm)) - radius) / 2, ball.point, axis=ball.axis)
+    vars(found).update(radius=ball.radius, inside=False, size=radius)
+    return found
+
+
 def surfaces(d):
     """Of each kind; the body's foot is near the origin."""
     below = np.append(np.zeros(d - 1), -2.0)
-    found = [dc.RigidSphere(below, 2.0), dc.RigidSphere(-2 * below, 4.0, inside=True)]
+    ball = dc.RigidSphere(below, 2.0)
+    found = [ball, dc.RigidSphere(-2 * below, 4.0, inside=True), by_expression(ball)]
     if d == 3:
         slanted = (1.0, 0.5, 0.02)
         found += [
@@ -217,9 +236,10 @@ def test_half_a_block_carries_half_the_force(solver):
 
 
 def test_a_function_of_position_is_the_surface_where_it_is_zero():
-    """By differences as by its gradient, to nine digits; forces on a ball given so are those on a ball."""
+    """By differences as by its gradient and by UFL, to nine digits; forces on a ball given so are those on a ball."""
     ball, found = dc.RigidSphere((0, 0, -3.0), 3.0, axis=(1, 0, 0)), []
-    for surface in (ball, by_distance(ball), by_distance(ball, gradient=False)):
+    ways = by_distance(ball), by_distance(ball, gradient=False), by_expression(ball)
+    for surface in (ball, *ways):
         scene = block(surface, (0.3, 0.15), cells=[3, 3, 2])
         for slide in (0.0, 0.1):
             scene.step(slide, 0, -0.06)
@@ -227,6 +247,39 @@ def test_a_function_of_position_is_the_surface_where_it_is_zero():
     size = np.linalg.norm(found[0])
     assert np.linalg.norm(found[1] - found[0]) < 1e-8 * size
     assert np.linalg.norm(found[2] - found[0]) < 1e-6 * size
+    assert np.linalg.norm(found[3] - found[0]) < 1e-8 * size
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_an_expression_is_what_it_says_at_any_position(d):
+    """Values and derivatives in UFL are those by hand: fewer positions than before or more, far from any mesh."""
+    _, x = coordinates(d)
+    values, gradient = by_ufl(ufl.exp(x[0] / 50) * ufl.sin(x[d - 1]) + x[0] ** 3, d)
+    random = np.random.default_rng(4)
+    for n in (7, 3, 1, 40):
+        y = 100 * random.normal(size=(d, n))
+        first, last = np.exp(y[0] / 50), y[d - 1]
+        by_hand = np.zeros((d, n))
+        by_hand[0] = first / 50 * np.sin(last) + 3 * y[0] ** 2
+        by_hand[d - 1] += first * np.cos(last)
+        assert np.allclose(values(y), first * np.sin(last) + y[0] ** 3, rtol=1e-13)
+        assert np.allclose(gradient(y), by_hand, rtol=1e-12, atol=1e-12)
+
+
+def test_a_constant_of_an_expression_is_taken_as_it_stands():
+    """A circle that grows between steps presses as one that comes nearer by as much, at a foot small to its radius."""
+    ball = dc.RigidSphere((0, -2.0), 2.0)
+    growing, found = by_expression(ball), []
+    for surface in (ball, growing):
+        scene = block(surface, edge=1e-3)
+        scene.step(0, -1e-5)
+        if surface is growing:
+            surface.size.value += 1e-5
+        else:
+            surface.displacement = (0, 1e-5)
+        scene.step(0, -1e-5)
+        found.append(scene.contact.force())
+    assert found[0][1] > 0 and np.linalg.norm(found[1] - found[0]) < 1e-5 * found[0][1]
 
 
 def test_small_rotations_keep_their_digits():
@@ -466,6 +519,11 @@ def test_a_checkpoint_of_another_surface_is_refused(tmp_path):
         (lambda: block(dc.RigidSphere((0, 0, 0), 1.0)), "at the centre"),
         (lambda: dc.RigidSurface(1.0), "distance must be a function"),
         (lambda: dc.RigidSurface(len, gradient=2), "gradient must be a function"),
+        (lambda: dc.RigidSurface(coordinates(3)[1]), "scalar expression"),
+        (lambda: dc.RigidSurface(coordinates(2)[1][1]), "in 3 dimensions"),
+        (lambda: dc.RigidSurface(ufl.as_ufl(1.0)), "scalar expression of the SpatialCoordinate"),
+        (lambda: dc.RigidSurface(ufl.CellVolume(coordinates(3)[0])), "scalar expression"),
+        (lambda: dc.RigidSurface(coordinates(3)[1][2], gradient=len), "gradient must be None"),
         (lambda: block(dc.RigidSurface(lambda y: y)), "must give shape"),
         (lambda: block(dc.RigidSurface(lambda y: 0 * y[0])), "no gradient"),
         (lambda: block(dc.RigidSphere((0, 0, -1), 1.0, axis=(0, 0, 1))), "along the normal"),

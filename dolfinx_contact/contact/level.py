@@ -8,12 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from ufl.core.expr import Expr
 
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.checks import finite
 from dolfinx_contact.contact.curved import CurvedSurface
 from dolfinx_contact.contact.drive import vector
 from dolfinx_contact.contact.surface import unit
+from dolfinx_contact.contact.ufl_distance import by_ufl, is_ufl
 
 # Step of central differences over the size of the nodes' positions: rounding and truncation alike.
 STEP = float(np.cbrt(np.finfo(float).eps))
@@ -31,7 +33,8 @@ class RigidSurface(CurvedSurface):
 
     Args:
         distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface, global components
-            as long as it stands where it was made; gives ``shape=(n,)``.
+            as long as it stands where it was made; gives ``shape=(n,)``.  Or a scalar expression of UFL in
+            ``SpatialCoordinate``, numbers and ``Constant`` of any mesh; its gradient is then UFL's.
         point: About which it rotates, at which force acts, ``shape=(gdim,)``, global frame, length units.
         gradient: Function of the same positions that gives the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
             central differences, exact to ten digits.
@@ -52,12 +55,18 @@ class RigidSurface(CurvedSurface):
 
     def __init__(
         self,
-        distance: Callable[[np.ndarray], ArrayLike],
+        distance: Callable[[np.ndarray], ArrayLike] | Expr,
         point: ArrayLike = (0.0, 0.0, 0.0),
         gradient: Callable[[np.ndarray], ArrayLike] | None = None,
         axis: ArrayLike | None = None,
     ) -> None:
         super().__init__(vector("point", point))
+        if is_ufl(distance):
+            if gradient is not None:
+                raise ValueError(
+                    "gradient must be None where distance is in UFL, which derives it."
+                )
+            distance, gradient = by_ufl(distance, self.point.size)
         for name, function in (("distance", distance), ("gradient", gradient)):
             if not (callable(function) or function is gradient is None):
                 raise ValueError(f"{name} must be a function of positions, got {function!r}.")

@@ -1,0 +1,78 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A function of position written in UFL, and its gradient, as functions of arrays: compiled by DOLFINx's compiler."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from ufl.algorithms.analysis import extract_type
+from ufl.core.expr import Expr
+
+from dolfinx_contact import compat
+
+
+def is_ufl(given: object) -> bool:
+    """Whether it is an expression of UFL."""
+    return isinstance(given, Expr)
+
+
+def by_ufl(expression, gdim: int) -> tuple[_Evaluated, _Evaluated]:
+    """Values and gradient of a scalar expression in ``SpatialCoordinate``, at any positions.
+
+    The position becomes a function that is constant on each cell of a mesh with a cell for each position: the user's mesh
+    ends where the body does.  Constants count with the values that they have when the functions are called.
+
+    Args:
+        expression: Scalar, of ``SpatialCoordinate``, numbers and ``Constant``.
+        gdim: Of the positions.
+
+    Returns:
+        Functions of positions, ``shape=(gdim, n)``: values, ``shape=(n,)``, and derivatives, ``shape=(gdim, n)``.
+
+    Raises:
+        ValueError: an expression that is not scalar, or of anything else.
+    """
+    allowed = ufl.classes.SpatialCoordinate, ufl.classes.Constant, ufl.classes.ConstantValue, ufl.classes.MultiIndex  # fmt: skip
+    others = [
+        t for t in extract_type(expression, ufl.classes.Terminal) if not isinstance(t, allowed)
+    ]
+    coordinates = list(extract_type(expression, ufl.classes.SpatialCoordinate))
+    if expression.ufl_shape != () or others or [x.ufl_shape for x in coordinates] != [(gdim,)]:
+        raise ValueError(
+            f"distance in UFL must be a scalar expression of the SpatialCoordinate of a mesh in {gdim} dimensions, of numbers"
+            f" and Constants; got shape {expression.ufl_shape}, of {[*map(str, others or coordinates)]}. Give a Python"
+            " function of positions for anything else."
+        )
+    x = coordinates[0]
+    return _Evaluated(expression, x, False), _Evaluated(expression, x, True)
+
+
+class _Evaluated:
+    """Values of an expression, or its derivatives, compiled when first asked for so many positions."""
+
+    def __init__(self, expression, x, derived: bool):
+        self._given, self._x, self._derived = expression, x, derived
+        self._constants = list(extract_type(expression, ufl.classes.Constant))
+        self._room = 0
+
+    def __call__(self, y: np.ndarray) -> np.ndarray:
+        gdim, n = y.shape
+        if n > self._room:
+            self._compile(gdim, n)
+        self._position.x.array.reshape(-1, gdim)[self._nodes[:n]] = y.T
+        for own, given in zip(self._own, self._constants):
+            own.value[...] = given.value
+        found = compat.cell_values(self._compiled, self._mesh, np.arange(n, dtype=np.int32))
+        return found.T.copy() if self._derived else found.ravel()
+
+    def _compile(self, gdim: int, n: int) -> None:
+        self._mesh, self._room = compat.intervals(n), n
+        V = compat.functionspace(self._mesh, ("DG", 0, (gdim,)))
+        self._position, self._nodes = fem.Function(V), compat.cell_nodes(V)[:, 0]
+        self._own = [fem.Constant(self._mesh, np.array(c.value, float)) for c in self._constants]
+        at = ufl.variable(self._position)
+        moved = ufl.replace(self._given, {self._x: at, **dict(zip(self._constants, self._own))})
+        moved = ufl.diff(moved, at) if self._derived else moved
+        self._compiled = fem.Expression(moved, np.array([[0.5]]))
