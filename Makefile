@@ -10,7 +10,8 @@
 #               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress report docs test test-rest test-ranks test-all test-cpp test-python test-wheel format stubs clean
+.PHONY: punch study stress report docs test test-rest test-slow test-ranks test-all test-cpp test-python test-wheel \
+	test-wheel-ranks format stubs clean
 
 RANKS = 1 2 3
 # tests of plain arrays, the same on every rank: they run on one alone
@@ -18,6 +19,8 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 	friction friction_cone judge return_map
 # whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
 programs = accuracy demos docs report stress structure study
+on_ranks = force history input_errors internal_variables multigrid nonlinear problem second_order \
+	shared_nodes surfaces
 no_arrays = $(arrays:%=--ignore=tests/test_%.py)
 no_programs = $(programs:%=--ignore=tests/test_%.py)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -44,11 +47,14 @@ test: .venv/ready
 	tools/ctest example
 
 # what make test leaves out; it needs make test to come first
-test-rest: test-cpp test-ranks
+test-rest: test-cpp test-slow test-ranks
+
+test-slow: .venv/ready
+	tools/mpitest .venv 1 -m slow
 
 test-ranks: .venv/ready
 	tools/mpitest .venv 2 -m "not slow" $(programs:%=tests/test_%.py)
-	for n in 1 2; do tools/mpitest .venv $$n -m slow || exit 1; done
+	tools/mpitest .venv 2 -m slow
 	tools/mpitest .venv 3 -m "not slow" $(no_arrays) $(no_programs)
 
 test-all: test
@@ -60,10 +66,12 @@ test-cpp: .venv/ready
 test-python: .venv/ready
 	for n in $(RANKS); do tools/mpitest .venv $$n $(ARGS) || exit 1; done
 
-# those of the Python tests that touch DOLFINx, on the newest one on PyPI
+# those of the Python tests that touch DOLFINx, on the newest one on PyPI; on 2 ranks a feature of each kind
 test-wheel: .venv-wheel/ready
 	tools/mpitest .venv-wheel 1 -m "not slow" $(no_arrays) $(ARGS)
-	tools/mpitest .venv-wheel 2 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
+
+test-wheel-ranks: .venv-wheel/ready
+	tools/mpitest .venv-wheel 2 -m "not slow" $(on_ranks:%=tests/test_%.py) $(ARGS)
 
 format: .venv/ready
 	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')
