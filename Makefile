@@ -19,8 +19,8 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 	friction friction_cone judge return_map
 # whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
 programs = accuracy demos docs report stress structure study
-on_ranks = force history input_errors internal_variables multigrid nonlinear problem second_order \
-	shared_nodes surfaces
+# of these a few features, on several ranks of another DOLFINx: few, as meshes leave communicators behind
+on_ranks = force history internal_variables multigrid nonlinear problem spence surfaces
 no_arrays = $(arrays:%=--ignore=tests/test_%.py)
 no_programs = $(programs:%=--ignore=tests/test_%.py)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
