@@ -309,3 +309,80 @@ def test_a_face_of_the_groove_may_be_driven_by_force(mu):
         scene.apply(Push(down=0.05))
         problem.solve()
         assert scene.contacts[0].force() @ scene.normals[0] == pytest.approx(force, rel=1e-7)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_an_edge_on_circles_tends_to_one_on_planes(solver):
+    """Forces of a groove of two circles differ from those of its tangent planes as the inverse of the radius."""
+    missed, way, planes = [], (Push(), Push(across=0.3), Push(down=1.2)), None
+    for radius in (None, 1e3, 1e4):
+        scene = build_corner(70, (3, 3), mu=0.0)
+        if radius:
+            rounded = [dc.RigidSphere(-radius * n, radius) for n in scene.normals]
+            scene.contacts = [
+                dc.Contact(scene.V, side, circle, dc.Friction(0.0))
+                for side, circle in zip(scene.sides[1::-1], rounded)
+            ]
+        problem, forces = problem_of(scene, SOLVERS[solver]), []
+        for push in way:
+            scene.apply(push)
+            problem.solve()
+            forces += [contact.force() for contact in scene.contacts]
+        planes = planes or forces
+        missed.append(np.abs(np.subtract(forces, planes)).max() / np.abs(planes).max())
+    assert missed[1] < 0.5 and 8.0 < missed[1] / missed[2] < 12.0
+
+
+@pytest.mark.parametrize("solver", ["default", "condensed"])
+def test_walls_given_by_functions_are_walls(solver):
+    """Three faces of a box with frames for each node have the forces of planes."""
+    found = []
+    for given in (False, True):
+        scene = cube([0.2, 0.0, 0.4])
+        for k in range(3) if given else ():
+            wall = dc.RigidSurface(lambda y, k=k: y[k], axis=np.eye(3)[(k + 1) % 3])
+            side = mesh.locate_entities_boundary(scene.mesh, 2, lambda x, k=k: np.isclose(x[k], 0.0))  # fmt: skip
+            scene.contacts[k] = dc.Contact(scene.V, side, wall, scene.contacts[k].friction)
+        problem = problem_of(scene, SOLVERS[solver])
+        for pushed in ((-2e-3, 1e-4, -1e-3), (-1e-3, -1e-3, -1e-3)):
+            for value, way in zip(scene.held, pushed):
+                value.value = way
+            problem.solve()
+        found.append([contact.force() for contact in scene.contacts])
+    assert np.abs(np.subtract(*found)).max() <= 1e-7 * np.abs(found[0]).max()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_walls_may_turn_with_the_body(solver):
+    """Groove and held faces turned together by a small angle: the forces are turned, up to the angle squared and rounding."""
+    found = []
+    for turn in (0.0, 0.5):
+        scene = build_corner(70, (3, 3), mu=0.2)
+        problem = problem_of(scene, SOLVERS[solver])
+        for push in (Push(), Push(across=0.3)):
+            scene.apply(Push(across=push.across, turn=turn))
+            for contact in scene.contacts:
+                contact.plane.rotation = STRAIN * turn
+            problem.solve()
+        found.append([contact.force() for contact in scene.contacts])
+    size = np.abs(found[0]).max()
+    assert np.abs(np.subtract(*found)).max() <= 4 * STRAIN * size
+    scene.apply(Push(across=0.3))  # the groove alone is turned
+    problem.solve()
+    assert np.abs(scene.contacts[0].force() - found[0][0]).max() > 0.05 * size
+
+
+def test_a_nonlinear_body_in_the_corner_of_a_box():
+    """A body that is hardly nonlinear meets both laws and equilibrium of the linear one in every edge."""
+    scene = cube([0.2, 0.0, 0.4])
+    bent = scene.F + 1e-9 * ufl.inner(scene.u, scene.u) * ufl.inner(scene.u, ufl.TestFunction(scene.V)) * ufl.dx  # fmt: skip
+    problem = dc.ContactProblem(bent, scene.u, scene.contacts, scene.bcs)
+    assert problem.body.nonlinear
+    judge = CornerJudge(SimpleNamespace(V=scene.V, u=scene.u, F=scene.F, bcs=scene.bcs, contacts=scene.contacts, E=1e3, length=1.0,
+                                        normals=list(np.eye(3)), mu=[0.2, 0.0, 0.4], p=[None] * 3, axes=None))  # fmt: skip
+    for pushed in ((-2e-3, 1e-4, -1e-3), (-1e-3, -1e-3, -1e-3), (-2e-3, -1e-3, 0.0)):
+        for value, way in zip(scene.held, pushed):
+            value.value = way
+        step = problem.solve()
+        verdict = judge.verdict()
+        assert verdict.accepts(max(TOL, step.error)), verdict.defects
