@@ -253,8 +253,12 @@ def test_linear_solver_is_the_users_choice():
     other, scene = run(petsc_options=options, petsc_options_prefix="mine_")
     assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
     assert scene.problem.solve().solver.startswith("FixedPoint (without a factorisation")
-    with pytest.raises(dc.LinearSolverError, match="ksp_max_it"):
-        run(petsc_options={**options, "ksp_max_it": 1})
+    for solver, told in (
+        (None, "ksp_max_it.*factorisation"),
+        (dc.CondensedNewton(), "factorisation"),
+    ):
+        with pytest.raises(dc.LinearSolverError, match=told):
+            run(petsc_options={**options, "ksp_max_it": 1}, solver=solver)
 
 
 @pytest.mark.parametrize("case", CASES)

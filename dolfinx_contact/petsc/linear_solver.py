@@ -78,6 +78,19 @@ class LinearSolverError(RuntimeError):
     """
 
 
+def check_solved(ksp, options=None) -> None:
+    """Raise ``LinearSolverError`` if the last solve of a ``PETSc.KSP`` did not converge."""
+    if ksp.getConvergedReason() >= 0:
+        return
+    given = "" if options is None else f"; options {options}"
+    direct = ksp.getType() == "preonly"
+    raise LinearSolverError(
+        f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) after {ksp.getIterationNumber()} "
+        f"iterations{given}."
+        + ("" if direct else f" A factorisation needs no iteration: petsc_options={DIRECT}.")
+    )
+
+
 class LinearSolver:
     """A matrix and the PETSc solver that its user's options describe.
 
@@ -149,11 +162,7 @@ class LinearSolver:
         finally:  # others use the KSP, too, also after a solve that was interrupted
             self.ksp.setTolerances(rtol=rtol)
             self.ksp.setInitialGuessNonzero(False)
-        if self.ksp.getConvergedReason() < 0:
-            raise LinearSolverError(
-                f"PETSc's linear solver failed (KSPConvergedReason {self.ksp.getConvergedReason()}) "
-                f"after {self.ksp.getIterationNumber()} iterations; options {self._options}."
-            )
+        check_solved(self.ksp, self._options)
         return self._right.array_r.copy()
 
     def apply(self, b: np.ndarray) -> np.ndarray:

@@ -9,6 +9,8 @@ import os
 import numpy as np
 from petsc4py import PETSc
 
+from dolfinx_contact.petsc.linear_solver import check_solved
+
 UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
 _MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
@@ -176,11 +178,7 @@ def block_solver(ksp):
             left.array_w[:] = 0.0
             left.array_w[column[here] - first] = value[here]
             ksp.solve(left, right)
-            if ksp.getConvergedReason() < 0:
-                raise RuntimeError(
-                    "PETSc's linear solver failed while W was computed (KSPConvergedReason "
-                    f"{ksp.getConvergedReason()}): use solver=dc.FixedPoint()."
-                )
+            check_solved(ksp)
             result[:, k] = right.array_r
         return result
 
