@@ -19,10 +19,14 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 	friction friction_cone judge return_map
 # whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
 programs = accuracy demos docs report stress structure study
-# of these a few features, on several ranks of another DOLFINx: few, as meshes leave communicators behind
+# one test file or two of each feature that needs the mesh: make test has them on 2 ranks
+features = force friction_field held_by_contact history input_errors internal_variables multigrid \
+	nonlinear oblique_supports patch problem rewind shared_nodes surfaces
+# of these a few, on several ranks of another DOLFINx: few, as meshes leave communicators behind
 on_ranks = force history internal_variables multigrid nonlinear problem spence surfaces
 no_arrays = $(arrays:%=--ignore=tests/test_%.py)
 no_programs = $(programs:%=--ignore=tests/test_%.py)
+features_alone = $(patsubst %,--ignore=%,$(filter-out $(features:%=tests/test_%.py),$(wildcard tests/test_*.py)))
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
@@ -43,7 +47,7 @@ docs: .venv/ready
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" $(ARGS)
-	tools/mpitest .venv 2 -m "not slow" $(no_arrays) $(no_programs) $(ARGS)
+	tools/mpitest .venv 2 -m "not slow" $(features_alone) $(ARGS)
 	tools/ctest example
 
 # what make test leaves out; it needs make test to come first
@@ -53,7 +57,7 @@ test-slow: .venv/ready
 	tools/mpitest .venv 1 -m slow
 
 test-ranks: .venv/ready
-	tools/mpitest .venv 2 -m "not slow" $(programs:%=tests/test_%.py)
+	tools/mpitest .venv 2 -m "not slow" $(no_arrays) $(features:%=--ignore=tests/test_%.py)
 	tools/mpitest .venv 2 -m slow
 	tools/mpitest .venv 3 -m "not slow" $(no_arrays) $(no_programs)
 

@@ -23,6 +23,7 @@ from mechanics.judge_corners import CornerJudge
 pytestmark = pytest.mark.filterwarnings("ignore:.* are left out")
 COMM, TOL = scenes.COMM, 1e-8
 SOLVERS = {"default": None, "condensed": dc.CondensedNewton(), "fixed point": dc.FixedPoint()}
+FIXED_POINT_IS_SLOW = ["default", "condensed", pytest.param("fixed point", marks=pytest.mark.slow)]
 WAY = [Push(), Push(across=0.3), Push(across=-0.3, down=1.2, along=0.2), Push(down=-0.2), Push(across=0.1, down=0.5)]  # fmt: skip
 LAWS = {
     "smooth": dict(mu=0.0),
@@ -55,7 +56,7 @@ def test_both_laws_hold_in_the_edge_of_a_groove(angle, solver):
     judged(scene, problem_of(scene, SOLVERS[solver]))
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", FIXED_POINT_IS_SLOW)
 @pytest.mark.parametrize("law", LAWS)
 def test_both_laws_hold_along_an_edge(law, solver):
     """In space, also along the groove: without friction, with anisotropic friction, and with friction on one face alone."""
@@ -124,7 +125,7 @@ def test_a_brick_in_the_corner_of_a_box_has_the_pressures_of_hooke(solver):
         assert np.abs(contact.force() - area * pressure * normal).max() <= 1e-6 * area * pressure
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", FIXED_POINT_IS_SLOW)
 def test_a_brick_slides_on_the_walls_of_a_box(solver):
     """With other friction on each wall, and nodes of edges held along one direction: all laws hold."""
     scene = cube([0.2, 0.0, 0.4], SOLVERS[solver])

@@ -38,7 +38,10 @@ def dense_stiffness(scene):
 @pytest.mark.skipif(scenes.COMM.size > 1, reason="dense and slow: one rank is enough")
 @pytest.mark.parametrize(
     "case",
-    [pytest.param(case, marks=[pytest.mark.slow] * (case in ("B", "crossed"))) for case in CASES],
+    [
+        pytest.param(case, marks=[pytest.mark.slow] * (case in ("B", "C", "crossed")))
+        for case in CASES
+    ],
 )
 def test_programme_agrees_with_the_twin(case):
     """Every step's reactions agree with the twin's to 1e-8 and the judge accepts it; history goes along."""
