@@ -1,17 +1,20 @@
 """The punch to an accuracy that is asked for: bricks of 27 nodes on a quarter of it, graded and curved, refined until two
 differences are small.
 
-Both errors are estimated from runs that are made anyway or cost little:
+The work of friction is that of a fine mesh with large increments, plus what smaller increments change on a coarse mesh, where
+they cost little, and beyond them by extrapolation: the error of backward Euler falls with a power of the increment, the first or
+the second (docs/dissipation.md).  Forces hardly depend on increments; they are those of the fine mesh.  What is estimated:
 
 - mesh: the difference to the next coarser mesh with the same increments. That is the error of the coarser one, if the finer one is
   much better; of the finer one it is a guess on the safe side.
-- increments: twice the difference that half as large increments make on the coarser mesh, which is their error if it falls with
-  the first order (docs/dissipation.md).
+- increments: how far the extrapolated work moved when they were halved for the last time; of forces twice what halving them
+  changes. That the mesh changes what increments change is not in it.
 
 An estimate, no bound: measured against limits in notes/2026-11-22-accurate-punch.md.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import dolfinx_contact as dc
 from studies.punch.contact_map import gather
@@ -21,6 +24,7 @@ from studies.punch.model import Parameters, Punch, programme
 import numpy as np
 
 DIVISIONS = (2, 4, 6, 8, 10)  # of the meshes, one after another
+TRIAL = 1  # the place in them of the finest one on which increments are tried
 SHARE = 0.7  # of the accuracy that is left to the increments
 HALVINGS = 6  # of the increments, at most
 FACTORISED = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
@@ -33,7 +37,8 @@ class Found:
     punch: Punch
     records: list
     maps: list
-    dissipation: float
+    dissipation: float  # N mm
+    increments: float = 0.0  # of it, what smaller increments would change; the steps do not have it
     dissipation_error: float = np.inf
     force_error: float = np.inf
     tried: tuple = ()  # of every run: divisions, increments, work of friction
@@ -79,31 +84,63 @@ def accurate(parameters: Parameters, accuracy: float, shown=(), comm=None) -> Fo
             runs[level, halvings] = run(punches[level], parameters, 2**halvings, shown)
         return runs[level, halvings]
 
-    level, halvings = 1, 0
-    while True:
-        # increments first, on the coarser mesh, where they cost little
-        coarse = at(level - 1, halvings)
-        increments = difference(coarse, at(level - 1, halvings + 1))
-        if 2 * max(increments) > SHARE * accuracy and halvings < HALVINGS:
-            halvings += 1
-            continue
-        found = at(level, halvings)
-        mesh = difference(found, coarse)
-        found.dissipation_error, found.force_error = (
-            float(d + 2 * i) for d, i in zip(mesh, increments)
-        )
-        found.tried = tuple(
+    for level in range(1, len(DIVISIONS)):
+        trial = min(level - 1, TRIAL)
+        halvings, change, *increments = smaller_increments(partial(at, trial), accuracy)
+        coarse, fine = at(level - 1, halvings), at(level, halvings)
+        errors = [float(m + i) for m, i in zip(difference(fine, coarse), increments)]
+        tried = tuple(
             (DIVISIONS[tried], 2**k, of.dissipation) for (tried, k), of in sorted(runs.items())
         )
+        work = fine.dissipation + change
+        found = Found(fine.punch, fine.records, fine.maps, work, change, *errors, tried)
         if found.error <= accuracy:
             return found
-        level += 1
-        if level == len(DIVISIONS):
-            raise NotAccurate(
-                f"the estimated error is {found.error:.1e}, of the mesh {max(mesh):.1e}, of the increments "
-                f"{2 * max(increments):.1e}: more than {accuracy:g}, and the finest mesh is reached.",
-                found,
-            )
+    raise NotAccurate(
+        f"the estimated error is {found.error:.1e}, of the increments {max(increments):.1e}: more than {accuracy:g}, "
+        "and the finest mesh is reached.",
+        found,
+    )
+
+
+def smaller_increments(at, accuracy: float) -> tuple[int, float, float, float]:
+    """How often increments are halved for the forces' sake, what smaller ones change of the work then, and the errors that are left.
+
+    Args:
+        at: Run with increments halved so many times.
+        accuracy: Of work and forces, relative; increments may take SHARE of it.
+
+    Returns:
+        Halvings; change of the work, N mm; error of the work with it, and of the forces without, relative.
+    """
+    runs = [at(0), at(1)]
+    while True:
+        limit, moved = extrapolated([run.dissipation for run in runs])
+        forces = [2 * difference(one, other)[1] for one, other in zip(runs, runs[1:])]
+        enough = [k for k, error in enumerate(forces) if error <= SHARE * accuracy]
+        error = moved / max(run.dissipation for run in runs)
+        if (enough and error <= SHARE * accuracy) or len(runs) > HALVINGS:
+            break
+        runs.append(at(len(runs)))
+    halvings = (enough or [len(forces) - 1])[0]
+    return halvings, limit - runs[halvings].dissipation, error, forces[halvings]
+
+
+def extrapolated(values: list) -> tuple[float, float]:
+    """Limit of values (two or more) whose steps are halved, and how far it moved with the last one.
+
+    Richardson's extrapolation; the order is that of the last three values, between 1 and 2, or 1 without a third.
+    """
+    (*_, before, last), moved = values, abs(values[-1] - values[-2])
+    order = 1.0
+    if len(values) > 2:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.abs(np.divide(before - values[-3], last - before))
+        order = float(np.clip(np.log2(ratio), 1, 2)) if ratio > 0 else 1.0
+    limit = last + (last - before) / (2**order - 1)
+    if len(values) > 2:
+        moved = abs(limit - extrapolated(values[:-1])[0])
+    return limit, moved
 
 
 def build(parameters: Parameters, divisions: int, comm=None) -> Punch:
