@@ -24,6 +24,8 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
+    from dolfinx_contact.adaptation import Adapted as Adapted
+    from dolfinx_contact.adaptation import adapt as adapt
     from dolfinx_contact.checks import RoundingWarning as RoundingWarning
     from dolfinx_contact.contact.contact import Contact as Contact
     from dolfinx_contact.contact.curved import RigidCylinder as RigidCylinder
@@ -65,6 +67,7 @@ _NAMES = {  # by their module
     "contact.history": ["Status"],
     "contact.level": ["RigidSurface"],
     "contact.plane": ["RigidPlane"],
+    "adaptation": ["Adapted", "adapt"],
     "convergence": ["Converged", "converge"],
     "discretisation": ["Estimate", "estimate"],
     "increments": ["advance"],

@@ -14,6 +14,7 @@ from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
+import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem, graph, la
@@ -80,6 +81,18 @@ def second_order(domain: Any) -> Any:
         element = basix.ufl.element("Lagrange", cell, 2, shape=(gdim,))
     given = {"x": x, "domain" if "domain" in signature(create_mesh).parameters else "e": element}
     return create_mesh(domain.comm, cells, **given)
+
+
+def refined(domain: Any, cells: np.ndarray) -> Any:
+    """The mesh of simplices with these cells (local, owned) divided, and others as far as that takes.  Collective."""
+    tdim = domain.topology.dim
+    domain.topology.create_entities(1)
+    domain.topology.create_connectivity(tdim, 1)
+    edges = domain.topology.connectivity(tdim, 1).array.reshape(-1, 6 if tdim == 3 else 3)
+    found = dolfinx.mesh.refine(domain, np.unique(edges[cells]).astype(np.int32))
+    return (
+        found[0] if isinstance(found, tuple) else found
+    )  # with cells and facets of the old mesh since 0.9
 
 
 def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
