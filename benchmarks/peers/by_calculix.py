@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The punch, case A, as an input file of CalculiX, and its displacements back."""
+"""The punch, case A, as an input file of CalculiX, and its displacements back; bricks of 8 or of 20 nodes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,31 @@ import numpy as np
 
 from benchmarks.measurement import run_alone
 
-ORDER = [0, 1, 3, 2, 4, 5, 7, 6]  # DOLFINx's vertices of a hexahedron in the order of C3D8
+# Nodes of CalculiX' bricks among 8 or 27 that are sorted by z, then y, then x of the reference cell.
+C3D8 = [0, 1, 3, 2, 4, 5, 7, 6]
+C3D20 = [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15]
+TURNED = [
+    4,
+    5,
+    6,
+    7,
+    0,
+    1,
+    2,
+    3,
+    12,
+    13,
+    14,
+    15,
+    8,
+    9,
+    10,
+    11,
+    16,
+    17,
+    18,
+    19,
+]  # upper and lower side
 FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 STIFF = 50.0  # penalty over Young's modulus, 1/mm: pressure per overclosure and, the same, friction per slip
 
@@ -24,19 +48,22 @@ def write(file: Path, given: dict, kind: str) -> None:
 
     Args:
         file: The input file.
-        given: ``x``, ``cells``, ``contact``, ``top``, ``young``, ``poisson``, ``mu``, ``programme``.
-        kind: "node to surface" or "mortar".
+        given: ``x``, ``cells``, ``contact``, ``held``, ``young``, ``poisson``, ``mu``, ``programme``; may have ``stiff``, the penalty
+            over Young's modulus, and ``element``, the name of the bricks.
+        kind: "node to surface", "surface to surface" or "mortar".
     """
-    young, penalty = given["young"], STIFF * given["young"]
+    young, penalty = given["young"], given.get("stiff", STIFF) * given["young"]
     pressure = ["HARD"] if kind == "mortar" else ["LINEAR", f"{penalty:.6e}, 1e-3"]
-    lines = _mesh(given["x"], given["cells"][:, ORDER], given["contact"], given["top"])
+    element, held = given.get("element", "C3D8"), given["held"]
+    top = held[held[:, 1] == 2, 0]  # nothing else is held along z
+    lines = _mesh(given["x"], given["cells"], given["contact"], top, element)
     lines += [
         "*MATERIAL, NAME=STEEL", "*ELASTIC", f"{young:.10e}, {given['poisson']:.10e}",
         "*SOLID SECTION, ELSET=EBODY, MATERIAL=STEEL", "*SOLID SECTION, ELSET=EPLANE, MATERIAL=STEEL",
         "*SURFACE INTERACTION, NAME=RUB", f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={pressure[0]}", *pressure[1:],
         "*FRICTION", f"{given['mu']:.10e}, {penalty:.6e}",
         f"*CONTACT PAIR, INTERACTION=RUB, TYPE={kind.upper()}", "SLAVE, MASTER",
-        "*BOUNDARY", "NPLANE, 1, 3", "NTOP, 1, 2",
+        "*BOUNDARY", "NPLANE, 1, 3", *(f"{node + 1}, {k + 1}" for node, k in held if k < 2),
     ]  # fmt: skip
     for displacement in given["programme"]:
         lines += [
@@ -46,11 +73,12 @@ def write(file: Path, given: dict, kind: str) -> None:
     file.write_text("\n".join(lines) + "\n")
 
 
-def _mesh(x, cells, contact, top) -> list[str]:
+def _mesh(x, cells, contact, top, element) -> list[str]:
     """Nodes and elements of the body and of a block that is the plane, and their surfaces."""
+    cells = cells[:, C3D8 if cells.shape[1] == 8 else C3D20]
     edges = x[cells]
     turned = np.linalg.det(edges[:, [1, 3, 4]] - edges[:, :1]) < 0  # inside out
-    cells[turned] = cells[turned][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    cells[turned] = cells[turned][:, TURNED[: cells.shape[1]]]
     n, m, wide = len(x), len(cells), 1.6 * np.abs(x[:, :2]).max()
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     block = [(a * wide, b * wide, z) for z in (-wide, 0.0) for a, b in corners]
@@ -62,7 +90,7 @@ def _mesh(x, cells, contact, top) -> list[str]:
     ]
     return [
         "*NODE, NSET=NBODY", *numbered(1, x, ".12e"), "*NODE, NSET=NPLANE", *numbered(n + 1, block, ".12e"),
-        "*ELEMENT, TYPE=C3D8, ELSET=EBODY", *numbered(1, cells + 1),
+        f"*ELEMENT, TYPE={element}, ELSET=EBODY", *numbered(1, cells + 1),
         "*ELEMENT, TYPE=C3D8, ELSET=EPLANE", *numbered(m + 1, [range(n + 1, n + 9)]),
         "*SURFACE, NAME=SLAVE, TYPE=ELEMENT", *lower,
         "*SURFACE, NAME=MASTER, TYPE=ELEMENT", f"{m + 1}, S2", "*NSET, NSET=NTOP", *(f"{k + 1}," for k in top),
@@ -70,11 +98,13 @@ def _mesh(x, cells, contact, top) -> list[str]:
 
 
 def numbered(first: int, rows, style: str = "") -> list[str]:
-    """Lines of a number, from ``first`` on, and the values of a row."""
+    """Lines of a number, from ``first`` on, and the values of a row; of 16 entries at most, after a comma it goes on."""
     lines = (
         [str(k), *(format(value, style) for value in row)] for k, row in enumerate(rows, first)
     )
-    return list(map(", ".join, lines))
+    return [
+        ",\n".join(", ".join(line[k : k + 16]) for k in range(0, len(line), 16)) for line in lines
+    ]
 
 
 def read(file: Path, nodes: int) -> np.ndarray:

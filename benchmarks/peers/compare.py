@@ -11,6 +11,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 
+import basix
 import numpy as np
 
 import dolfinx_contact as dc
@@ -18,6 +19,7 @@ from benchmarks.measurement import Measurement, mesh_of, run_alone, timed
 from benchmarks.peers import by_calculix, by_getfem, by_siconos
 from benchmarks.report.drawing import OURS, THEIRS, bars, column
 from benchmarks.tables import chosen
+from dolfinx_contact.compat import lagrange_degree
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from mechanics import judge
@@ -97,12 +99,22 @@ def case_a(refine: int, increments: list, mesh: dict, tol=1e-10) -> Punch:
 
 
 def told(punch: Punch) -> dict:
-    """All that a peer is told."""
+    """All that a peer is told; nodes of a cell by z, then y, then x of the reference cell; held: node and component."""
     x, cells = punch.V.tabulate_dof_coordinates(), punch.mesh.topology.index_map(3).size_local
     cells = np.array([punch.V.dofmap.cell_dofs(k) for k in range(cells)])
+    points = basix.create_element(basix.ElementFamily.P, basix.CellType.hexahedron, lagrange_degree(punch.V),
+        basix.LagrangeVariant.gll_warped).points  # fmt: skip
     own, height = punch.parameters, punch.parameters.height
+    top = np.flatnonzero(x[:, 2] > height * (1 - 1e-9))
+    held = [(node, k) for node in top for k in range(3)]
+    if punch.parts > 1:  # planes of symmetry
+        held += [
+            (node, k)
+            for k in range(2)
+            for node in np.flatnonzero(np.abs(x[:, k]) < 1e-9 * own.radius)
+        ]
     return dict(
-        x=x, cells=cells, contact=punch.contact.nodes, top=np.flatnonzero(x[:, 2] > height * (1 - 1e-9)),
+        x=x, cells=cells[:, np.lexsort(points.T.round(9))], contact=punch.contact.nodes, held=np.unique(held, axis=0),
         young=own.young, poisson=own.poisson, mu=0.2, programme=np.array(programme(own)),
         cell=height / (4 * 2**own.refine),
     )  # fmt: skip

@@ -14,6 +14,14 @@ import dolfinx_contact as dc
 from studies.punch.accuracy import FACTORISED, mesh_options
 from studies.punch.model import Parameters, Punch, programme
 
+# What the runs tend to with mesh and increments, and half of the width that is left: N when loaded; N mm.  Judgements from two
+# sequences of meshes, no bounds (notes/2026-11-23-punch-limits.md).
+LIMITS = {
+    "A": dict(normal=(727.8e3, 0.7e3), tangential=(134.86e3, 0.05e3), dissipation=(395.6, 0.7)),
+    "B": dict(normal=(728.2e3, 0.7e3), tangential=(135.2e3, 0.1e3), dissipation=(353.0, 2.0)),
+    "C": dict(normal=(723.3e3, 0.6e3), tangential=(124.98e3, 0.05e3), dissipation=(511.7, 2.5)),
+}
+
 
 @dataclass(frozen=True)
 class Run:
