@@ -23,13 +23,13 @@ from tqdm import tqdm
 
 from benchmarks.measurement import ROOT, compute, current, machine, now, stored
 from benchmarks.peers import compare as peers
-from benchmarks.report import algebraic, ladder, meshes, stability
+from benchmarks.report import algebraic, ladder, meshes, stability, total
 from benchmarks.scaling import growth
 from studies import page
 
 # Each has TITLE, plan(size), evaluate(results), figure(data) with its CAPTION, and tables(data).
 SECTIONS = dict(
-    algebraic=algebraic, meshes=meshes, peers=peers, growth=growth, ladder=ladder, stability=stability
+    total=total, algebraic=algebraic, meshes=meshes, peers=peers, growth=growth, ladder=ladder, stability=stability
 )  # fmt: skip
 DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
 INTRODUCTION = (
@@ -95,15 +95,26 @@ def write(report: dict, file: Path, directory: Path) -> dict[str, str]:
             captions[name] = of.CAPTION
             parts.append(page.picture(drawing, of.CAPTION))
             parts += map(page.table, of.tables(data))
-        parts += remarks(section)
+        parts += remarks(section, report["machine"])
     machine_rows = [{"": key, " ": value} for key, value in report["machine"].items()]
     parts += ["<h2>Machine</h2>", page.table(machine_rows)]
     page.write(file, "dolfinx_contact: error against run time", parts)
     return captions
 
 
-def remarks(section: dict) -> list[str]:
-    """What failed, what was not run, when it was measured."""
+def joined(old: dict, report: dict) -> dict:
+    """A report with the sections of an older one that it does not have; those say on which machine, if on another one."""
+    sections = {}
+    for name in SECTIONS:
+        if name in report["sections"]:
+            sections[name] = report["sections"][name]
+        elif name in old["sections"]:
+            sections[name] = dict(machine=old["machine"]) | old["sections"][name]
+    return report | dict(sections=sections)
+
+
+def remarks(section: dict, machine: dict) -> list[str]:
+    """What failed, what was not run, when it was measured, and what its machine had other than the report's."""
     bad = [f"Failed: {name}: {text[-300:]}" for name, text in section["failed"].items()]
     for key, said in NAMED.items():
         if section[key]:
@@ -111,6 +122,12 @@ def remarks(section: dict) -> list[str]:
     when = "; ".join(f"{day} ({count})" for day, count in section["measured"].items())
     load = f"at a load average of up to {section['load'][0] or 0:.1f}"
     measured = page.paragraph(f"Measured {when}, in {section['seconds']:.0f} s, {load}.")
+    if other := {
+        key: value for key, value in section.get("machine", {}).items() if machine.get(key) != value
+    }:
+        measured += page.paragraph(
+            "Machine: " + ", ".join(f"{key} {value}" for key, value in other.items()) + "."
+        )
     return [*(page.paragraph(text, "bad") for text in bad), measured]
 
 
@@ -123,6 +140,7 @@ def main(argv=None) -> Path:
     add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
     add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
     add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
+    add("--keep", action="store_true", help="sections that are not measured: as report.json of the output has them")  # fmt: skip
     add("--redraw", action="store_true", help="measure nothing, draw what report.json of the output has")  # fmt: skip
     options = parser.parse_args(argv)
     quick = ROOT / "results" / "report-quick"
@@ -139,6 +157,8 @@ def main(argv=None) -> Path:
         records = run(plans, kept, options.minutes)
         sections = {name: evaluated(name, of) for name, of in records.items()}
         report = dict(date=now(), size=options.size, machine=machine(), sections=sections)
+        if options.keep and file.exists():
+            report = joined(json.loads(file.read_text()), report)
     figures.mkdir(parents=True, exist_ok=True)
     report["figures"] = write(report, output / "report.html", figures)
     file.write_text(json.dumps(report, indent=1) + "\n")
