@@ -255,10 +255,12 @@ def test_boundary_values_that_were_not_reached_are_no_solution():
         scene.problem.solve()
 
 
-def test_no_contact_at_all():
+@pytest.mark.parametrize("options", [None, MULTIGRID], ids=["factorised", "multigrid"])
+def test_no_contact_at_all(options):
     """A rubber block that hangs from its top goes with it, as far as one likes in one step."""
     scene = block(cells=(4, 3), held=True)
-    problem = dc.ContactProblem(scene.F, scene.u, [], bcs=scene.problem.body.bcs)
+    bcs = scene.problem.body.bcs
+    problem = dc.ContactProblem(scene.F, scene.u, [], bcs=bcs, petsc_options=options)
     move(scene, 3.0, -2.0)
     problem.solve()
     np.testing.assert_allclose(scene.u.x.array.reshape(-1, 2) - [3.0, -2.0], 0.0, atol=1e-9)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.solvers.border import Border
@@ -76,6 +77,7 @@ class ContactPreconditioner:
             blocks = springs[:, :, None] * np.eye(contact.points.dim)
             matrix = contact.points.matrix(blocks).tocsr()
             S = matrix if S is None else S + matrix
+        S = sparse.csr_matrix((self._body.size,) * 2) if S is None else S
         S.resize(self._body.size, K.getSize()[1])
         indices = K.getOwnershipRange()[0] + S.indices
         csr = (S.indptr.astype(PETSc.IntType), indices.astype(PETSc.IntType), S.data)
