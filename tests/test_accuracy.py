@@ -30,11 +30,10 @@ from studies.punch.accuracy import (
     smaller_increments,
 )
 from studies.punch.contact_map import gather
+from studies.punch.limits import LIMITS
 from studies.punch.mesh import CONTACT, punch_mesh
 
 COMM = MPI.COMM_WORLD
-# N mm, work of friction and its half width: notes/2026-11-23-punch-limits.md
-LIMITS = {"A": (395.6, 0.7), "B": (353.0, 2.0), "C": (511.7, 2.5)}
 
 
 @pytest.fixture
@@ -145,7 +144,7 @@ def test_forces_decide_the_increments_of_the_steps_and_work_is_extrapolated():
 def test_accuracy_that_is_asked_for(case):
     """The work of friction is within the estimate of its limit, and the estimate within what was asked."""
     found = accurate(Parameters(case=case, tol=1e-8), 0.05)
-    limit, width = LIMITS[case]
+    limit, width = LIMITS[case]["dissipation"]
     assert found.error <= 0.05
     assert abs(found.dissipation - limit) <= found.dissipation_error * limit + width
     assert found.tried[-1][:2] == (4, 1) and len(found.tried) == 3

@@ -17,28 +17,8 @@ from benchmarks.measurement import run_alone
 # Nodes of CalculiX' bricks among 8 or 27 that are sorted by z, then y, then x of the reference cell.
 C3D8 = [0, 1, 3, 2, 4, 5, 7, 6]
 C3D20 = [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15]
-TURNED = [
-    4,
-    5,
-    6,
-    7,
-    0,
-    1,
-    2,
-    3,
-    12,
-    13,
-    14,
-    15,
-    8,
-    9,
-    10,
-    11,
-    16,
-    17,
-    18,
-    19,
-]  # upper and lower side
+# Upper and lower side exchanged.
+TURNED = [4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19]  # fmt: skip
 FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 STIFF = 50.0  # penalty over Young's modulus, 1/mm: pressure per overclosure and, the same, friction per slip
 
