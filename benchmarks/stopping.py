@@ -71,7 +71,7 @@ def flat_punch(cells: int, parts: int, order: int = 1) -> float:
 
 
 def ball(cells: int, parts: int) -> float:
-    problem = ball_on_flat(flat.quarter_block(cells), 1)
+    problem = ball_on_flat(flat.scene(cells), 1)
     return abs(float(problem.contacts[0].force()[2]))
 
 
@@ -84,7 +84,7 @@ def paper(case: str):
 
 def scenes() -> dict:
     """Function, meshes, halvings and true value."""
-    cells = (4, 8, 16, 32)  # first order
+    cells = (4, 8, 16, 32, 64, 128)  # first order
     slipped = cylinder(FINEST, 16, 0.3, 2)[1]
     return {
         "cylinder of Hertz, 2-D: force": (
@@ -96,9 +96,9 @@ def scenes() -> dict:
         "partial slip, 2-D: work": (lambda n, k: cylinder(n, k, 0.3)[1], cells, 5, slipped),
         "flat punch, 2-D: moment": (
             flat_punch,
-            (*cells, 64),
+            (*cells, 256),
             0,
-            2 * flat_punch(64, 1, 2) - flat_punch(32, 1, 2),
+            2 * flat_punch(128, 1, 2) - flat_punch(64, 1, 2),
         ),
         "ball on flat, 3-D: force": (ball, (4, 8, 16), 0, flat.FORCE / 4),
         "paper's punch, A: work": (paper("A"), (2, 4, 6, 8), 5, LIMITS["A"]["dissipation"][0]),
