@@ -25,7 +25,7 @@ pytest.importorskip("tqdm")
 from studies import page
 from studies.punch import Parameters, Punch, programme
 from studies.punch import __main__ as study_punch
-from studies.punch.contact_map import ContactMap
+from studies.punch.contact_map import ContactMap, gather, mirrored
 from studies.punch.measures import hysteresis, plateau, zones
 from studies.punch.run import EnergyBalance, Run, compute
 from studies.punch.work import TERMS, comparison, mesh_orders
@@ -223,6 +223,45 @@ def test_zones_are_pieces_connected_by_edges():
     run = strip([2, 2, 2, 2, 2])
     run.disc(1).slip_increment[0] = (0.1, 0)  # from the left end to the middle
     assert zones(run, 1).inner == pytest.approx(2 / np.hypot(2, 1))
+
+
+@pytest.mark.skipif(not ALONE, reason="maps of whole programs")
+@pytest.mark.parametrize("order", (1, 2))
+def test_mirrored_quarter_is_the_whole_disc(order):
+    """The map of a quarter, mirrored, has status where it is clear, slip and force per area of the whole punch."""
+    discs = []
+    for quarter in (False, True):
+        mesh = dict(divisions=2, layers=2, order=order, quarter=quarter)
+        punch = Punch(Parameters(case="C", loading=2, unloading=3, tol=1e-11), **mesh)
+        for displacement in programme(punch.parameters)[:4]:
+            punch.press(displacement)
+        discs.append(gather(punch))
+    whole, found = discs[0], mirrored(discs[1])
+    at = np.linalg.norm(found.x[:, None] - whole.x[None], axis=2)
+    node = at.argmin(axis=1)
+    assert at.min(axis=1).max() < 1e-6 and set(node) == set(range(len(whole.x)))
+    assert len(found.faces) == len(whole.faces)
+    clear = np.abs(whole.load_function[node]) > 1e-5 * np.abs(whole.load_function).max()
+    assert (found.status[clear] == whole.status[node][clear]).all() and len(
+        set(whole.status[node][clear])
+    ) >= 1
+    scale = np.abs(whole.reaction).max()
+    areas = found.area()[:, None], whole.area()[node, None]
+    np.testing.assert_allclose(
+        found.reaction / areas[0], whole.reaction[node] / areas[1], atol=1e-5 * scale
+    )
+    np.testing.assert_allclose(
+        found.slip_increment,
+        whole.slip_increment[node],
+        atol=1e-5 * np.abs(whole.slip_increment).max(),
+    )
+    assert found.mean_pressure() == pytest.approx(whole.mean_pressure(), rel=1e-6)
+    corners = found.x[found.faces]
+    edge = np.roll(corners, -1, axis=1) - corners
+    assert (
+        edge[:, :, 0] * np.roll(edge, -1, axis=1)[:, :, 1]
+        > edge[:, :, 1] * np.roll(edge, -1, axis=1)[:, :, 0]
+    ).all()
 
 
 def curve(force, slip, loading):

@@ -126,6 +126,22 @@ def _four(V, ring, middle) -> list:
     return [[ring[k], ring[(k + 1) % 8], middle, ring[k - 1]] for k in range(first, 8, 2)]
 
 
+def mirrored(part: ContactMap) -> ContactMap:
+    """The whole disc of its quarter x, y > 0; nodes on the axes occur again with each part."""
+    signs = [np.array(of) for of in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    faces = [
+        (part.faces if sign.prod() > 0 else part.faces[:, ::-1]) + k * len(part.x)
+        for k, sign in enumerate(signs)
+    ]
+    vectors = [
+        np.concatenate([of * [*sign, 1.0][: of.shape[1]] for sign in signs])
+        for of in (part.x, part.reaction, part.slip_increment)
+    ]
+    status, f, area = (np.tile(of, 4) for of in (part.status, part.load_function, part.area()))
+    x, reaction, slip = vectors
+    return ContactMap(x, np.concatenate(faces), reaction, slip, status, f, area)
+
+
 def draw(maps, title, file, point) -> None:
     """Draw ``maps``, pairs of a title and a ContactMap, side by side into a file; ``point`` is where P is, mm.
 
