@@ -24,6 +24,9 @@ NAME = "SparseNewton"
 # Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT.
 NORMAL, TANGENTIAL, SHORT = 10.0, (1.0, 0.3, 0.1), 0.1
 
+# Of the parameter along the normal: with so little predictors are the reactions that the body asks for.
+TINY = 1e-12
+
 # Of a step is taken the largest half, quarter, ... after which the residual is smaller than the largest of the last
 # BEFORE ones; below SHORTEST there is none. Iterations in which the smallest error has to halve.
 BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
@@ -138,14 +141,15 @@ class _Descent:
             x: Displacement of owned degrees of freedom.
             chord: Whether the last tangent is good enough.
         """
-        step = self._step
+        step, maps = self._step, self._maps
         if not chord:
             if self._body.nonlinear and not self._stands:
                 self._body.linearise(x)
+            maps = self._following(x) if self._stands else maps
             self._stands = False
-            maps = self._closing(x) if self._free else self._maps
-            self._tangent.linearise(step.derivatives(x, maps))
-        left, carried = step.free(step.out_of_balance(x, self._maps)), np.zeros_like(x)
+            closing = self._closing(x, maps) if self._free else maps
+            self._tangent.linearise(step.derivatives(x, closing))
+        left, carried = step.free(step.out_of_balance(x, maps)), np.zeros_like(x)
         missing = step.missing(x)
         if not step.held(x):
             carried = self._tangent.multiply(missing, self._body.carried(missing))
@@ -164,9 +168,26 @@ class _Descent:
             length /= 2
         return x, 0.0
 
-    def _closing(self, x: np.ndarray) -> list:
+    def _following(self, x: np.ndarray) -> list:
+        """Maps for which nodes under load stay pressed where their plane moves off: Newton's step closes their gaps.
+
+        Let go, all would spring back at once. Where gaps close does not depend on the augmentation parameter ``rho``, as
+        long as the predictor ``r - rho g`` is positive. With friction they are let go, along the plane, too: held, steps
+        that turn back took more iterations.
+        """
+        self._step.out_of_balance(x, [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps])
+        maps = []
+        for contact, map in zip(self._step.contacts, self._maps):
+            pressed, gap = contact.reaction[:, -1], contact.gap
+            off = (gap > 0.0) & (pressed > 0.0) & (pressed < 2 * map.normal * gap)
+            off &= contact.friction.frictionless
+            normal = np.where(off, 0.5 * pressed / np.where(off, gap, 1.0), map.normal)
+            maps.append(ReturnMap(normal, map.tangential))
+        return maps
+
+    def _closing(self, x: np.ndarray, maps) -> list:
         """Maps for which nodes that just touch do so under load: a body at rest on a plane is not to fall through."""
-        both = zip(self._step.contacts, self._maps)
+        both = zip(self._step.contacts, maps)
         return [_Closing(map, contact.gap_rounding(x)) for contact, map in both]
 
 
