@@ -32,7 +32,9 @@ FINEST = 40  # cells
 def solved(V, F, u, face, held, far, mu: float) -> tuple[dc.ContactProblem, dc.Contact]:
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(mu))
-    return dc.ContactProblem(F, u, [contact], bcs=bcs, solver=dc.CondensedNewton()), contact
+    return dc.ContactProblem(
+        F, u, [contact], bcs=bcs, solver=dc.CondensedNewton(), petsc_options=punches.FACTORISED
+    ), contact
 
 
 def body(scene, order: int):
