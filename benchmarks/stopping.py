@@ -1,7 +1,7 @@
-"""Whether ``dc.converge`` stops where a number is as accurate as asked for: seven scenes, true over asked error.
+"""Whether ``dc.converge`` stops where a number is as accurate as asked for: nine scenes, true over asked error.
 
 ``PYTHONPATH=demos python -m benchmarks.stopping FILE`` appends a line of JSON for each; docs/accuracy.md has the table.
-True values: closed form of the ball; of the cylinder second order on a mesh finer than all (and 16 times the increments), of the
+True values: closed form of the ball; of the cylinder and the block second order on a mesh finer than most (and 16 times the increments), of the
 flat punch two of them extrapolated with the first order; of the paper's punch ``LIMITS``, from studies.punch.limits.
 """
 
@@ -24,14 +24,17 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from helpers import hooke, rounded_body
+from mpi4py import MPI
 
 ASKED = (0.05, 0.02, 0.01, 0.005)
 FINEST = 40  # cells
 
 
-def solved(V, F, u, face, held, far, mu: float) -> tuple[dc.ContactProblem, dc.Contact]:
+def solved(
+    V, F, u, face, held, far, mu: float, normal=(0, 1)
+) -> tuple[dc.ContactProblem, dc.Contact]:
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
-    contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(mu))
+    contact = dc.Contact(V, face, dc.RigidPlane((0, 0), normal), dc.Friction(mu))
     return dc.ContactProblem(
         F, u, [contact], bcs=bcs, solver=dc.CondensedNewton(), petsc_options=punches.FACTORISED
     ), contact
@@ -72,6 +75,22 @@ def flat_punch(cells: int, parts: int, order: int = 1) -> float:
     return float((normal * contact.x[:, 0] ** 2).sum() / normal.sum() / 0.1**2)
 
 
+def block(
+    cells: int, parts: int, mu: float, tilt: float = 0.0, order: int = 1
+) -> tuple[float, float]:
+    """A square that is pressed on a plane and dragged, or on a tilted one without friction: normal force, work of friction."""
+    domain = mesh.create_unit_square(MPI.COMM_WORLD, cells, cells, mesh.CellType.quadrilateral)
+    foot, top = (mesh.locate_entities_boundary(domain, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1))  # fmt: skip
+    V, u, F = body((domain,), order)
+    held = fem.Constant(domain, np.zeros(2))
+    normal = (np.sin(tilt), np.cos(tilt))
+    problem, contact = solved(V, F, u, foot, held, top, mu, normal)
+    for part in np.arange(1, 4 * parts + 1) / (4 * parts):
+        held.value = (0.01 * part if mu > 0 else 0.0, -0.005)
+        problem.solve()
+    return float(contact.force() @ normal), float(contact.dissipation.sum())
+
+
 def ball(cells: int, parts: int) -> float:
     problem = ball_on_flat(flat.scene(cells), 1)
     return abs(float(problem.contacts[0].force()[2]))
@@ -102,7 +121,19 @@ def scenes() -> dict:
             0,
             2 * flat_punch(128, 1, 2) - flat_punch(64, 1, 2),
         ),
-        "ball on flat, 3-D: force": (ball, (4, 8, 16), 0, flat.FORCE / 4),
+        "block dragged, 2-D: work": (
+            lambda n, k: block(n, k, 0.3)[1],
+            (*cells, 256),
+            6,
+            block(128, 64, 0.3, order=2)[1],
+        ),
+        "block on a tilted plane, 2-D: force": (
+            lambda n, k: block(n, k, 0.0, 0.01)[0],
+            cells,
+            0,
+            block(128, 1, 0.0, 0.01, 2)[0],
+        ),
+        "ball on flat, 3-D: force": (ball, (4, 8, 16, 32), 0, flat.FORCE / 4),
         "paper's punch, A: work": (paper("A"), (2, 4, 6, 8), 5, LIMITS["A"]["dissipation"][0]),
         "paper's punch, B: work": (paper("B"), (2, 4, 6, 8), 5, LIMITS["B"]["dissipation"][0]),
         "paper's punch, C: work": (paper("C"), (2, 4, 6, 8), 5, LIMITS["C"]["dissipation"][0]),
