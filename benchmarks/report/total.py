@@ -19,11 +19,13 @@ from studies.punch.model import Parameters, programme
 
 TITLE = "Total error against seconds"
 CAPTION = (
-    "One cycle of the paper's punch on a quarter of it: relative error against the limits of mesh and increments, over "
-    "processor seconds with set-up. Grey: half the width to which a limit is known; an error below its edge says no more than "
-    "that. Peers know isotropic friction alone, case A. Sums of tangential magnitudes and nodal pressures are not defined on "
-    "C3D20R. The peak pressure is not shown: it is at the rim, where pressure is singular, and grows with every finer mesh; "
-    "the pressure at the centre of the disc takes its place, its limit from our two finest meshes."
+    "One cycle of the paper's punch, a quarter of it: relative error against the limits of mesh and increments, over processor "
+    "seconds with mesh, forms and factors; without imports and compilers, but for CalculiX, whose whole process is counted. 15 "
+    "increments unless the table says otherwise. Grey: less than half the width to which a limit is known, where an error says no "
+    "more than that. Peers know isotropic friction alone, case A, and have the same graded meshes. Lines that cross the limit "
+    "dip: the sign of an error is not drawn. Sums of tangential magnitudes and nodal pressures are not defined on C3D20R. The "
+    "peak pressure is not shown: it is at the rim of the disc, where the pressure is singular, and grows with every finer mesh; "
+    "the pressure at the centre takes its place, with a limit from our two finest meshes."
 )
 QUANTITIES = dict(
     normal="normal force, loaded", tangential="sum of tangential forces, loaded", dissipation="work of friction",
@@ -42,13 +44,12 @@ RECIPE, ADAPTED = "recipe: increments, tolerance and mesh balanced", "adapted"
 BALANCED = [[2, 1, 1, 1e-4], [4, 1, 2, 1e-4], [6, 2, 8, 1e-5], [8, 2, 8, 1e-5]]
 ASKED = (0.05, 0.02, 0.01)
 TOLERANCES = [1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1]
-# Peer, divisions and times the paper's increments, with the processor seconds after which it is stopped.
+# Peer, divisions and times the paper's increments; what is finer takes more than three minutes.
 PEERS = [
     ("GetFEM, Q1", 4, 1),
     ("GetFEM, Q1", 8, 1),
     ("GetFEM, Q2", 2, 1),
     ("GetFEM, Q2", 4, 1),
-    ("GetFEM, Q2", 6, 1),
 ]
 PEERS += [("CalculiX, C3D8", 4, 1), ("CalculiX, C3D8", 8, 1)]
 PEERS += [("CalculiX, C3D20R", n, times) for n, times in ((2, 1), (2, 2), (4, 1), (4, 2))]
