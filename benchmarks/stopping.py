@@ -123,9 +123,9 @@ def scenes() -> dict:
         ),
         "block dragged, 2-D: work": (
             lambda n, k: block(n, k, 0.3)[1],
-            (*cells, 256),
+            cells,
             6,
-            block(128, 64, 0.3, order=2)[1],
+            block(96, 32, 0.3, order=2)[1],
         ),
         "block on a tilted plane, 2-D: force": (
             lambda n, k: block(n, k, 0.0, 0.01)[0],
@@ -133,7 +133,7 @@ def scenes() -> dict:
             0,
             block(128, 1, 0.0, 0.01, 2)[0],
         ),
-        "ball on flat, 3-D: force": (ball, (4, 8, 16, 32), 0, flat.FORCE / 4),
+        "ball on flat, 3-D: force": (ball, (4, 8, 16), 0, flat.FORCE / 4),
         "paper's punch, A: work": (paper("A"), (2, 4, 6, 8), 5, LIMITS["A"]["dissipation"][0]),
         "paper's punch, B: work": (paper("B"), (2, 4, 6, 8), 5, LIMITS["B"]["dissipation"][0]),
         "paper's punch, C: work": (paper("C"), (2, 4, 6, 8), 5, LIMITS["C"]["dissipation"][0]),
