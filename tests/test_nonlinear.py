@@ -255,6 +255,33 @@ def test_boundary_values_that_were_not_reached_are_no_solution():
         scene.problem.solve()
 
 
+class Lost(Lazy):
+    """Linearises at a senseless displacement, and hands back one that nothing balances."""
+
+    def bind(self, body, *_):
+        self.body = body
+        return self
+
+    def solve(self, step):
+        x = step.start().copy()
+        x[self.body.fixed] = step.b[self.body.fixed]
+        self.body.linearise(1e40 * np.random.default_rng(0).standard_normal(x.size))
+        return SolverResult(x, 0, 0.0, "Lost")
+
+
+def test_a_senseless_trial_does_not_make_forces_small():
+    """Rounding is not that of the tangent where a solver got lost: a state out of balance stays one."""
+
+    def green(u, v, modulus):
+        E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2
+        return ufl.derivative((ufl.inner(E, E) + ufl.tr(E) ** 2) * ufl.dx(metadata=scenes.MEASURE), u, v)  # fmt: skip
+
+    scene = block(green, cells=(4, 3), solver=Lost())
+    move(scene, -0.1)
+    with pytest.raises(dc.NotConverged):
+        scene.problem.solve()
+
+
 @pytest.mark.parametrize("options", [None, MULTIGRID], ids=["factorised", "multigrid"])
 def test_no_contact_at_all(options):
     """A rubber block that hangs from its top goes with it, as far as one likes in one step."""

@@ -54,6 +54,7 @@ class NonlinearBody(ElasticBody):
         self._before = before_residual
         self._given = [*self._parameters, *self._load_parameters]
         self._place = None  # where K stands
+        self._rounding = None
         self.soft = None
 
     # -- at a displacement ---------------------------------------------------------------------
@@ -82,6 +83,9 @@ class NonlinearBody(ElasticBody):
             self.u.x.array[:] = kept
         self._hold()
         self._place = x.copy()
+        # Rounding is that of the last converged displacement: beside the tangent of a senseless trial any force is small.
+        if self._rounding is not None:
+            self._row_size = self._rounding
 
     # -- a step --------------------------------------------------------------------------------
 
@@ -96,8 +100,9 @@ class NonlinearBody(ElasticBody):
         """
         agree_on_values((*self._given, *compat.bc_constants(self.bcs)), self.comm)
         if x is not None:
-            self._place = None  # constants and coefficients may have changed
+            self._place = self._rounding = None  # constants and coefficients may have changed
             self.linearise(x)
+            self._rounding = self._row_size
             with raised_together(self.comm):
                 check_diagonal(self.diagonal(), self.V)
             if self.soft is None:
