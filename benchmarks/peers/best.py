@@ -43,10 +43,7 @@ def best(peer: str, divisions: int, times: int, cap: int) -> dict:
     punch.restart(loading=times * start.loading, unloading=times * start.unloading)
     given = told(punch)
     if element is None:
-        # Augmentation of E times the width of what belongs to a node: with one for all it stops after some steps.
-        width = np.sqrt(punch.contact.area)
-        given |= dict(cap=cap, cell=1.0, alpha=width, lsearch="simplest")
-        found = by_system(by_getfem.__file__, given)
+        found = by_system(by_getfem.__file__, given | dict(cap=cap, cell=1.0))
     else:
         found = by_calculix.solve(given | dict(element=element, stiff=STIFF), SURFACE, cap)
     row = dict(peer=peer, case="A", divisions=divisions, unknowns=unknowns(given, element), increments=len(given["programme"]),

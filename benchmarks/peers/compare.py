@@ -35,7 +35,7 @@ GETFEM = "GetFEM, basic contact brick"
 SETTINGS = {
     "CalculiX, node to surface": "C3D8, penalty 50 E/mm, increments of its own",
     "CalculiX, mortar": "C3D8, hard, stick slope 50 E/mm, increments of its own",
-    GETFEM: "nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, residual 1e-9",
+    GETFEM: "nodal, augmented Lagrangian (Alart, Curnier), r = E h, MUMPS, simplest line search, residual 1e-9",
 }
 # Peer, level of the mesh, increments, and how many of their steps.  The fine mesh: every one of three steps slips anew;
 # mortar takes minutes for the first one, GetFEM had not ended all after six.
