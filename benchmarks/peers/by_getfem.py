@@ -37,7 +37,7 @@ def punch(getfem, given):
         model.add_initialized_data(name, [float(value)])
     model.add_isotropic_linearized_elasticity_brick(mim, "u", "lame", "shear")
     support = add_supports(getfem, model, first, given, mfu.nbdof())
-    add_contact(getfem, model, first[given["contact"]], mfu.nbdof())
+    add_contact(getfem, model, first[given["contact"]], mfu.nbdof(), given)
     return model, (mesh, mfu, mim), first, support
 
 
@@ -60,7 +60,7 @@ def add_supports(getfem, model, first, given, size) -> int:
     return model.add_constraint_with_multipliers("u", "support", rows(held[~twice]), zero)
 
 
-def add_contact(getfem, model, first, size) -> None:
+def add_contact(getfem, model, first, size, given) -> None:
     """The contact brick on the rows of the contact nodes, by their first degrees of freedom."""
     n = len(first)
     normal, tangent = getfem.Spmat("empty", n, size), getfem.Spmat("empty", 2 * n, size)
@@ -71,7 +71,7 @@ def add_contact(getfem, model, first, size) -> None:
     model.add_variable("pressure", n)
     model.add_variable("friction", 2 * n)
     model.add_initialized_data("gap", np.zeros(n))
-    model.add_initialized_data("alpha", np.ones(n))
+    model.add_initialized_data("alpha", given.get("alpha", np.ones(n)))
     model.add_initialized_data("before", np.zeros(size))
     model.add_basic_contact_brick("u", "pressure", "friction", "r", normal, tangent, "mu", "gap", "alpha", 1,
         "gamma", "before")  # fmt: skip
