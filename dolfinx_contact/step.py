@@ -281,15 +281,17 @@ class LoadStep:
         before, self._before = self._before, reaction
         change = np.full(1, np.inf) if before is None else reaction - before
         cancelling = EPSILON * (self.body.cancelling(x) + acting)
+        loaded = self.statics is not None and self.statics.loads.any()
         if self.planes is not None:
             on_planes, terms = self.planes.left()
+            loaded = loaded or (np.abs(self.planes.driving()) > EPSILON * terms).any()
             mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
             left = np.append(left, on_planes[mine])
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
         errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
-        if not errors.acts and self.statics is not None and self.statics.loads.any():
-            return errors._replace(
-                error=np.inf
-            )  # the body is lost so far away that rounding hides its loads
+        if (
+            not errors.acts and loaded
+        ):  # body or plane are so far away that rounding hides the loads
+            return errors._replace(error=np.inf)
         return errors

@@ -215,6 +215,29 @@ def test_an_unbalanced_plane_is_never_converged(monkeypatch):
     assert step.measure(x).error == pytest.approx(1e-6 * load / size, rel=1e-3)
 
 
+def test_a_plane_lost_far_away_is_never_converged():
+    """Where rounding hides the force on a plane, no reactions balance it: with rounding as scale nothing seems to act."""
+    scene = free_block(("n",))
+    scene.push(0, 0, 1e-3 * E)
+    step = scene.problem.load_step()
+    step.planes.move_to(np.array([-1e20]))
+    errors = step.measure_open(np.zeros(scene.problem.body.size))
+    assert not errors.acts and not errors.within(TOL)
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-16])
+def test_a_node_that_rounding_lets_touch_does_not_hold_a_plane_back(depth):
+    """One node 1e-16 lower than the others says nothing of them: the plane begins where a node would carry the force."""
+    scene = free_block(("n",))
+    scene.plane.force = scene.axes @ np.array([0.0, 0.0, 1e-3 * E])
+    step, points = scene.problem.load_step(), scene.contact.points
+    x, forces = np.zeros(scene.problem.body.size), np.zeros((points.count, 3))
+    forces[:1, 2] = -depth
+    points.add_forces(forces, x)  # the motion of that node
+    assert step.planes.touch(x)
+    assert step.planes.moved[0] > 1e-6
+
+
 @pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
 def test_checkpoints_resets_and_failures_keep_the_plane(solver, tmp_path):
     """The plane's place is part of the history: a run continued from a file, or after a failure, goes on alike."""

@@ -201,7 +201,8 @@ class DrivenPlanes:
                 ways.append(np.array([gap, gap + push])[:, rate > 0] / rate[rate > 0])
             first, far = np.concatenate(ways, axis=1).min(axis=1)
             first, far = (self._body.comm.allreduce(float(way), op=MPI.MIN) for way in (first, far))
-            away = 0.0 <= first if near is None else near < first
+            # By less than rounding no node touches: on one alone a plane that may tilt has no equilibrium.
+            away = -NEAR * self._body.extent <= first if near is None else near < first
             if driving[motion] != 0.0 and away and first < np.inf:
                 self.move_to(self.moved + sign * far * np.eye(self.count)[motion])
                 touched = True

@@ -110,7 +110,7 @@ class CondensedBody:
         rows = q
         if step.statics is not None:
             q, placed = self._placed(step, free)
-        iterations, error, rounding = 0, np.inf, 0.0
+        iterations, error, rounding, best = 0, np.inf, 0.0, None
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             previous = error
@@ -130,7 +130,7 @@ class CondensedBody:
                 solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
                 if solved or (step.planes is not None and step.planes.beyond()):
                     break
-            if not error < previous:
+            if best is not None and not error < previous:
                 break
             best = x, force, result
             if max(error, result.change) <= step.tol:
