@@ -132,8 +132,12 @@ class CondensedBody:
                     break
             if best is not None and not error < previous:
                 break
-            best = x, force, result
-            if max(error, result.change) <= step.tol:
+            change = result.change
+            if self._shared and error <= step.tol < change:
+                # The kernel's moves reactions between contacts of a node, which changes nothing else.
+                change = min(change, next_change(step, x))
+            best = x, force, result, change
+            if max(error, change) <= step.tol:
                 break
             # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
             # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
@@ -144,11 +148,7 @@ class CondensedBody:
             anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
             moved = (result.displacement.ravel(), anchored, self._planes.driving(step))
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
-        x, force, result = best
-        change = result.change
-        if self._shared and step.measure(x).largest <= step.tol < change:
-            # The kernel's moves reactions between contacts of a node, which changes nothing else.
-            change = min(change, next_change(step, x))
+        x, force, result, change = best
         self._planes.move(step, force)
         self.past.append((rows, force, self._tied))
         forward = max(change, step.measure(x).largest)
