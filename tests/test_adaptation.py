@@ -53,7 +53,7 @@ def force():
     return 2 * found[1] - found[0]
 
 
-@pytest.mark.parametrize("accuracy", [0.05, 0.01])
+@pytest.mark.parametrize("accuracy", [pytest.param(0.05, marks=pytest.mark.slow), 0.01])
 def test_the_force_of_a_flat_punch(accuracy, force):
     """As accurate as asked for, by a force of other meshes; not a mesh sooner, and with fewer cells than uniform ones need."""
     found = dc.adapt(solved, rectangle(8), accuracy, "normal_force")

@@ -28,7 +28,14 @@ def pressed_box(domain, bottom, top, order, weight=0.0, mu=0.0):
     return dc.ContactProblem(F, u, contact, bcs, tol=1e-10)
 
 
-@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "triangle",
+        "quadrilateral",
+        *(pytest.param(c, marks=pytest.mark.slow) for c in ("tetrahedron", "hexahedron")),
+    ],
+)
 def test_an_even_stress_has_no_error(cell):
     """What both spaces contain is estimated at rounding, in forces, in the energy norm and on every cell."""
     scene = box(cell)

@@ -14,6 +14,7 @@ from mechanics.scenes import build, problem_of
 COMM = scenes.COMM
 E, TOL = 210e3, 1e-10
 SOLVERS = {"default": None, "fixed point": dc.FixedPoint(), "paper's map": dc.FixedPoint(map="bipotential")}  # fmt: skip
+OF_EACH = ["default", "fixed point", pytest.param("paper's map", marks=pytest.mark.slow)]
 CELLS = {3: (4, 4, 2), 2: (4, 3)}
 
 
@@ -33,7 +34,7 @@ def free_block(free, dim=3, **options):
     return scene
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", OF_EACH)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_pressed_block_has_the_pressure_force_over_area(dim, solver):
     """Without Poisson's effect: pressure F / A everywhere, and the plane rises by F h / (E A)."""
@@ -45,7 +46,7 @@ def test_a_pressed_block_has_the_pressure_force_over_area(dim, solver):
         assert scene.force()[-1] == pytest.approx(load, rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", OF_EACH)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_stroke_under_dead_weight_is_resisted_by_mu_times_it(dim, solver):
     """Normal force prescribed, stroke prescribed: once the block slides, friction is mu N, N stays."""
@@ -59,7 +60,7 @@ def test_a_stroke_under_dead_weight_is_resisted_by_mu_times_it(dim, solver):
     assert scene.force()[0] == pytest.approx(0.3 * load, rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", OF_EACH)
 @pytest.mark.parametrize("case", ["isotropic", "not associated", "in the plane"])
 def test_forces_of_a_displacement_driven_run_lead_back_to_its_displacements(case, solver):
     """A plane that is given the forces which a prescribed programme needed goes through the same programme."""
@@ -137,7 +138,7 @@ def test_no_state_beyond_gross_sliding(dim, solver):
         assert scene.force()[0] == pytest.approx(0.24 * load, rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", OF_EACH)
 def test_a_spring_in_series(solver):
     """Body and spring share the drive: R = F + k (drive - u) with R = E A u / h; pulled off, the spring alone holds."""
     scene = free_block(("n",), mu=0.0, p=None, nu=0.0, solver=SOLVERS[solver])
@@ -154,7 +155,7 @@ def test_a_spring_in_series(solver):
         assert (scene.contact.reaction == 0).all()
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", OF_EACH)
 def test_a_pulled_spring_slides_at_mu_n(solver):
     """A slider pulled by a spring: once it slides friction is mu N, and the spring is stretched by mu N / k."""
     scene = free_block(("t1", "n"), mu=0.3, p=None, solver=SOLVERS[solver])

@@ -260,6 +260,7 @@ def test_whether_loads_can_be_held_is_what_a_linear_programme_says():
     assert seen == {0, 2}
 
 
+@pytest.mark.slow
 def test_friction_at_its_limit_is_decided_in_every_direction():
     """Pushed by a little less or more than mu N along any direction: statics say which, and name the translation."""
     scene, random = Loose(3), np.random.default_rng(5)

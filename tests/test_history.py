@@ -267,6 +267,7 @@ np.save({result!r}, scene.contact.reaction)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMM.size > 1, reason="starts processes of its own")
 def test_killed_run_continues_to_the_same_bits(tmp_path):
     """A process that is killed after a step, started again, ends with the bits of one never killed."""

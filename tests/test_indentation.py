@@ -4,6 +4,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
+import pytest
 import ufl
 from demo_indentation import SIZE, YIELD, YOUNG, half_plane, indent
 from dolfinx import fem
@@ -42,6 +43,7 @@ def pushed(scene, depths):
         scene.law.after_step(scene.u)
 
 
+@pytest.mark.slow
 def test_the_punch_as_boundary_values():
     """Loaded, partly unloaded and loaded again forces are those of Newton's method without contact; taken off, the imprint stays."""
     depths = YIELD / YOUNG * np.array([2.0, 6, 12, 11, 14])

@@ -139,7 +139,7 @@ def test_the_plane_pushes_with_the_derivative_of_the_energy():
     assert forces[2] == pytest.approx((energies[1] - energies[0]) / 2e-4, rel=1e-6)
 
 
-@pytest.mark.parametrize("gdim", [2, 3])
+@pytest.mark.parametrize("gdim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_pressure_that_follows(gdim):
     """Under a pressure on the deformed top the stress is uniform, the reaction pressure times deformed area."""
 
@@ -208,6 +208,7 @@ def test_thermal_strain():
     assert type(scene.problem.body) is ElasticBody
 
 
+@pytest.mark.slow
 def test_a_step_that_is_too_large_is_refused():
     """A top pushed through the plane: an error, the last state in place, and the next step as if nothing had been."""
     forces = []

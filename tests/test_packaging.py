@@ -138,6 +138,7 @@ def test_no_dolfinx_is_no_refusal():
         assert (result.returncode, result.stdout, result.stderr) == (1, "", "")
 
 
+@pytest.mark.slow
 def test_kernel_without_eigen_says_what_is_missing(tmp_path):
     """Where CMake finds no Eigen, its message names Eigen and how to get it."""
     cmake = shutil.which("cmake", path=f"{sys.prefix}/bin:{os.environ['PATH']}")

@@ -99,6 +99,7 @@ def test_units_scale_the_answer_and_nothing_else(length, modulus):
     assert np.abs(scaled - expected).max() <= 1e-8 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_scale_of_p_and_metric_do_not_change_the_answer():
     """Only the ratio p_y/p_x is physical, and rho is numerical."""
     reference, _ = run()
@@ -226,6 +227,7 @@ def test_failed_step_leaves_the_last_state_and_its_record(cap, iterations):
     assert scene.problem.solve().error <= scene.problem.tol
 
 
+@pytest.mark.slow
 def test_wrong_derivative_is_never_taken_for_convergence():
     """The reported equilibrium residual is assembled from F itself: a wrong J cannot hide."""
     import ufl

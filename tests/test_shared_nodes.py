@@ -48,7 +48,7 @@ def judged(scene, problem, way=WAY):
     return judge
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", FIXED_POINT_IS_SLOW)
 @pytest.mark.parametrize("angle", [1, 30, 90, 170])
 def test_both_laws_hold_in_the_edge_of_a_groove(angle, solver):
     """In the plane, with friction: pressed, dragged to both sides, lifted and pressed again."""
@@ -299,7 +299,7 @@ def test_contacts_that_share_no_node_have_no_nodal_problems():
         dc.ContactProblem(scene.F, scene.u, twice, scene.bcs)
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("mu", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_a_face_of_the_groove_may_be_driven_by_force(mu):
     """The force of its contact, nodes of the edge among it, is the given one along the normal."""
     scene = build_corner(90, (3, 3), mu=mu)
@@ -353,7 +353,7 @@ def test_walls_given_by_functions_are_walls(solver):
     assert np.abs(np.subtract(*found)).max() <= 1e-7 * np.abs(found[0]).max()
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", FIXED_POINT_IS_SLOW)
 def test_walls_may_turn_with_the_body(solver):
     """Groove and held faces turned together by a small angle: the forces are turned, up to the angle squared and rounding."""
     found = []

@@ -70,6 +70,7 @@ def test_errors_are_those_of_the_limits(record):
     assert all(re.fullmatch(r"\d{4}-\d\d-\d\d, \w+\+?", when) for when in record["measured"])
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_record(record, tmp_path):
     """What is committed is what the record draws, to the byte where the version of matplotlib is the same."""
     committed = (FOLDER / "total.svg").read_text()
