@@ -33,6 +33,9 @@ EPSILON = np.finfo(float).eps / 2  # of one operation
 # Rounding is an estimate: errors up to this many times as large may be no more than that.
 ROUNDED = 2.0
 
+# Part of the forces that act above which rounding may hide that loads are not balanced.
+BLIND = 1e-3
+
 
 class NodalStiffness(NamedTuple):
     """Blocks of the stiffness at the contact nodes, local frame, force per length."""
@@ -54,6 +57,11 @@ class Errors(NamedTuple):
     def largest(self) -> float:
         """The larger one of both errors; NaN if either is."""
         return float(np.maximum(self.error, self.slip_error))
+
+    @property
+    def blind(self) -> bool:
+        """Whether rounding may hide that loads are not balanced."""
+        return not self.acts or self.rounding > BLIND
 
     def within(self, tol: float) -> bool:
         """Whether both are at most ``tol``, or as small as double precision allows."""

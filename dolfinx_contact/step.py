@@ -281,17 +281,18 @@ class LoadStep:
         before, self._before = self._before, reaction
         change = np.full(1, np.inf) if before is None else reaction - before
         cancelling = EPSILON * (self.body.cancelling(x) + acting)
-        loaded = self.statics is not None and self.statics.loads.any()
         if self.planes is not None:
             on_planes, terms = self.planes.left()
-            loaded = loaded or (np.abs(self.planes.driving()) > EPSILON * terms).any()
             mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
             left = np.append(left, on_planes[mine])
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
         errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
-        if (
-            not errors.acts and loaded
-        ):  # body or plane are so far away that rounding hides the loads
-            return errors._replace(error=np.inf)
-        return errors
+        return errors._replace(error=np.inf) if self._lost(errors) else errors
+
+    def _lost(self, errors: Errors) -> bool:
+        """Whether body or planes are so far away that rounding hides the loads on them: no state is one then."""
+        loads = [] if self.statics is None else [self.statics.loads]
+        if self.planes is not None:  # of springs the force would be as large as the way is far
+            loads.append(self.planes.driving()[self.planes.springs == 0.0])
+        return errors.blind and any(load.any() for load in loads)

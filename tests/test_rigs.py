@@ -8,6 +8,8 @@ import scenes
 from test_surfaces import E, block
 
 import dolfinx_contact as dc
+from dolfinx_contact.contact.plane_balance import PlaneBalance
+from mechanics.rigs import Load, build_rig
 
 COMM = scenes.COMM
 SOLVERS = {"default": None, "fixed point": dc.FixedPoint()}
@@ -177,6 +179,28 @@ def test_the_weight_acts_at_the_point():
         scene.step(0, 0, 0)
     assert moved.rotation == pytest.approx(plane.rotation, rel=1e-4, abs=1e-14)
     assert other.contact.reaction[:, 2] == pytest.approx(one.contact.reaction[:, 2], abs=1e-7)
+
+
+@pytest.mark.parametrize("weight", [1e-6, 1e-3, 1.0])
+def test_a_platen_finds_a_foot_that_is_flat_to_rounding(weight):
+    """One node of it is drawn a last digit below the plane: the others are touched all the same, and carry the weight."""
+    rig = build_rig(weight=weight, free=("n", "r1", "r2"))
+    asked = rig.apply(Load())
+    step = dc.ContactProblem(rig.F, rig.u, [rig.contact], rig.bcs).solve()
+    assert rig.contact.force()[2] == pytest.approx(asked.force[2], rel=1e-9)
+    assert rig.contact.moment()[:2] == pytest.approx([0, 0], abs=1e-9 * asked.force[2])
+    assert step.counts.open == 0
+
+
+@pytest.mark.parametrize("far", [1e8, 1e10, 3e10, 1e12, 1e16])
+def test_a_platen_that_is_lost_is_in_no_state(far, monkeypatch):
+    """So far away that rounding hides the weight nothing is in balance: the error says so, whatever one node carries."""
+    scene, plane = platen(("n", "r1", "r2"))
+    scene.step(0, 0, 0)
+    step, x = scene.problem.load_step(), scene.u.x.array[: scene.problem.body.size].copy()
+    monkeypatch.setattr(PlaneBalance, "reach", lambda self: None)  # it stays there
+    step.planes.move_to(far * np.array([0.0, 0.0, -1.0]))
+    assert not step.measure(x).error < 1e-3
 
 
 @pytest.mark.parametrize("solver", [None, pytest.param(dc.FixedPoint(), marks=pytest.mark.slow)])

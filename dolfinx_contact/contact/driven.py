@@ -196,13 +196,14 @@ class DrivenPlanes:
             ways = [np.full((2, 1), np.inf)]  # to the first node; to where it carries the force
             for contact, axes in zip(self._contacts, self.axes):
                 contact.move(x)
-                gap, rate = contact.gap, sign * axes[:, -1, motion]
+                # By less than rounding none touches: on one node alone a plane that may tilt has no equilibrium.
+                touching = np.abs(contact.gap) <= contact.gap_rounding(x)
+                gap, rate = np.where(touching, 0.0, contact.gap), sign * axes[:, -1, motion]
                 push = 0.0 if near is not None else sign * driving[motion] / contact.rho
                 ways.append(np.array([gap, gap + push])[:, rate > 0] / rate[rate > 0])
             first, far = np.concatenate(ways, axis=1).min(axis=1)
             first, far = (self._body.comm.allreduce(float(way), op=MPI.MIN) for way in (first, far))
-            # By less than rounding no node touches: on one alone a plane that may tilt has no equilibrium.
-            away = -NEAR * self._body.extent <= first if near is None else near < first
+            away = 0.0 <= first if near is None else near < first
             if driving[motion] != 0.0 and away and first < np.inf:
                 self.move_to(self.moved + sign * far * np.eye(self.count)[motion])
                 touched = True
