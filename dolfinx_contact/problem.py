@@ -40,10 +40,10 @@ from dolfinx_contact.results.record import (
     record,
     warn_of_rounding,
 )
+from dolfinx_contact.settle import found_for, refusal, with_friction
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
-from dolfinx_contact.trial import held_by_contact, unmoved, without_reactions
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -171,12 +171,12 @@ class ContactProblem(ProblemStates):
         self._variables.settle()  # with what the user has written into them
         try:
             self._check_input()
-            self._renew_laws()
+            self._renew_laws(begin=True)
             step, found = self._search()
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not converged(step.errors, done, self.tol):
                 raise NotConverged(
-                    f"not converged: {done}, tol {self.tol:.1e}. {step.no_state() or 'Smaller load steps help most often'}.",
+                    f"not converged: {done}, tol {self.tol:.1e}. {refusal(step, self.contacts)}.",
                     done,
                     found.x,
                     [contact.reaction for contact in self.contacts],
@@ -242,17 +242,12 @@ class ContactProblem(ProblemStates):
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
-        if step.planes is not None:
-            step.planes.check()
-            if step.planes.beyond(given=True):
-                return step, unmoved(self.body, step, self._states[0])
-        if self.body.loose is not None:
+
+        def search() -> SolverResult:
             arguments = self.body, self.contacts, step, self._states[0], self.undetermined
-            return step, held_by_contact(*arguments, self._solved)
-        found = None
-        if not self.body.nonlinear:
-            found = without_reactions(self.body, self.contacts, step)
-        return step, found or self._solved(step)
+            return found_for(*arguments, self._solved)
+
+        return step, with_friction(self.contacts, step, search, self._renew_laws, self._memory)
 
     def _solved(self, step: LoadStep) -> SolverResult:
         with stage("contact: iterations"):
@@ -273,8 +268,10 @@ class ContactProblem(ProblemStates):
         check_driven(self.body, self.contacts)
         agree(self.body.comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
 
-    def _renew_laws(self) -> None:
-        """Let the solver know of friction that was exchanged since the last step.  Collective."""
+    def _renew_laws(self, begin: bool = False) -> None:
+        """Let friction follow the present state, at the ``begin`` of a step too, and the solver know of what changed.  Collective."""
+        for contact in self.contacts:
+            contact.renew_friction(begin)
         laws = self._present_laws()
         changed = any(one is not other for one, other in zip(laws, self._laws))
         if self.body.comm.allreduce(changed, op=MPI.LOR):

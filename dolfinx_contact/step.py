@@ -86,11 +86,7 @@ class LoadStep:
         return self.body.total(array)
 
     def start(self) -> np.ndarray:
-        """The start with the smallest error.
-
-        By the return map: the paper's, whose reactions differ more from those before where slip is far from the
-        normal of the cone, takes an extrapolation for worse than it is.
-        """
+        """The start with the smallest error, by the return map: the paper's takes extrapolations for worse than they are."""
         guesses = [start.copy() for start in self._starts]
         if self.statics is not None and self.statics.placed:
             guesses = [self.statics.start.copy()]
@@ -170,6 +166,10 @@ class LoadStep:
             self.errors = self.errors._replace(change=change)
         self._tell()
         return left, self.errors
+
+    def again(self, x: np.ndarray) -> None:
+        """Laws are others now: measure anew, and start from a displacement."""
+        self._measured, self._starts = None, [x]
 
     def measure(self, x: np.ndarray) -> Errors:
         """Errors of a displacement by F itself; also takes its reactions, gaps and slips.

@@ -237,9 +237,13 @@ class Contact(ContactKinematics):
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
-        work = work_of_friction(
-            self.friction, before, slipped, self.reaction, self.slip_increment, self._settled_by
-        )
+        law, law_before, slip = self.friction, self._settled_by, self.slip_increment
+        if self._begun is None:
+            work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
+        else:  # forces before the step with the law at its beginning
+            none = np.zeros_like(before)
+            work = work_of_friction(self._begun[1], before, slipped, none, slip, law_before)
+            work += work_of_friction(law, none, slipped, self.reaction, slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(self.slip_increment, axis=1)
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from inspect import signature
+
 import numpy as np
 from dolfinx import fem
 
@@ -13,17 +15,32 @@ from dolfinx_contact.law.friction import Friction, is_field
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
 
+# Arrays of a contact that coefficients may follow: arguments of callables.
+STATE = ("pressure", "slip_path", "dissipation", "wear_depth")
 
-def on_nodes(contact, friction: Friction) -> Friction:
+
+def followed(friction: Friction) -> list[str]:
+    """Names of the arrays of a contact that a law's coefficients follow."""
+    asked = {name for key in ("mu", "p") for name in _arguments(friction.given()[key])}
+    return [name for name in STATE if name in asked]
+
+
+def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=None) -> Friction:
     """The law with coefficients and axes for each owned node of a contact, which has ``V``, ``nodes``, ``x`` and ``frame``.
+
+    Args:
+        contact: The contact.
+        friction: A law with fields.
+        state: Arrays of the contact that the fields follow, by name.
+        axes: Those of the nodes, if they are known.
 
     Raises:
         ValueError: values of another shape, Functions of another mesh or of a space that is not continuous, and what
             ``Friction`` refuses.  On this rank alone.
     """
     given, k = friction.given(), friction.exponent
-    mu, p = (_coefficients(contact, name, given[name]) for name in ("mu", "p"))
-    return Friction(mu, p, k, axes=_axes(contact, given["axes"]))
+    mu, p = (_coefficients(contact, name, given[name], state) for name in ("mu", "p"))
+    return Friction(mu, p, k, axes=_axes(contact, given["axes"]) if axes is None else axes)
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
@@ -53,10 +70,21 @@ def directed(friction: Friction, gdim: int) -> bool:
     return friction.field and gdim == 3 and is_field(friction.given()["axes"])
 
 
-def _coefficients(contact, name: str, given):
+def _arguments(given) -> list[str]:
+    """Arrays of the contact that a field has as arguments; one whose arguments Python does not know has none."""
+    if not callable(given) or hasattr(given, "function_space"):
+        return []
+    try:
+        return [name for name in STATE if name in signature(given).parameters]
+    except (TypeError, ValueError):
+        return []
+
+
+def _coefficients(contact, name: str, given, state):
     if not is_field(given):
         return given
-    values, n = _values(contact, name, given), contact.nodes.size
+    state = {key: state[key].copy() for key in _arguments(given)}
+    values, n = _values(contact, name, given, state), contact.nodes.size
     if values.shape not in ((), (n,), (1, n), (2, n)):
         raise ValueError(
             f"{name} must give one value per point, shape {(n,)}, or two, {(2, n)}, for x of shape {(3, n)}, not "
@@ -68,7 +96,10 @@ def _coefficients(contact, name: str, given):
 def _axes(contact, given):
     if not is_field(given):
         return given
-    values, (n, gdim) = _values(contact, "axes", given), (contact.nodes.size, contact.points.dim)
+    values, (n, gdim) = (
+        _values(contact, "axes", given, {}),
+        (contact.nodes.size, contact.points.dim),
+    )
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
@@ -89,12 +120,12 @@ def _axes(contact, given):
     return (along / length).T.copy()
 
 
-def _values(contact, name: str, given) -> np.ndarray:
+def _values(contact, name: str, given, state) -> np.ndarray:
     """Values at the nodes, ``shape=(n,)`` or ``(components, n)``."""
     if hasattr(given, "function_space"):
         return _of_function(contact, name, given)
     n = contact.nodes.size
-    values = given(contact.x.T.copy())
+    values = given(contact.x.T.copy(), **state)
     try:
         values = np.asarray(values, dtype=float)
     except (TypeError, ValueError):

@@ -10,7 +10,7 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
-from dolfinx_contact.contact.friction_field import directed, guided, on_nodes
+from dolfinx_contact.contact.friction_field import STATE, directed, followed, guided, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
@@ -20,10 +20,15 @@ class ContactLaws(ContactHistory):
     """Friction and wear of a ``Contact``, which has space, plane, frame and nodes."""
 
     _guides: tuple | None = None
+    _field: Friction | None = None  # the law given, if it follows the state
+    _begun: tuple[Friction, Friction] | None = (
+        None  # what was given, and the law, at the beginning of the step
+    )
 
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then.
+        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, and as
+        the state goes on if they follow it.
 
         Where a support lets a node slide along one direction alone, which is none of the frame's, it has the coefficient of that direction.
         """
@@ -31,16 +36,52 @@ class ContactLaws(ContactHistory):
 
     @friction.setter
     def friction(self, friction: Friction) -> None:
-        gdim = self.V.mesh.geometry.dim
+        gdim, field = self.V.mesh.geometry.dim, None
         if getattr(friction, "field", False):
+            field = friction if followed(friction) else None
+            state = self._state(followed(friction), empty="_present" not in self.__dict__)
             with raised_together(self.comm):
                 turned = directed(friction, gdim)
-                friction = on_nodes(self, friction)
+                friction = on_nodes(self, friction, state)
                 check_law(self.plane, friction, gdim, turned)
         else:
             check_law(self.plane, friction, gdim)
-        self._given = friction
+        self._given, self._field, self._begun = friction, field, None
         self.guide(self._guides)
+
+    @property
+    def follows_pressure(self) -> bool:
+        """Whether friction follows the pressure at the end of the step."""
+        return self._field is not None and "pressure" in followed(self._field)
+
+    def renew_friction(self, begin: bool = False) -> None:
+        """Let friction that follows the state be that of the present one.  Collective.
+
+        Args:
+            begin: A step begins here.
+        """
+        if self._field is None:
+            return
+        state = self._state(followed(self._field))
+        with raised_together(self.comm):
+            friction = on_nodes(self, self._field, state, self._given.axes)
+        rows = zip((friction.mu, friction.p), (self._given.mu, self._given.p))
+        if not all(np.array_equal(one, other) for one, other in rows):
+            self._given = friction
+            self.guide(self._guides)
+        if begin:
+            self._begun = self._given, self._friction
+
+    def restore(self) -> None:
+        """Return to the last converged state; friction that follows it, too."""
+        super().restore()
+        if self._begun is not None:
+            self._given, _ = self._begun
+            self.guide(self._guides)
+
+    def _state(self, names, empty: bool = False) -> dict[str, np.ndarray]:
+        """Arrays of this contact by name; zeros, as before anything has touched, if ``empty``.  Collective."""
+        return {name: np.zeros(self.nodes.size) if empty else getattr(self, name) for name in names}
 
     def guide(self, guides: tuple | None) -> None:
         """From now on some nodes slide along one direction alone, see ``ContactPoints.guided``; on all ranks or on none."""
@@ -102,9 +143,11 @@ class ContactLaws(ContactHistory):
         self.plane.displacement = saved["plane"]
 
     def _laws(self) -> dict[str, np.ndarray]:
-        """Coefficients and axes of all nodes; plane and wear."""
-        axes = (1.0, 0.0) if self.friction.axes is None else self.friction.axes
-        rows = (self.friction.mu, self.friction.p, axes)
+        """Coefficients, of a law that follows the state those without one, and axes of all nodes; plane and wear."""
+        law = self.friction
+        if self._field is not None:
+            law = on_nodes(self, self._field, self._state(STATE, empty=True), self._given.axes)
+        rows = (law.mu, law.p, (1.0, 0.0) if law.axes is None else law.axes)
         laws = np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
         wear = np.nan if self.wear is None else self.wear.coefficient
         parts = (self.plane.described(), np.broadcast_to(wear, 2))

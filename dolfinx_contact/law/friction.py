@@ -19,7 +19,7 @@ from dolfinx_contact import _kernel
 from dolfinx_contact.attributes import Guarded, frozen
 from dolfinx_contact.checks import finite
 
-Field = Callable[[Any], Any]  # or a DOLFINx Function, which this module does not know
+Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
 
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
@@ -74,7 +74,9 @@ class Friction(Guarded):
 
     ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as DOLFINx interpolates them, that return
     values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them
-    at its own nodes when it takes the law: ``contact.friction`` has the values. Until then there are none.
+    at its own nodes when it takes the law: ``contact.friction`` has the values. Until then there are none. A callable of ``mu``
+    or ``p`` that also has an argument named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth`` gets that array of
+    the contact, ``shape=(n,)``: the law follows the state, the pressure that at the end of the step, see docs/howto/fields.md.
 
     Raises:
         ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
@@ -93,6 +95,7 @@ class Friction(Guarded):
     Example:
         >>> friction = dc.Friction(mu=(0.30, 0.15), p=(0.05, 0.20))  # along and across the axis
         >>> lubricated = dc.Friction(mu=lambda x: np.where(x[0] < 0.5, 0.3, 0.05))  # a field
+        >>> polymer = dc.Friction(mu=lambda x, pressure: 0.3 / (1 + pressure / 50.0))  # follows the pressure
     """
 
     mu: np.ndarray
@@ -116,8 +119,7 @@ class Friction(Guarded):
         self._made = True
 
     def _take(self, mu, p, k, axes) -> None:
-        given = f"mu={mu!r}, p={p!r}, k={k!r}"
-        mu = _cone(mu)
+        given, mu = (mu, p, k), _cone(mu)
         if k is not None:
             q = _q_from_exponent(mu, k)
         elif p is not None:
@@ -138,7 +140,7 @@ class Friction(Guarded):
         if q.min(initial=1.0) < _SMALLEST:
             raise ValueError(
                 f"p/mu must not differ by more than {_LARGEST} between the two directions, "
-                f"but does with {given}"
+                f"but does with mu={given[0]!r}, p={given[1]!r}, k={given[2]!r}"
             )
         self.mu, self.p = frozen(mu), frozen(q * mu)
         self.axes = None if axes is None else _unit_vectors(axes, mu)
