@@ -59,10 +59,10 @@ class ContactProblem(ProblemStates):
         contacts: The contacts; a node of an edge may belong to several.
         bcs: Dirichlet conditions; their values may change between steps.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
-        solver: ``CondensedNewton(...)`` or ``FixedPoint(...)``; None takes the first for small
-            contacts and the second for large ones, and says so in ``step.solver``.
-        tol: Largest error, slip error and forward error of a converged step, see ``dolfinx_contact.error``.
-        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation.
+        solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small
+            contacts, the second for large ones, the third for nonlinear bodies, and says so in ``step.solver``.
+        tol: Largest error, slip error and forward error of a converged step, see docs/errors.md.
+        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, of large bodies multigrid.
         petsc_options_prefix: Their prefix.
         state: Internal variables, Functions: a step that fails leaves them as they were; saved in checkpoints.
         before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and

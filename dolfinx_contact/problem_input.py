@@ -126,7 +126,9 @@ def hold(contacts, body) -> None:
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     if len(where) == 0:
         return
-    low, high = where.min(axis=0).tolist(), where.max(axis=0).tolist()
+    ends = np.array([where.min(axis=0), where.max(axis=0)])
+    ends[np.abs(ends) < 1e-12 * np.abs(ends).max()] = 0.0
+    low, high = (f"({', '.join(f'{x:.6g}' for x in end)})" for end in ends)
     if len(where) == nodes:
         raise ValueError(
             f"the normal displacement of all {nodes} contact nodes, from {low} to {high}, is fixed by boundary "

@@ -9,6 +9,7 @@ import numpy as np
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.contact.shared import shared_nodes
+from dolfinx_contact.contact.sliding import nothing_holds
 from dolfinx_contact.error import (
     EPSILON,
     Errors,
@@ -79,6 +80,8 @@ class LoadStep:
         said = "" if self.statics is None else self.statics.said
         if self.planes is not None:
             said = said or self.planes.beyond(True) or self.planes.beyond()
+            if not said and self.statics is not None:
+                said = nothing_holds(self.contacts)
         return said
 
     def total(self, array) -> np.ndarray:

@@ -262,6 +262,7 @@ def test_checkpoints_resets_and_failures_keep_the_plane(solver, tmp_path):
     assert other.plane.displacement == pytest.approx(scene.plane.displacement, rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:.* no force moves the plane")
 @pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
 def test_how_a_plane_is_driven_may_change_between_steps(solver):
     """Pressed by displacement, held by the force that took, sheared by force, then by displacement: one history."""
@@ -337,6 +338,19 @@ def test_nonsense_is_refused(mistake):
         scene.problem.solve()
     scene.plane.free, scene.plane.stiffness = ("n",), 0.0
     scene.push(0, 0, E * 1e-3)
+
+
+def test_a_force_that_drives_nothing_is_told_of_once():
+    """A plane that was never free has a force: one warning; the plane stands, and one held again is not spoken of."""
+    scene = free_block((), mu=0.3, p=None)
+    with pytest.warns(UserWarning, match="no force moves the plane") as said:
+        for _ in range(2):
+            scene.push(0, 0, E * 1e-3)
+    assert len(said) == 1 and not scene.force().any()
+    scene = free_block(("n",), mu=0.3, p=None)
+    for free in (("n",), ()):
+        scene.plane.free = free
+        scene.push(0, 0, E * 1e-3)
 
 
 def test_nothing_holds_a_plane_without_friction():

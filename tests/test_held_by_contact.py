@@ -143,6 +143,18 @@ def test_plates_clamp_a_block(dim, kind, driven):
             assert scene.contacts[1].force() @ scene.up == pytest.approx(-1e-3, rel=1e-7)
 
 
+def test_a_plate_below_a_body_that_nothing_holds_is_refused():
+    """Body and plate both move along the normal: the step that does not converge says that nothing holds them."""
+    scene = Loose(2)
+    plate = scene.contact.plane
+    plate.free, plate.force = ("n",), 1e-3 * scene.up
+    with pytest.raises(dc.NotConverged, match="leave 'n' out of its plane.free"):
+        scene.problem.solve()
+    plate.free, plate.displacement = (), np.zeros(2)
+    scene.load(0, -1e-3)
+    assert scene.contact.force() @ scene.up == pytest.approx(1e-3, rel=1e-7)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_block_that_tips_is_refused_as_a_rotation_about_its_edge(dim):
     """Friction enough, side force above half the width over half the height times the weight: it turns about its edge."""

@@ -169,6 +169,10 @@ def test_history_is_a_table_of_the_run(tmp_path):
     COMM.barrier()
     again = dc.History(scene.problem, path, points=[(0.3, 0.2, 0.0)], resume=3)
     assert again.rows == history.rows[:3]
+    with pytest.raises(
+        ValueError, match="no column 'dissipation'; there are .*contact0_dissipation"
+    ):
+        history.column("dissipation")
     with pytest.raises(ValueError, match="cannot resume"):
         dc.History(scene.problem, path, resume=9)
     with pytest.raises(ValueError, match="points must have shape"):

@@ -74,6 +74,8 @@ def bad_facets(scene, case):
         "none": np.zeros(0, dtype=np.int32),
         "strings": np.array(["bottom"]),
         "a mask": np.ones(available, dtype=bool),
+        "a tag": 3,
+        "tags": mesh.meshtags(scene.mesh, 2, inner, np.zeros(inner.size, dtype=np.int32)),
     }[case]
 
 
@@ -86,7 +88,9 @@ def bad_facets(scene, case):
         ("negative", "local indices"),
         ("out of range", "local indices"),
         ("of the wrong dimension", "local indices|not on the boundary"),
-        ("none", "empty on all ranks"),
+        ("none", "empty on all ranks.*facet_tags.values"),
+        ("a tag", r"the number 3: pass facet_tags.find\(tag\)"),
+        ("tags", r"pass facet_tags.find\(tag\)"),
         ("strings", "array of integers"),
         ("a mask", "array of integers"),
     ],

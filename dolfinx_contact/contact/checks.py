@@ -23,7 +23,8 @@ def check_space(V) -> None:
         )
     if gdim != tdim or gdim not in (2, 3):
         raise ValueError(
-            f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both."
+            f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both. Of a mesh from gmsh: a body "
+            "without a physical group of its own is left out, and a mesh in the plane needs gdim=2."
         )
     if components != gdim:
         raise ValueError(
@@ -36,6 +37,11 @@ def check_space(V) -> None:
 
 def checked_facets(facets, index_map, boundary) -> np.ndarray:
     array = np.asarray(facets)
+    if hasattr(facets, "indices") or (array.ndim == 0 and np.issubdtype(array.dtype, np.integer)):
+        given = "facet tags" if hasattr(facets, "indices") else f"the number {facets}"
+        raise ValueError(
+            f"facets must be an array of facets, got {given}: pass facet_tags.find(tag), the facets that have a tag."
+        )
     if array.size == 0:
         return np.zeros(0, dtype=np.int32)
     if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):

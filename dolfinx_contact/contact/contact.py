@@ -46,7 +46,7 @@ class Contact(ContactKinematics):
     Args:
         V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2.
         facets: Local indices of boundary facets, integers; a rank may have none.
-        plane: The ``RigidPlane``, ``RigidSphere`` or ``RigidCylinder``.
+        plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
         friction: The friction law, the same on all ranks; or on all of them one with coefficients
             per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
@@ -98,7 +98,10 @@ class Contact(ContactKinematics):
         with raised_together(mesh.comm):
             self.check(described)
             if total == 0:
-                raise ValueError("facets is empty on all ranks: name the facets that may touch.")
+                raise ValueError(
+                    "facets is empty on all ranks: name the facets that may touch. If they come from tags, "
+                    "facet_tags.values has the tags that the mesh has; if from a position, compare it with mesh.geometry.x."
+                )
         self.facets, self._geometry, self._owner = frozen(facets), self._digest(), None
         self._apart = CLEAR * np.abs(mesh.geometry.x).max(initial=0.0)
         self.reset()

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -55,6 +56,7 @@ class Drive(Guarded):
         self._rotation = frozen(np.zeros(3 if size == 3 else 1))
         self._drive = frozen(np.zeros(size))
         self._free: tuple[str, ...] = ()
+        self._ever_free = False  # or said that it is not, although a force is given
         self._force: np.ndarray | None = None
         self._moment: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
@@ -88,6 +90,7 @@ class Drive(Guarded):
                 f"plane.free must be a tuple of names among {known}, such as ({self.directions[-1]!r},), got {names!r}."
             )
         self._free = tuple(name for name in known if name in names)
+        self._ever_free = self._ever_free or bool(self._free)
 
     @property
     def force(self) -> np.ndarray | None:
@@ -210,6 +213,14 @@ class Drive(Guarded):
             raise ValueError(
                 f"plane.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
                 "one for each."
+            )
+        if not self._ever_free and not (self._force is None and self._moment is None):
+            self._ever_free = True
+            warnings.warn(
+                f"plane.force is {self._force} and plane.moment {self._moment}, but plane.free is (): no force moves the "
+                "plane, it stands where plane.displacement puts it. Name the directions that force drives, such as "
+                f"plane.free = ({self.directions[-1]!r},), if that is not meant.",
+                stacklevel=2,
             )
         moving = [motion for motion in self.motions if not motion.turns]
         if not moving or (self._force is None and all(motion.spring > 0 for motion in moving)):

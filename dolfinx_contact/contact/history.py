@@ -109,7 +109,7 @@ class ContactHistory(Guarded):
 
     @property
     def reaction(self) -> np.ndarray:
-        """Force of the plane on the body, ``shape=(n, gdim)``, local frame."""
+        """Force of the plane on each node, ``shape=(n, gdim)``, local frame, force units."""
         return self._present.reaction
 
     @property
@@ -119,17 +119,17 @@ class ContactHistory(Guarded):
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance to the plane, ``shape=(n,)``; negative is penetration."""
+        """Distance to the plane, ``shape=(n,)``, length units; negative is penetration."""
         return self._present.gap
 
     @property
     def slip_increment(self) -> np.ndarray:
-        """Slip relative to the plane since the last step, ``shape=(n, gdim - 1)``, local frame."""
+        """Slip relative to the plane in the last step, ``shape=(n, gdim - 1)``, local frame, length units."""
         return self._present.slip_increment
 
     @property
     def status(self) -> np.ndarray:
-        """A ``Status`` per node, ``shape=(n,)``."""
+        """A ``Status`` per node, ``shape=(n,)``, integers: 0 open, 1 stick, 2 slip."""
         return self._present.status
 
     @property
@@ -139,7 +139,7 @@ class ContactHistory(Guarded):
 
     @property
     def slip_path(self) -> np.ndarray:
-        """Length of the path slipped while in contact since the start, ``shape=(n,)``."""
+        """Length of the path slipped while in contact since the start, ``shape=(n,)``, length units."""
         return self._sums["slip_path"]
 
     @property

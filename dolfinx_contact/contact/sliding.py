@@ -29,6 +29,17 @@ def slides_away(planes, body, contacts, given: bool) -> str:
     return ""
 
 
+def nothing_holds(contacts) -> str:
+    """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
+    planes = [contact.plane for contact in contacts]
+    if any(not any(m.name == "n" and m.spring == 0 for m in plane.motions) for plane in planes):
+        return ""
+    return (
+        "No condition holds the body along the normal, and force moves every plane that it touches along its own: together "
+        "they fly away, or stand anywhere. Hold the body, or a plane: leave 'n' out of its plane.free"
+    )
+
+
 class _Driven:
     """One surface, its motions ``part`` of all, and the contacts on it with their columns of ``D``."""
 

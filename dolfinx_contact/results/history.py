@@ -107,7 +107,13 @@ class History:
         return row
 
     def column(self, name: str) -> np.ndarray:
-        """One column over all steps, ``shape=(steps,)``."""
+        """One column over all steps, ``shape=(steps,)``.
+
+        Raises:
+            ValueError: there is no such column; the message has the names of those there are.
+        """
+        if self.rows and name not in self.rows[0]:
+            raise ValueError(f"there is no column {name!r}; there are {', '.join(self.rows[0])}.")
         return np.array([row[name] for row in self.rows])
 
     def _totals(self, contact):
@@ -157,7 +163,7 @@ class History:
 
     def _rows_of_file(self, count: int) -> list[dict]:
         if self.path is None or not self.path.exists():
-            raise ValueError(f"cannot resume after {count} steps: {self.path} has no file.")
+            raise ValueError(f"cannot resume after {count} steps: there is no file {self.path}.")
         try:
             with open(self.path, newline="") as file:
                 rows = list(csv.DictReader(file, strict=True))

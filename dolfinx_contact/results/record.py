@@ -32,7 +32,7 @@ class Step:
 
     Attributes:
         error: What is out of balance, off the law or penetrates, over the forces that act; see
-            ``dolfinx_contact.error``.
+            docs/errors.md.
         slip_error: Defect of the slip rule, as a force over the forces that act; see the same place.
         rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
         forward_error: How far the reactions may still be from the exact ones, over the same forces: an
