@@ -12,7 +12,7 @@ version = release = installed("dolfinx_contact")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 extensions += [
     f"docs.extension.{name}"
-    for name in ("runs", "gallery", "docstrings", "headers", "formulas", "links")
+    for name in ("runs", "gallery", "docstrings", "headers", "formulas", "links", "together")
 ]
 
 root_doc = "docs/index"
@@ -25,9 +25,9 @@ nitpicky = False
 suppress_warnings = ["myst.header"]  # pages of notes begin where it suits them
 
 autodoc_member_order = "bysource"
-autodoc_typehints = (
-    "none"  # types stand in the signature of the stubs, units and shapes in the text
-)
+autodoc_typehints = "description"  # beside the name; units and shapes in the text
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
 napoleon_use_rtype = False

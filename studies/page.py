@@ -11,12 +11,13 @@ STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 1500px; margin: 2em auto; padding: 0 1em; }
 .bad { color: var(--bad); } .scroll { overflow-x: auto; } figure { margin: 2em 0; }
 img { width: 100%; min-width: 44em; background: white; } figcaption { max-width: 60em; }
-table { border-collapse: collapse; margin: 1em 0; }
+table { border-collapse: collapse; margin: 1em 0; font-size: 0.85em; } summary { margin: 1em 0; cursor: pointer; }
 td, th { border: 1px solid var(--line); padding: 0.2em 0.6em; text-align: right; vertical-align: top; }
-td { white-space: nowrap; } td.text { text-align: left; } td.long { white-space: normal; min-width: 14em; }
+td { white-space: nowrap; } .text { text-align: left; } td.long { white-space: normal; min-width: 14em; }
 p, h1, h2 { overflow-wrap: anywhere; }
 """
 LONG = 24  # letters of a text beyond which its cell may have several lines
+FOLDED = 15  # rows beyond which a table is shown when asked for
 UNITS = {"_Nmm": " [N mm]", "_mm3": " [mm³]", "_um": " [µm]"}
 
 
@@ -48,10 +49,14 @@ def table(rows: list[dict]) -> str:
     if not rows:
         return ""
     keys = [key for key in rows[0] if not all(_missing(row.get(key)) for row in rows)]
-    titles = "".join(f"<th>{html.escape(_title(key))}</th>" for key in keys)
-    lines = ["".join(_cell(row.get(key)) for key in keys) for row in rows]
+    kinds = {key: _kind([row.get(key) for row in rows]) for key in keys}
+    titles = "".join(f"<th{kinds[key]}>{html.escape(_title(key))}</th>" for key in keys)
+    lines = ["".join(_cell(row.get(key), kinds[key]) for key in keys) for row in rows]
     lines = "\n".join(f"<tr>{line}</tr>" for line in (titles, *lines))
-    return f'<div class="scroll"><table>{lines}</table></div>'
+    shown = f'<div class="scroll"><table>{lines}</table></div>'
+    if len(rows) <= FOLDED:
+        return shown
+    return f"<details><summary>Table of {len(rows)} rows</summary>{shown}</details>"
 
 
 def _title(key: str) -> str:
@@ -65,11 +70,20 @@ def _missing(value) -> bool:
     return value is None or value == "" or isinstance(value, float) and math.isnan(value)
 
 
-def _cell(value) -> str:
+def _kind(column: list) -> str:
+    """Words begin at the left, titles above them too; numbers end at the right."""
+    return (
+        ' class="text"'
+        if any(isinstance(value, (str, list, tuple)) and value for value in column)
+        else ""
+    )
+
+
+def _cell(value, kind: str) -> str:
     if _missing(value):
-        return "<td>–</td>"
+        return f"<td{kind}>–</td>"
     if isinstance(value, (int, float)):
-        return f"<td>{value if isinstance(value, int) else format(value, '.4g')}</td>"
+        return f"<td{kind}>{value if isinstance(value, int) else format(value, '.4g')}</td>"
     if isinstance(value, (list, tuple)) and all(isinstance(each, (int, float)) for each in value):
         size = max(map(abs, value), default=0)  # rounding beside the others is zero
         value = ", ".join(format(x if abs(x) > 1e-12 * size else 0.0, ".4g") for x in value)

@@ -22,6 +22,7 @@ from docs.extension.gallery import cells
 from docs.extension.headers import HEADERS, declarations, without_bodies
 from docs.extension.links import dead_links
 from docs.extension.runs import APART, blocks, run
+from docs.extension.together import together
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -256,6 +257,17 @@ def test_page_with_measured_numbers_has_a_date(page):
     """Where a page's words state times, shares or ratios, it names the day of their record."""
     words = re.sub(r"^```.*?^```$", "", TEXTS[page], flags=re.DOTALL | re.MULTILINE)
     assert not MEASURED.search(words) or DATED.search(words)
+
+
+def test_numbers_keep_their_units():
+    """No line ends between a number and its unit; words and what is no unit may be parted."""
+    kept = {
+        "6.0 %, 8.3 s": "6.0~%, 8.3~s",
+        "0.1 ± 0.2 %": "0.1~±~0.2~%",
+        "n = 4 cells": "n~=~4 cells",
+    }
+    kept |= {"2 steps of 3 mm": "2 steps of 3~mm", "353 ± 2 N mm": "353~±~2~N mm"}
+    assert {text: together(text).replace("\xa0", "~") for text in kept} == kept
 
 
 def test_cells_of_demos():

@@ -150,6 +150,19 @@ def test_lists_in_tables_are_short():
     assert ">5.193, -1, 0<" in page.table([{"point": [5.192815424335428, -1, 1.7e-16]}])
 
 
+def test_columns_of_words_begin_at_the_left_and_long_tables_are_folded():
+    """A title stands above its column, a cell without a value too; a table of many rows is shown when asked for."""
+    rows = [{"solver": "Newton", "s": 1.5}, {"solver": "", "s": None}]
+    words, number = '<td class="text">', "<td>"
+    shown = page.table(rows)
+    assert '<th class="text">solver</th><th>s</th>' in shown
+    assert (
+        f"{words}Newton</td>{number}1.5</td>" in shown and f"{words}–</td>{number}–</td>" in shown
+    )
+    assert "<details>" not in shown
+    assert "<summary>Table of 40 rows</summary>" in page.table(20 * rows)
+
+
 @pytest.mark.skipif(not ALONE, reason="one rank says it all")
 def test_variant_that_fails_is_in_the_table(tmp_path, monkeypatch):
     """A step that does not converge ends its run, not the study, is named, and is not tried again."""

@@ -119,11 +119,16 @@ def remarks(section: dict, machine: dict) -> list[str]:
     for key, said in NAMED.items():
         if section[key]:
             bad.append(f"{said}: {', '.join(section[key])}.")
-    when = "; ".join(f"{day} ({count})" for day, count in section["measured"].items())
+    when = "; ".join(
+        f"{day} ({count} record{'s' if count > 1 else ''})"
+        for day, count in section["measured"].items()
+    )
     load = f"at a load average of up to {section['load'][0] or 0:.1f}"
     measured = page.paragraph(f"Measured {when}, in {section['seconds']:.0f} s, {load}.")
     if other := {
-        key: value for key, value in section.get("machine", {}).items() if machine.get(key) != value
+        key: value
+        for key, value in section.get("machine", {}).items()
+        if machine.get(key) != value and key != "commit"  # which stands beside the date
     }:
         measured += page.paragraph(
             "Machine: " + ", ".join(f"{key} {value}" for key, value in other.items()) + "."

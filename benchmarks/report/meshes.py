@@ -114,9 +114,13 @@ def figure(data):
                 axes[3].plot(seconds, error, marker=marker, label=f"{family} refined")
         ax.set(xlabel=label, ylabel="relative error")
     axes[3].set(xlabel="processor seconds of a cycle", ylabel="error of the work of friction")
-    for ax in axes:
+    for ax, family in zip(axes, (*FAMILIES, None)):
         logarithmic(ax)
         ax.legend(fontsize=9)
+        if family in ("meshes", "increments") and ax.get_xscale() == "log":
+            widths = column(data[family], "x")
+            ax.set_xticks(widths, [f"{width:.3g}" for width in widths])
+            ax.set_xticks([], minor=True)
     return figure
 
 

@@ -20,7 +20,7 @@ from studies.punch.model import Parameters, programme
 TITLE = "Total error against seconds"
 CAPTION = (
     "One cycle of the paper's punch, a quarter of it: relative error against the limits of mesh and increments, over processor "
-    "seconds with mesh, forms and factors; without imports and compilers, but for CalculiX, whose whole process is counted. 15 "
+    "seconds with mesh, forms and factors (n: cells along each side of the five blocks of the disc, 8 in the paper's mesh); without imports and compilers, but for CalculiX, whose whole process is counted. 15 "
     "increments unless the table says otherwise. Grey: less than half the width to which a limit is known, where an error says no "
     "more than that. Peers know isotropic friction alone, case A, and have the same graded meshes. Lines that cross the limit "
     "dip: the sign of an error is not drawn. Sums of tangential magnitudes and nodal pressures are not defined on C3D20R. The "
