@@ -63,7 +63,7 @@ def _title(key: str) -> str:
     for ending, unit in UNITS.items():
         if key.endswith(ending):
             key = key.removesuffix(ending) + unit
-    return key.replace("_", " ")
+    return key.replace("_", " ").replace("N mm", "N\N{NO-BREAK SPACE}mm")
 
 
 def _missing(value) -> bool:

@@ -284,7 +284,7 @@ def limit_rows(limits: dict) -> list[dict]:
     return [
         {"limit": case}
         | {
-            f"{QUANTITIES[key]} [{units[key]}]": f"{value:.6g} ± {half:.2g}"
+            f"{QUANTITIES[key]} [{units[key]}]": f"{value:.6g} ± {float(f'{half:.2g}'):g}"
             for key, (value, half) in of.items()
         }
         for case, of in limits.items()
