@@ -17,7 +17,7 @@ td { white-space: nowrap; } .text { text-align: left; } td.long { white-space: n
 p, h1, h2 { overflow-wrap: anywhere; }
 """
 LONG = 24  # letters of a text beyond which its cell may have several lines
-FOLDED = 15  # rows beyond which a table is shown when asked for
+FOLDED = 30  # rows beyond which a table is shown when asked for
 UNITS = {"_Nmm": " [N mm]", "_mm3": " [mm³]", "_um": " [µm]"}
 
 
