@@ -20,7 +20,7 @@ from test_packaging import clean_environment
 import dolfinx_contact as dc
 from docs.extension.gallery import cells
 from docs.extension.headers import HEADERS, declarations, without_bodies
-from docs.extension.links import dead_links
+from docs.extension.links import dead_links, opened
 from docs.extension.runs import APART, blocks, run
 from docs.extension.together import together
 
@@ -257,6 +257,12 @@ def test_page_with_measured_numbers_has_a_date(page):
     """Where a page's words state times, shares or ratios, it names the day of their record."""
     words = re.sub(r"^```.*?^```$", "", TEXTS[page], flags=re.DOTALL | re.MULTILINE)
     assert not MEASURED.search(words) or DATED.search(words)
+
+
+def test_pages_are_opened_and_data_is_saved():
+    """A link to a page shows it; one to a table or a record saves it."""
+    page, data = (f'<a download="" href="a/b.{kind}">' for kind in ("html", "json"))
+    assert opened(page + data) == '<a href="a/b.html">' + data
 
 
 def test_numbers_keep_their_units():

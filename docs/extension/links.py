@@ -1,5 +1,6 @@
-"""After the build: every link and picture of every page leads to a file of the site, and to an anchor that is there."""
+"""Every link and picture of every page leads to a file of the site, and to an anchor that is there; pages are opened, not saved."""
 
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -37,6 +38,15 @@ def dead_links(folder: Path) -> list[str]:
     return sorted(dead)
 
 
+def opened(body: str) -> str:
+    """A page whose links to other pages, such as the report, open these: Sphinx takes them for files to be saved."""
+    return re.sub(r' download="" (href="[^"]+\.html")', r" \1", body)
+
+
+def open_pages(app, name, template, context, doctree) -> None:
+    context["body"] = opened(context.get("body", ""))
+
+
 def check(app, exception) -> None:
     if exception is None and app.builder.format == "html":
         dead = dead_links(Path(app.outdir))
@@ -47,5 +57,6 @@ def check(app, exception) -> None:
 
 
 def setup(app) -> dict:
+    app.connect("html-page-context", open_pages)
     app.connect("build-finished", check)
     return {"parallel_read_safe": True}
