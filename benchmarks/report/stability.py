@@ -15,7 +15,7 @@ from benchmarks.stress.scenes import LAWS, Scene, scenes
 from benchmarks.tables import chosen
 
 TITLE = "Stability"
-CAPTION = "Every scene of the stress matrix by group: the largest error that the judge found, and the outcome."
+CAPTION = "Every scene of the stress matrix by group: the largest error that an independent check found (mechanics/judge.py), and the outcome."
 MATRIX = ROOT / "results" / "stress" / "stress.jsonl"  # of make stress
 SINGULAR = "singular stiffness"
 KEPT = ("group", "name", "solver", "outcome", "steps", "seconds", "slowest", "methods")

@@ -40,7 +40,7 @@ def draw(records: list[dict]) -> Figure:
             error = [max(r["error"], r.get("slip_error", 0.0), 1e-17) for r in of]
             places = [groups.index(r["group"]) for r in of]
             ax.plot(error, places, "o", color=colour, alpha=0.5, label=outcome)
-        ax.set(xscale="log", title=solver, xlabel="largest error found by the judge")
+        ax.set(xscale="log", title=solver, xlabel="largest error found by an independent check")
         ax.set_yticks(range(len(groups)), groups)
     axes[0].invert_yaxis()
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
