@@ -177,8 +177,7 @@ class LoadStep:
     def measure(self, x: np.ndarray) -> Errors:
         """Errors of a displacement by F itself; also takes its reactions, gaps and slips.
 
-        Reactions by the return map: where slip is large beside them their direction is that of the slip, not that of
-        rounding in the forces.
+        Reactions by the return map: beside large slip their direction is that of the slip, not that of rounding in forces.
         """
         if not self._is_measured(x):
             forces = self.by_form(x)
