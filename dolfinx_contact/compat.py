@@ -131,6 +131,24 @@ def lagrange_degree(V) -> int | None:
     return element.degree if element.family_name == "P" and continuous else None
 
 
+def value_size(V) -> int:
+    """Number of components of a function of the space."""
+    element = V.ufl_element()
+    if hasattr(element, "value_size"):  # legacy UFL elements
+        return element.value_size()
+    return int(np.prod(element.reference_value_shape, dtype=int))
+
+
+def is_part(V) -> bool:
+    """Whether it is a sub-space, ``V.sub(i)``."""
+    return len(_cpp(V).component()) > 0
+
+
+def is_within(part, V) -> bool:
+    """Whether a space is another one or a part of it."""
+    return _cpp(V).contains(_cpp(part))
+
+
 def cell_nodes(V):
     """Local node indices of each cell, ``shape=(cells, nodes)``: an adjacency list before 0.8."""
     nodes = V.dofmap.list
@@ -231,7 +249,7 @@ def is_condition(bc) -> bool:
 
 def condition_lives_on(bc, V) -> bool:
     """Whether a boundary condition is one on ``V`` or a part of it."""
-    return _cpp(V).contains(_cpp(bc.function_space))
+    return is_within(bc.function_space, V)
 
 
 def free_garbage(comm) -> None:

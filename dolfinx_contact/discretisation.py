@@ -161,8 +161,14 @@ def _check_pair(problem, reference) -> None:
     if len(reference.contacts) != len(problem.contacts):
         raise ValueError(f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
                          f"{len(reference.contacts)}.")  # fmt: skip
+    same_mesh = problem.body.V.mesh is reference.body.V.mesh
+    if same_mesh and any(of.body.displacements.mixed for of in (problem, reference)):
+        raise ValueError(
+            "on the same mesh dc.estimate does not know mixed spaces, which have no energy norm of their own: give a "
+            "reference on a finer mesh, whose quantities alone are compared."
+        )
     orders = [compat.lagrange_degree(of.body.V) for of in (problem, reference)]
-    if problem.body.V.mesh is reference.body.V.mesh and orders[0] >= orders[1]:
+    if same_mesh and orders[0] >= orders[1]:
         raise ValueError(
             f"on the same mesh the reference must be of higher order, got degrees {orders[0]} and {orders[1]}: give the "
             "problem of lower order first, or a reference on a finer mesh."

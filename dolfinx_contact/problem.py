@@ -116,7 +116,7 @@ class ContactProblem(ProblemStates):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
         comm = u.function_space.mesh.comm
         with raised_together(comm):
-            self.contacts = checked_contacts(contacts, u)
+            self.contacts, of = checked_contacts(contacts, u)
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
             self.undetermined = undetermined
@@ -125,7 +125,7 @@ class ContactProblem(ProblemStates):
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
         self.u, self.monitor = u, None
-        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual)
+        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of)
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
         self._points = [contact.points for contact in self.contacts]
@@ -178,7 +178,7 @@ class ContactProblem(ProblemStates):
                 raise NotConverged(
                     f"not converged: {done}, tol {self.tol:.1e}. {refusal(step, self.contacts)}.",
                     done,
-                    found.x,
+                    self.body.values(found.x),
                     [contact.reaction for contact in self.contacts],
                 )
             self.body.put(found.x)
@@ -222,7 +222,7 @@ class ContactProblem(ProblemStates):
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         b, external = body.load()
         last, before = self._states
-        starts = [self.u.x.array[: body.size].copy(), 2 * last - before]
+        starts = [body.taken(self.u.x.array), 2 * last - before]
         kind = NonlinearStep if body.nonlinear else LoadStep
         return kind(
             body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -26,8 +27,8 @@ LARGE = 10.0  # a displacement of so many times the size of a body is one in oth
 UNDETERMINED = ("refused", "nearest")
 
 
-def checked_contacts(contacts, u) -> tuple[Contact, ...]:
-    """The contacts, each on the space of ``u``."""
+def checked_contacts(contacts, u) -> tuple[tuple[Contact, ...], Any]:
+    """The contacts, each on the space of ``u``, and the displacements which they mean, None without contacts."""
     if isinstance(contacts, Contact):
         contacts = [contacts]
     if not isinstance(contacts, (list, tuple)):
@@ -39,14 +40,19 @@ def checked_contacts(contacts, u) -> tuple[Contact, ...]:
             raise ValueError(
                 f"contacts must hold dc.Contact objects, got {type(contact).__name__}."
             )
-        if contact.V != u.function_space:
+        if not compat.is_within(contact.V, u.function_space):
             raise ValueError(
                 "a contact lives on another space or mesh than u: build it on u.function_space."
             )
         check_mesh(contact)
     if len({id(contact) for contact in contacts}) < len(contacts):
         raise ValueError("contacts names the same Contact twice: name it once.")
-    return tuple(contacts)
+    of = [contact.displacements for contact in contacts]
+    if of and of[0].mixed and any((of[0].are != other.are).any() for other in of[1:]):
+        raise ValueError(
+            "contacts mean different sub-spaces of a mixed space as displacements: build all on the same."
+        )
+    return tuple(contacts), of[0] if of else None
 
 
 def check_mesh(contact: Contact) -> None:
@@ -189,7 +195,7 @@ def check_planes(contacts, body) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
         plane, gdim = contact.plane, contact.points.dim
-        x = body.V.tabulate_dof_coordinates()[:, :gdim]
+        x = body.displacements.x[:, :gdim]
         height = plane.distance(plane.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.gap)

@@ -27,7 +27,7 @@ def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
     stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
     for contact, of in zip(contacts, stiffness):
         contact.rho = of.normal
-    size = body.largest(np.abs(body.V.tabulate_dof_coordinates()))
+    size = body.largest(np.abs(body.displacements.x))
     # Any unit that keeps squares within the range of double precision.
     return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
 

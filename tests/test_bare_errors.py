@@ -13,7 +13,6 @@ import ufl
 from dolfinx import fem
 
 import dolfinx_contact as dc
-from dolfinx_contact.compat import functionspace
 
 COMM = scenes.COMM
 ONE = np.eye(3)
@@ -71,25 +70,6 @@ def test_moduli_that_no_material_has_are_refused(nu):
     scene.move_top(0, 0, -0.01)
     with pytest.raises(ValueError, match="nu|moduli"):
         problem.solve()
-
-
-def test_mixed_spaces_are_named(scene):
-    """A space of more than displacements is called that, and not one of one component."""
-    from dolfinx_contact.compat import version
-
-    if version.startswith("0.5"):
-        V = fem.FunctionSpace(scene.mesh, ufl.MixedElement(ufl.VectorElement("CG", "hexahedron", 1), ufl.FiniteElement("CG", "hexahedron", 1)))  # fmt: skip
-    else:
-        import basix.ufl
-
-        cell = scene.mesh.basix_cell() if hasattr(scene.mesh, "basix_cell") else "hexahedron"
-        parts = [
-            basix.ufl.element("Lagrange", cell, 1, shape=(3,)),
-            basix.ufl.element("Lagrange", cell, 1),
-        ]
-        V = functionspace(scene.mesh, basix.ufl.mixed_element(parts))
-    with pytest.raises(ValueError, match="mixed space"):
-        dc.Contact(V, scene.facets, scene.plane, dc.Friction(0.3))
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,18 @@ import numpy as np
 from dolfinx_contact.collective import raised_together
 
 
-def check_diagonal(diagonal: np.ndarray, V) -> None:
-    """Raise a ``ValueError`` if an entry is not finite or not positive."""
+def check_diagonal(diagonal: np.ndarray, displacements) -> None:
+    """Raise a ``ValueError`` if an entry is not finite, or one of a displacement is not positive."""
     if not np.isfinite(diagonal).all():
         raise ValueError(
             "the stiffness contains NaN or infinity: check the material parameters in F (nu = 0.5 has no stiffness)."
         )
+    diagonal = displacements.rows(diagonal)
     if not (diagonal > 0.0).all():
-        dof = int(np.argmin(diagonal))
-        x = V.tabulate_dof_coordinates()[dof // V.dofmap.index_map_bs]
+        node = int(np.argmin(diagonal.min(axis=1)))
+        x = displacements.x[node]
         raise ValueError(
-            f"the stiffness of the node at {x.tolist()} is {diagonal[dof]:g}, which must be positive: check the sign "
+            f"the stiffness of the node at {x.tolist()} is {diagonal[node].min():g}, which must be positive: check the sign "
             "of F (internal minus external work) and the moduli (0 < E, nu < 0.5)."
         )
 
@@ -32,8 +33,10 @@ def check_dilation(body) -> None:
     Args:
         body: ElasticBody, its stiffness assembled, nothing held yet.
     """
-    gdim = body.V.mesh.geometry.dim
-    growth = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim].ravel() / body.extent
+    of = body.displacements
+    if of.mixed:
+        return  # pressures do the work
+    growth = of.x[: of.count, : of.dim].ravel() / body.extent
     energy, scale = body.total(
         [growth @ body.multiply(growth), growth @ (body.diagonal() * growth)]
     )

@@ -14,14 +14,16 @@ from dolfinx_contact.bodies import checks, rigid_motion
 from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
+from dolfinx_contact.bodies.unknowns import Unknowns
 from dolfinx_contact.collective import OverRanks, raised_together
-from dolfinx_contact.petsc.linear_solver import LinearSolver, preconditioner
+from dolfinx_contact.contact.displacements import Displacements
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
 
 
-class ElasticBody(OverRanks):
+class ElasticBody(Unknowns, OverRanks):
     """F(u) = K u - f on the free degrees of freedom, u given on the others.
 
     Args:
@@ -32,12 +34,15 @@ class ElasticBody(OverRanks):
         petsc_options: Options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
         petsc_options_prefix: Their prefix.
+        of: Its ``Displacements``, where they are known.
     """
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose = None  # ``LooseMotions``, where rigid motions cost nothing
 
-    def __init__(self, F, u, bcs, derivative, petsc_options=None, petsc_options_prefix=None):
+    def __init__(
+        self, F, u, bcs, derivative, petsc_options=None, petsc_options_prefix=None, of=None
+    ):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
@@ -46,11 +51,12 @@ class ElasticBody(OverRanks):
         coefficients = [c for c in derivative.coefficients() if c is not u]
         self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
-        self._work = fem.Function(self.V)
-        self.size = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
+        self._work, self.displacements = fem.Function(self.V), of or Displacements(self.V)
+        self.size = self.displacements.size
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
-        self.options = None if petsc_options is None else dict(petsc_options)
+        default = DIRECT if self.displacements.mixed else None  # a saddle point: no multigrid
+        self.options = default if petsc_options is None else dict(petsc_options)
         self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
         self._assemblies = 0
@@ -58,7 +64,7 @@ class ElasticBody(OverRanks):
         self._coupling = self._lift = self._lifted = self._right = self._left = None
         self.closed = self._said = False
         self.known: FreeState | None = None  # the last one
-        self.extent = rigid_motion.extent(self.V)
+        self.extent = rigid_motion.extent(self.displacements)
 
     def refresh(self, x=None) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.
@@ -77,7 +83,7 @@ class ElasticBody(OverRanks):
         self._digest = None  # so that a failure below does not leave a stale matrix
         self._assemble()
         with raised_together(self.comm):
-            checks.check_diagonal(self.diagonal(), self.V)
+            checks.check_diagonal(self.diagonal(), self.displacements)
         checks.check_dilation(self)
         self._hold()
         self.soft, self.loose = rigid_motion.soft_motions(self)
@@ -94,9 +100,10 @@ class ElasticBody(OverRanks):
             self.K.zeroEntries()
             fem.petsc.assemble_matrix(self.K, self._stiffness_form)
         self.K.assemble()
+        self.balance(self.K)
         # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
         entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
-        self._row_size = np.sqrt(entries) * np.abs(self.diagonal())
+        self._row_size = np.sqrt(entries) * self.sizes(self.K)
         self._right, self._left = self.K.createVecs()
         self._assemblies += 1
 
@@ -141,11 +148,6 @@ class ElasticBody(OverRanks):
         if not getattr(self, "closed", True) and compat.may_free_alone(self.comm):
             self.close()
 
-    def show(self, values: np.ndarray) -> None:
-        """Let ``u`` be a displacement; its owned or all local entries.  Collective."""
-        self.u.x.array[: values.size] = values
-        self.u.x.scatter_forward()
-
     def put(self, values: np.ndarray) -> None:
         """As ``show``, and let what the user makes of ``u`` follow, see ``NonlinearBody``.  Collective."""
         self.show(values)
@@ -161,12 +163,12 @@ class ElasticBody(OverRanks):
             ``b`` with ``b - K u`` the residual forces for any ``u`` that has the boundary values
             (which ``b`` holds at fixed degrees of freedom), and the external forces alone.
         """
-        lift = self._work.x.array.copy()
-        lift[:] = 0.0
-        compat.set_bc_values(lift, self.bcs)
+        local = np.zeros_like(self._work.x.array)
+        compat.set_bc_values(local, self.bcs)
+        lift = self.taken(local)
         digest = digest_of(self._load_parameters)
         if self.comm.allreduce(digest != self._load_digest, op=MPI.LOR):
-            self._external = -self.internal_force(np.zeros_like(lift))
+            self._external = -self.internal_force(np.zeros(self.size))
             self._load_digest = digest
         external = self._external.copy()
         b = external - self.carried(lift)
@@ -204,13 +206,11 @@ class ElasticBody(OverRanks):
             compat.assemble_into(self._work.x, self._residual_form)
         finally:
             self.u.x.array[:] = kept
-        return self._work.x.array[: self.size].copy()
+        return self.as_forces(self._work.x.array)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """F at a displacement of owned degrees of freedom, what supports carry included."""
-        values = self.u.x.array.copy()
-        values[: self.size] = x
-        return self.internal_force(values)
+        return self.internal_force(x)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """K x; rows and columns of fixed degrees of freedom are those of the identity."""

@@ -15,7 +15,9 @@ from dolfinx_contact.collective import raised_together
 from dolfinx_contact.petsc.linear_solver import preconditioner
 
 
-def body_of(F, u, bcs, J=None, options=None, prefix=None, before_residual=None) -> ElasticBody:
+def body_of(
+    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None
+) -> ElasticBody:
     """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
 
     Args:
@@ -26,6 +28,7 @@ def body_of(F, u, bcs, J=None, options=None, prefix=None, before_residual=None) 
         options: PETSc options of linear solves.
         prefix: Their prefix.
         before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
+        of: Its ``Displacements``, where they are known.
 
     Raises:
         ValueError: ``F`` is no residual form in ``u``.
@@ -36,8 +39,8 @@ def body_of(F, u, bcs, J=None, options=None, prefix=None, before_residual=None) 
             raise ValueError(f"before_residual must be a function of u, got {before_residual!r}.")
         derivative, linear = derivative_of(F, u, J, moving)
     if linear:
-        return ElasticBody(F, u, bcs, derivative, options, prefix)
-    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual)
+        return ElasticBody(F, u, bcs, derivative, options, prefix, of)
+    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of)
 
 
 class NonlinearBody(ElasticBody):
@@ -49,9 +52,9 @@ class NonlinearBody(ElasticBody):
 
     nonlinear = True
 
-    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before_residual=None):
-        super().__init__(F, u, bcs, derivative, options, prefix)
-        self._before = before_residual
+    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None):
+        super().__init__(F, u, bcs, derivative, options, prefix, of)
+        self._before = before
         self._given = [*self._parameters, *self._load_parameters]
         self._place = None  # where K stands
         self._rounding = None
@@ -60,7 +63,7 @@ class NonlinearBody(ElasticBody):
     # -- at a displacement ---------------------------------------------------------------------
 
     def put(self, values: np.ndarray) -> None:
-        """Let ``u`` and what the user makes of it be those of a displacement; its owned or all local entries.  Collective."""
+        """Let ``u`` and what the user makes of it be those of a displacement, owned degrees of freedom.  Collective."""
         self.show(values)
         if self._before is not None:
             with raised_together(self.comm):
@@ -104,7 +107,7 @@ class NonlinearBody(ElasticBody):
             self.linearise(x)
             self._rounding = self._row_size
             with raised_together(self.comm):
-                check_diagonal(self.diagonal(), self.V)
+                check_diagonal(self.diagonal(), self.displacements)
             if self.soft is None:
                 self.soft, loose = rigid_motion.soft_motions(self)
                 if loose is not None:
@@ -122,8 +125,8 @@ class NonlinearBody(ElasticBody):
         """
         values, local = np.zeros(self.size), np.zeros_like(self._work.x.array)
         compat.set_bc_values(local, self.bcs)
-        values[self.fixed] = local[self.fixed]
-        external = -self.internal_force(np.zeros_like(local))
+        values[self.fixed] = self.taken(local)[self.fixed]
+        external = -self.internal_force(np.zeros(self.size))
         external[self.fixed] = 0.0
         check_finite({"boundary values": values, "loads, F at u = 0,": external}, self.comm)
         return values, external

@@ -29,12 +29,12 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
         ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.  Of these,
         those that cost nothing, which contact alone can hold; None where all cost something.
     """
-    gdim = body.V.mesh.geometry.dim
-    x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
-    part, parts = _connected_parts(body.V, body.comm)
+    of = body.displacements
+    x = of.x[: of.count, : of.dim]
+    part, parts = _connected_parts(of.V, body.comm)
     diagonal, soft, loose = body.diagonal(), [np.zeros((body.size, 0))], []
     for k in range(parts):
-        modes = rigid_modes(x, part[: x.shape[0]] == k, body.comm)
+        modes = of.vectors(rigid_modes(x, part[: of.count] == k, body.comm))
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
         left_free = vectors[:, values <= ROUNDING * values[-1]]
@@ -50,7 +50,7 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
             where = f"one of its {parts} separate parts" if parts > 1 else "the body"
             turned = root.T @ vectors[:, relative < ROUNDING]
             combination = left_free @ turned
-            middle, size = box(x, part[: x.shape[0]] == k, body.comm)
+            middle, size = box(x, part[: of.count] == k, body.comm)
             loose.append(LoosePart(where, free @ turned, combination, middle, size))
         soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
     return np.concatenate(soft, axis=1), LooseMotions(loose) if loose else None
@@ -84,17 +84,17 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
 
 def free_modes(body) -> np.ndarray:
     """Orthonormal rigid motions that vanish at fixed degrees of freedom.  Collective."""
-    gdim = body.V.mesh.geometry.dim
-    x = body.V.tabulate_dof_coordinates()[: body.size // gdim, :gdim]
-    modes = rigid_modes(x, np.ones(len(x), dtype=bool), body.comm)
+    of = body.displacements
+    x = of.x[: of.count, : of.dim]
+    modes = of.vectors(rigid_modes(x, np.ones(len(x), dtype=bool), body.comm))
     modes[body.fixed] = 0.0
     lower = np.linalg.cholesky(body.total(modes.T @ modes))
     return np.linalg.solve(lower, modes.T).T
 
 
-def extent(V) -> float:
+def extent(displacements) -> float:
     """Largest edge of the box around the body.  Collective."""
-    x, comm = V.tabulate_dof_coordinates(), V.mesh.comm
+    x, comm = displacements.x, displacements.V.mesh.comm
     edges = np.concatenate((x.max(axis=0, initial=-np.inf), (-x).max(axis=0, initial=-np.inf)))
     comm.Allreduce(MPI.IN_PLACE, edges, op=MPI.MAX)
     return float((edges[:3] + edges[3:]).max())

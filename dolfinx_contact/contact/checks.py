@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact import compat
+from dolfinx_contact.contact.displacements import displacement_part
 from dolfinx_contact.contact.surface import Surface
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
@@ -15,12 +16,8 @@ from dolfinx_contact.law.wear import Wear
 def check_space(V) -> None:
     mesh = V.mesh
     gdim, tdim = mesh.geometry.dim, mesh.topology.dim
-    components = V.dofmap.index_map_bs
-    if components == 1 and V.element.num_sub_elements > 1:
-        raise ValueError(
-            "V is a mixed space: contact needs a space of displacements alone, "
-            f'functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
-        )
+    part = displacement_part(V)
+    components = compat.value_size(V) if part is None else gdim
     if gdim != tdim or gdim not in (2, 3):
         raise ValueError(
             f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both. Of a mesh from gmsh: a body "
@@ -31,7 +28,7 @@ def check_space(V) -> None:
             f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
             f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
         )
-    if compat.lagrange_degree(V) is None:
+    if compat.lagrange_degree(V if part is None else part) is None:
         raise ValueError(f"V must be continuous Lagrange, got {V.ufl_element()}.")
 
 

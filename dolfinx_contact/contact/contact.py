@@ -21,6 +21,7 @@ from dolfinx_contact.contact.checks import (
     check_wear,
     checked_facets,
 )
+from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import contact_nodes
 from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.interface import add_to
@@ -44,7 +45,8 @@ class Contact(ContactKinematics):
     it, and the normal.  On a curved surface every node has its own, see docs/surfaces.md.
 
     Args:
-        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2.
+        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2; or a mixed
+            space, whose first such sub-space they are, or that sub-space itself.
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
         friction: The friction law, the same on all ranks; or on all of them one with coefficients
@@ -56,8 +58,8 @@ class Contact(ContactKinematics):
             does not fit, a plane of another dimension or without an axis where friction needs one.
 
     Attributes:
-        nodes: Indices of the nodes among the blocks of ``V``, ``shape=(n,)``: those of the facets, but not
-            vertices of tetrahedra of second order, on which an even pressure makes no force.
+        nodes: Indices of the nodes among the blocks of ``displacements.V``, which is ``V`` or that sub-space collapsed,
+            ``shape=(n,)``: those of the facets, but not vertices of tetrahedra of second order, on which an even pressure makes no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
 
@@ -88,8 +90,9 @@ class Contact(ContactKinematics):
             check_law(plane, friction, gdim)
             check_wear(wear)
         self.V, self.comm, self.plane = V, mesh.comm, plane
-        self.nodes = frozen(contact_nodes(V, facets))
-        self.x = frozen(V.tabulate_dof_coordinates()[self.nodes])
+        self.displacements = Displacements(V)
+        self.nodes = frozen(contact_nodes(self.displacements.V, facets))
+        self.x = frozen(self.displacements.x[self.nodes])
         with raised_together(mesh.comm):
             self.place()
         self.friction, self.wear, self.rho = friction, wear, None

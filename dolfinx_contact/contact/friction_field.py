@@ -26,7 +26,7 @@ def followed(friction: Friction) -> list[str]:
 
 
 def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=None) -> Friction:
-    """The law with coefficients and axes for each owned node of a contact, which has ``V``, ``nodes``, ``x`` and ``frame``.
+    """The law with coefficients and axes for each owned node of a contact, which has ``displacements``, ``nodes``, ``x`` and ``frame``.
 
     Args:
         contact: The contact.
@@ -142,8 +142,9 @@ def _of_function(contact, name: str, function) -> np.ndarray:
         )
     size = V.dofmap.index_map_bs
     parts = [function] if size == 1 else [function.sub(k).collapse() for k in range(size)]
-    scalars, parent = contact.V.sub(0).collapse()
-    at = np.argsort(np.ravel(parent) // contact.V.dofmap.index_map_bs)[contact.nodes]
+    of = contact.displacements
+    scalars, parent = of.V.sub(0).collapse()
+    at = np.argsort(np.ravel(parent) // of.dim)[contact.nodes]
     values = fem.Function(scalars)
     found = []
     for part in parts:

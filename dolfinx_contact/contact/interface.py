@@ -91,12 +91,15 @@ class ContactPoints:
     def stiffness(self, K) -> NodalStiffness:
         """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective."""
         first = K.getOwnershipRange()[0]
-        dofs = (self.dofs.ravel() + first).astype(PETSc.IntType)
+        order = np.argsort(self.dofs, axis=None)  # PETSc wants them sorted
+        dofs = (self.dofs.ravel()[order] + first).astype(PETSc.IntType)
         rows = PETSc.IS().createGeneral(dofs, comm=K.comm)
         block = K.createSubMatrix(rows, rows)
         start, columns, values = block.getValuesCSR()
         row = np.repeat(np.arange(dofs.size), np.diff(start))
         column = columns - block.getOwnershipRange()[0]
+        mine = (column >= 0) & (column < dofs.size)
+        row, column, values = order[row[mine]], order[column[mine]], values[mine]
         here = row // self.dim == column // self.dim
         blocks = np.zeros(self.frames.shape)
         blocks[row[here] // self.dim, row[here] % self.dim, column[here] % self.dim] = values[here]

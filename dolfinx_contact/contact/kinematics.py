@@ -38,7 +38,7 @@ class Placed(NamedTuple):
 
 
 class ContactKinematics(ContactResults):
-    """Motion of the nodes of a ``Contact``, which has ``V``, ``nodes``, ``x`` and ``plane``."""
+    """Motion of the nodes of a ``Contact``, which has ``V``, ``displacements``, ``nodes``, ``x`` and ``plane``."""
 
     _placed: Any = None  # ``Placed``
     _settled: Any = None  # the same and the last state, at the end of the last step
@@ -91,9 +91,8 @@ class ContactKinematics(ContactResults):
 
     def _points_of(self, frame: np.ndarray) -> ContactPoints:
         n, gdim = self._at.shape
-        dofs = gdim * self.nodes[:, None] + np.arange(gdim)
         frames = np.broadcast_to(frame, (n, gdim, gdim)).copy()
-        return ContactPoints(dofs, frames, gdim * self.V.dofmap.index_map.size_local)
+        return ContactPoints(self.displacements.dofs(self.nodes), frames, self.displacements.size)
 
     @property
     def follows(self) -> bool:

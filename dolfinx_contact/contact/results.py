@@ -78,8 +78,9 @@ class ContactResults(ContactLaws):
         Collective at the first call.
         """
         if self._area is None:
-            areas = fields.areas(self.V, self.facets)
-            self._area = frozen(areas[self.points.dofs[:, 0]])
+            V = self.displacements.V
+            areas = fields.areas(V, self.facets)
+            self._area = frozen(areas[self.displacements.dim * self.nodes])
         return self._area
 
     @property
@@ -89,11 +90,16 @@ class ContactResults(ContactLaws):
 
     def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
         """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
-        return fields.scalar(self.V, self.nodes, values, name, elsewhere)
+        return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
 
     def reaction_function(self) -> fem.Function:
-        """Nodal reactions in global components as a Function on ``V``, zero elsewhere."""
-        function = fem.Function(self.V, name="reaction")
-        self.points.add_forces(self.reaction, function.x.array[: self.points.size])
+        """Nodal reactions in global components as a Function on the space of displacements, zero elsewhere."""
+        function, forces = (
+            fem.Function(self.displacements.V, name="reaction"),
+            np.zeros(self.points.size),
+        )
+        self.points.add_forces(self.reaction, forces)
+        rows = self.displacements.rows(forces)
+        function.x.array[: rows.size] = rows.ravel()
         function.x.scatter_forward()
         return function

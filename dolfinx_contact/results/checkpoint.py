@@ -12,6 +12,7 @@ import os
 import zipfile
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
@@ -37,14 +38,17 @@ def save(path, body, contacts, states, past, variables) -> None:
     mine = nodes | {"ranks": np.array([len(nodes["nodes"])])}
     for name, array in zip(("u", "before"), states):
         mine[name] = _rows(body, array)
-    if body.known:
+    if body.displacements.mixed:
+        mine |= {f"mixed_{name}": _by_cells(body, a) for name, a in zip(("u", "before"), states)}
+    elif body.known:
         known = body.known
         mine |= {"digest": known.digest[None], "load": _rows(body, known.load)}
         mine["free" if known.exact else "rough"] = _rows(body, known.displacement)
     for k, contact in enumerate(contacts):
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
     if past:
-        mine["past_nodes"] = np.concatenate([a for name, a in nodes.items() if name != "nodes"])
+        of_contacts = [nodes[f"contact{k}_nodes"] for k in range(len(contacts))]
+        mine["past_nodes"] = np.concatenate(of_contacts)
     mine |= variables.save()
     stiffness, everything = body.stiffness_norm(), comm.gather(mine, root=0)
     with raised_together(comm):
@@ -77,7 +81,7 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
     comm = body.comm
     with raised_together(comm):
         _check_path(path)
-    body.refresh()
+    body.refresh(np.zeros(body.size) if body.displacements.mixed else None)  # it scales unknowns
     asked = comm.gather(_nodes(body, contacts) | variables.cells(), root=0)
     stiffness = body.stiffness_norm()
     parts, past = None, ()
@@ -108,6 +112,8 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
         exact = "free" in mine
         free = mine["free" if exact else "rough"].ravel()
         body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+    if body.displacements.mixed:
+        return [_of_cells(body, mine[f"mixed_{name}"]) for name in ("u", "before")], past
     return [mine["u"].ravel(), mine["before"].ravel()], past
 
 
@@ -152,14 +158,36 @@ def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
 
 def _nodes(body, contacts) -> dict[str, np.ndarray]:
     """Original indices of this rank's nodes, of the body and of each contact."""
-    original = compat.original_nodes(body.V)
+    original = compat.original_nodes(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
+    if body.displacements.mixed:
+        of_contacts["mixed_nodes"] = compat.original_cells(body.V.mesh)
     return {"nodes": original} | of_contacts
 
 
 def _rows(body, array: np.ndarray) -> np.ndarray:
-    """Values of owned degrees of freedom, a row a node."""
-    return array.reshape(-1, body.V.dofmap.index_map_bs)
+    """Displacements among values of owned degrees of freedom, a row a node."""
+    return body.displacements.rows(array)
+
+
+def _by_cells(body, array: np.ndarray) -> np.ndarray:
+    """All unknowns of a mixed space in their units, a row an owned cell.  Collective."""
+    values = fem.Function(body.V)
+    values.x.array[: body.size] = body.values(array)
+    values.x.scatter_forward()
+    return values.x.array[_cells(body)]
+
+
+def _of_cells(body, rows: np.ndarray) -> np.ndarray:
+    """Values of owned degrees of freedom from what ``_by_cells`` returned."""
+    values = np.zeros_like(body.u.x.array)
+    values[_cells(body)] = rows
+    return body.taken(values)
+
+
+def _cells(body) -> np.ndarray:
+    """Degrees of freedom of each owned cell."""
+    return compat.cell_dofs(body.V)[: len(compat.original_cells(body.V.mesh))]
 
 
 def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:

@@ -197,9 +197,8 @@ class CondensedBody:
 
     def _anchor_rows(self) -> Rows:
         """One row per anchor, of all components of its node, as blocks of right-hand sides want them."""
-        gdim = self._contacts[0].points.dim
         dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
-        node = gdim * (dofs // gdim)[:, None] + np.arange(gdim)
+        node = self._body.displacements.beside(dofs)
         return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
 
     def _motion(self, step, displacement: np.ndarray) -> np.ndarray:

@@ -56,7 +56,9 @@ class RigidBalance:
         soft = root @ vectors[:, share < 1 / STIFFENED]
         self.modes, self.forces = modes @ soft, forces @ soft
         self._energy = soft.T @ energy @ soft
-        self._scale = 1 / np.sqrt(A.getDiagonal().array_r) if len(self) else None
+        if len(self):  # of unknowns besides displacements nothing counts
+            diagonal, are = A.getDiagonal().array_r, body.displacements.are
+            self._scale = np.where(are, 1 / np.sqrt(np.where(are, diagonal, 1.0)), 0.0)
 
     def __len__(self) -> int:
         """Number of soft motions."""

@@ -113,17 +113,16 @@ class SurfaceLayer:
 
 def _near(body, contacts) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
-    gdim = body.V.dofmap.index_map_bs
-    nodes = compat.cell_nodes(body.V)
-    near = fem.Function(body.V)
+    of = body.displacements
+    gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)
     for contact in contacts:
-        near.x.array[contact.points.dofs] = 1.0
+        near.x.array[gdim * contact.nodes[:, None] + np.arange(gdim)] = 1.0
     for _ in range(LAYERS - 1):
         near.x.scatter_forward()
         marked = near.x.array[::gdim] > 0.0
         reached = nodes[marked[nodes].any(axis=1)]
         near.x.array[(gdim * reached[:, :, None] + np.arange(gdim)).ravel()] = 1.0
         compat.add_to_owners(near.x)
-    free = near.x.array[: body.size] > 0.0
+    free = of.vectors(near.x.array[: gdim * of.count].reshape(of.count, gdim, 1))[:, 0] > 0.0
     free[body.fixed] = False
     return np.flatnonzero(free)

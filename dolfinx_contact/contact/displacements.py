@@ -1,0 +1,96 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The displacements among the unknowns of a function space: which degrees of freedom belong to which node."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from dolfinx_contact import compat
+
+
+def displacement_part(V):
+    """The sub-space of a mixed space that holds displacements; None of any other space.
+
+    Args:
+        V: Any function space.
+
+    Raises:
+        ValueError: a mixed space none of whose sub-spaces is continuous Lagrange with a component per dimension.
+    """
+    gdim = V.mesh.geometry.dim
+    if compat.is_part(V) and compat.value_size(V) == gdim and V.dofmap.index_map_bs == 1:
+        return V
+    if V.dofmap.index_map_bs > 1 or V.element.num_sub_elements < 2:
+        return None
+    for part in (V.sub(i) for i in range(V.element.num_sub_elements)):
+        if compat.value_size(part) == gdim and compat.lagrange_degree(part) is not None:
+            return part
+    raise ValueError(
+        f"V is a mixed space, but none of its sub-spaces is continuous Lagrange with {gdim} components: contact needs "
+        "displacements."
+    )
+
+
+class Displacements:
+    """Nodes and components of the displacements of a space ``V``.
+
+    Args:
+        V: A space of displacements; or a mixed space, see ``displacement_part``, or a sub-space of one.
+
+    Attributes:
+        V: The space of displacements alone, whose numbering of nodes is meant everywhere.
+        mixed: Whether there are other unknowns.
+        size: Owned degrees of freedom of all unknowns.
+        count: Owned nodes of the displacements.
+        dim: Their components.
+    """
+
+    def __init__(self, V):
+        part, self.V, self._dofs = displacement_part(V), V, None
+        self.mixed = part is not None
+        self.size = V.dofmap.index_map.size_local * V.dofmap.index_map_bs
+        if self.mixed:
+            self.V, parent = part.collapse()
+            self._dofs = np.reshape(parent, (-1, self.V.dofmap.index_map_bs))
+        self.dim, self.count = self.V.dofmap.index_map_bs, self.V.dofmap.index_map.size_local
+
+    @cached_property
+    def x(self) -> np.ndarray:
+        """Positions of the nodes, ghosts included, ``shape=(nodes, 3)``."""
+        return self.V.tabulate_dof_coordinates()
+
+    def dofs(self, nodes: np.ndarray) -> np.ndarray:
+        """Degrees of freedom of nodes, ``shape=(n, dim)``, in the numbering of all unknowns."""
+        if self.mixed:
+            return self._dofs[nodes]
+        return self.dim * nodes[:, None] + np.arange(self.dim)
+
+    def rows(self, values: np.ndarray) -> np.ndarray:
+        """Of values of owned degrees of freedom those of the displacements, ``shape=(nodes, dim)``."""
+        values = values[self._dofs[: self.count].ravel()] if self.mixed else values
+        return values.reshape(self.count, self.dim)
+
+    def vectors(self, rows: np.ndarray) -> np.ndarray:
+        """Values of owned nodes, ``shape=(nodes, dim, m)``, as ``shape=(owned dofs, m)``; other unknowns are zero."""
+        flat = rows.reshape(self.count * self.dim, -1)
+        if not self.mixed:
+            return flat
+        vectors = np.zeros((self.size, flat.shape[1]))
+        vectors[self._dofs[: self.count].ravel()] = flat
+        return vectors
+
+    @cached_property
+    def are(self) -> np.ndarray:
+        """Which owned degrees of freedom are displacements, booleans."""
+        return self.vectors(np.ones((self.count, self.dim, 1)))[:, 0] > 0.0
+
+    def beside(self, dofs: np.ndarray) -> np.ndarray:
+        """All degrees of freedom of the nodes to which these displacements belong, ``shape=(n, dim)``."""
+        if not self.mixed:
+            return self.dofs(dofs // self.dim)
+        mine = self._dofs[: self.count].ravel()
+        order = np.argsort(mine)
+        return self.dofs(order[np.searchsorted(mine, dofs, sorter=order)] // self.dim)

@@ -1,0 +1,161 @@
+"""Mixed spaces: contact on the displacements, pressures beside them."""
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import pytest
+import twin_solver
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix
+from mixed_scenes import block, pressed, ring
+from scenes import COMM, MPI
+
+SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
+TILTED = pytest.mark.parametrize("tilted", [False, True], ids=["flat", "tilted"])
+SOLVERS = {"CondensedNewton": dc.CondensedNewton(), "SparseNewton": dc.SparseNewton(), "FixedPoint": dc.FixedPoint()}  # fmt: skip
+
+
+def passes_patch_test(found) -> None:
+    """Displacements, pressures, statuses, reactions and slips are those of the even stress."""
+    contact = found.contact
+    u, p = (found.w.sub(i).collapse().x.array for i in range(2))
+    exact = found.exact.x.array
+    assert np.abs(u - exact).max(initial=0.0) <= 1e-10 * np.abs(exact).max(initial=1e-3)
+    assert np.abs(p / found.pressure - 1).max(initial=0.0) <= 1e-9
+    force = contact.area[:, None] * found.traction
+    scale = COMM.allreduce(np.abs(force).max(initial=0.0), op=MPI.MAX)
+    assert np.abs(contact.reaction - force).max(initial=0.0) <= 1e-10 * scale
+    slips = found.slip.any()
+    assert (contact.status == (dc.Status.SLIP if slips else dc.Status.STICK)).all()
+    assert np.abs(contact.slip_increment - found.slip[:-1]).max(initial=0.0) <= 1e-12
+
+
+@SLIPS
+@TILTED
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_patch(cell, tilted, slips):
+    """On distorted meshes an even stress is found exactly by Taylor-Hood's elements."""
+    passes_patch_test(pressed(cell, slips, tilted))
+
+
+@SLIPS
+@pytest.mark.parametrize("cell", ["triangle", "hexahedron"])
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_patch_by_every_solver(name, cell, slips, sign):
+    """All solvers find it, whichever sign the equation of the pressure has."""
+    found = pressed(cell, slips, tilted=True, solver=SOLVERS[name], sign=sign)
+    passes_patch_test(found)
+    assert name in found.step.solver
+
+
+@pytest.mark.parametrize("compliance", [0.5, 2e-4, 0.0])
+def test_even_compression_without_friction(compliance):
+    """Force, width and pressure of a block in plane strain are those of the closed form, incompressible ones included."""
+    scene = block(compliance=compliance, mu=0.0, whole=False, tol=1e-12)
+    scene.press(-0.1)
+    # with s = G / lambda, stress along x zero: -2 G e_x = p, p = lambda (e_x + e_y), e_y = -0.1
+    across = 0.1 / (1 + 2 * compliance)
+    assert scene.contact.force()[1] == pytest.approx(2 * (0.2 + 2 * across), rel=1e-10)
+    u, p = (scene.w.sub(i).collapse() for i in range(2))
+    x = u.function_space.tabulate_dof_coordinates()[:, :2]
+    np.testing.assert_allclose(u.x.array.reshape(-1, 2), x * [across, -0.1], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(p.x.array, -2 * across, rtol=1e-10)
+
+
+PUSHES = [(0.0, -0.02), (0.03, -0.03), (0.01, -0.02), (-0.05, -0.01)]
+
+
+@pytest.mark.skipif(COMM.size > 1, reason="dense and slow: one rank is enough")
+@pytest.mark.parametrize("name", SOLVERS)
+def test_pressures_eliminated_by_dense_algebra(name):
+    """Reactions are those of the twin, on the stiffness of displacements alone: Schur's complement, block Gauss-Seidel."""
+    scene = block(n=2, solver=SOLVERS[name], tol=1e-11)
+    contact, W = scene.contact, scene.W
+    A = assemble_matrix(fem.form(ufl.derivative(scene.F, scene.w, ufl.TrialFunction(W))))
+    A.assemble()
+    K, (V, of_u), (_, of_p) = A[:, :], W.sub(0).collapse(), W.sub(1).collapse()
+    of_u, of_p = np.array(of_u), np.array(of_p)
+    part = K[np.ix_(of_u, of_p)]
+    K = K[np.ix_(of_u, of_u)] - part @ np.linalg.solve(K[np.ix_(of_p, of_p)], K[np.ix_(of_p, of_u)])
+    y = V.tabulate_dof_coordinates()[:, 1]
+    nodes = np.flatnonzero(np.isclose(y, 0.0))
+    fixed = (2 * np.flatnonzero(np.isclose(y, 1.0))[:, None] + np.arange(2)).ravel()
+    free = np.setdiff1d(np.arange(len(K)), fixed)
+    inverse = np.linalg.inv(K[np.ix_(free, free)])
+    frame, size = contact.frame, nodes.size
+    rows = np.searchsorted(free, (2 * nodes[:, None] + np.arange(2)).ravel())
+    compliance = inverse[np.ix_(rows, rows)].reshape(size, 2, size, 2)
+    compliance = np.einsum("aj,ijkl,bl->iakb", frame, compliance, frame)
+    before = np.zeros((size, 1))
+    for push in PUSHES:
+        scene.press(*push)
+        lift = np.zeros(len(K))
+        lift[fixed] = np.tile(push, fixed.size // 2)
+        trial = lift.copy()
+        trial[free] -= inverse @ (K @ lift)[free]
+        q = trial.reshape(-1, 2)[nodes] @ frame.T
+        q[:, :1] -= before
+        expected = twin_solver.solve(compliance, q, 0.3, 0.3)
+        assert np.array_equal(contact.nodes, nodes)
+        assert np.abs(contact.reaction - expected).max() <= 1e-8 * np.abs(expected).max()
+        before += (q + np.tensordot(compliance, expected, 2))[:, :1]
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_units_of_pressure_do_not_matter(name):
+    """Whatever the units of length, modulus and pressure: as many iterations, the same errors and forces but for units."""
+    found = []
+    for length, modulus, pressure in ((1.0, 1.0, 1.0), (1e3, 1e-2, 1e6), (1e-3, 1e11, 1e-8)):
+        scene = block(mu=0.3, length=length, modulus=modulus, pressure=pressure, solver=SOLVERS[name])  # fmt: skip
+        steps = [scene.press(*push) for push in PUSHES]
+        force = scene.contact.force() / (modulus * length)
+        found.append(([step.iterations for step in steps], [step.counts for step in steps], force))
+    for other in found[1:]:
+        assert other[:2] == found[0][:2]
+        np.testing.assert_allclose(other[2], found[0][2], rtol=1e-6)
+
+
+def test_missing_volume_counts_as_a_force():
+    """An error of the pressure's equation is found, as the force that taking it back makes, in any unit of pressure."""
+    errors = []
+    for unit in (1.0, 1e6):
+        scene = block(compliance=0.0, mu=0.0, whole=False, pressure=unit)
+        scene.press(-0.1)
+        problem = scene.problem
+        step, x = problem.load_step(), problem.body.taken(scene.w.x.array)
+        assert step.measure(x).error < 1e-12
+        at = problem.body.displacements.x[: problem.body.displacements.count, :2]
+        dilation = np.where(
+            at[:, 1:] < 0.7, 1e-6 * at * [1, 0], 0.0
+        )  # moves no node of the plane off it
+        x += problem.body.displacements.vectors(dilation[:, :, None])[:, 0]
+        errors.append(step.measure(x).error)
+        left = step.free(step.with_reactions(step.by_form(x)))
+        rest = ~problem.body.displacements.are
+        assert problem.body.norm(left[rest]) > 0.01 * problem.body.norm(left)
+        assert 1e-8 < errors[-1] < 1e-4
+    assert errors[1] == pytest.approx(errors[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("bulk", [100.0, 1000.0, None])
+def test_rubber_seal_at_30_percent(bulk, mu):
+    """Neo-Hookean rubber down to incompressible: both planes carry the same, volumes obey, few iterations."""
+    scene = ring(bulk, mu)
+    upper, lower = (contact.force() for contact in scene.contacts)
+    np.testing.assert_allclose(lower, upper * [1, -1], rtol=1e-6, atol=1e-9)
+    assert max(step.iterations for step in scene.steps) <= 6
+    volume = COMM.allreduce(fem.assemble_scalar(fem.form((scene.J - 1) * ufl.dx(domain=scene.mesh, metadata={"quadrature_degree": 5}))))  # fmt: skip
+    p = scene.w.sub(1)
+    of_pressure = COMM.allreduce(fem.assemble_scalar(fem.form(p * ufl.dx)))
+    assert volume == pytest.approx(0.0 if bulk is None else of_pressure / bulk, abs=1e-10)
+
+
+def test_seal_with_three_fields():
+    """With the change of volume as a third unknown, in the space of the pressure, the seal has the force of two fields."""
+    two, three = (ring(100.0, mu=0.3, jacobian=jacobian) for jacobian in (False, True))
+    np.testing.assert_allclose(three.contacts[0].force(), two.contacts[0].force(), rtol=1e-8)
+    assert [step.iterations for step in three.steps] == [step.iterations for step in two.steps]
