@@ -12,9 +12,9 @@ from patches import LAME, MU, G, P, box, even_state, turned
 from scenes import COMM
 
 
-def taylor_hood(domain, *more):
+def taylor_hood(domain, *more, pressure=("Lagrange", 1)):
     """Displacements of second order, pressures of first; ``more`` are further elements."""
-    gdim, scalars = domain.geometry.dim, [("Lagrange", 1), *more]
+    gdim, scalars = domain.geometry.dim, [pressure, *more]
     if hasattr(ufl, "MixedElement"):  # legacy UFL elements
         cell = domain.ufl_cell()
         parts = [ufl.FiniteElement(family, cell, degree) for family, degree in scalars]
@@ -27,6 +27,17 @@ def taylor_hood(domain, *more):
     parts = [basix.ufl.element(family, cell, degree) for family, degree in scalars]
     parts.insert(0, basix.ufl.element("Lagrange", cell, 2, shape=(gdim,)))
     return fem.functionspace(domain, basix.ufl.mixed_element(parts))
+
+
+def scalars_alone(domain):
+    """Two fields without components."""
+    if hasattr(ufl, "MixedElement"):
+        part = ufl.FiniteElement("Lagrange", domain.ufl_cell(), 1)
+        return fem.FunctionSpace(domain, ufl.MixedElement(part, part))
+    import basix.ufl
+
+    part = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
+    return fem.functionspace(domain, basix.ufl.mixed_element([part, part]))
 
 
 def held(W, facets, values=None, component=None):
@@ -90,6 +101,7 @@ def block(
     modulus=1.0,
     pressure=1.0,
     whole=True,
+    load=None,
     solver=None,
     tol=1e-8,
     comm=None,
@@ -101,6 +113,7 @@ def block(
         compliance: Shear modulus over lambda.
         length, modulus, pressure: Units; the last one of the unknown pressure alone, over the modulus.
         whole: Whether the top is held along the plane, too; else the side x = 0 is.
+        load: Force per volume, over modulus and length, of a block that nothing else holds than the plane.
     """
     corners, cells = [np.zeros(2), length * np.array([2.0, 1.0])], (2 * n, n)
     domain = mesh.create_rectangle(comm or COMM, corners, cells, mesh.CellType.quadrilateral)
@@ -116,6 +129,9 @@ def block(
     F = 2 * G * ufl.inner(strain, ufl.sym(ufl.grad(v))) + unit * p * ufl.div(v)
     F = (F + q * (ufl.div(u) - C * unit * p)) * ufl.dx
     bcs = [held(W, top)] if whole else [held(W, top, component=1), held(W, side, component=0)]
+    if load is not None:
+        bcs, weight = [], fem.Constant(domain, modulus / length * np.array(load))
+        F = F - ufl.inner(weight, v) * ufl.dx
     plane = dc.RigidPlane((0, 0), (0, 1))
     contact = dc.Contact(W, bottom, plane, dc.Friction(mu))
     problem = dc.ContactProblem(F, w, contact, [bc for bc, _ in bcs], solver=solver, tol=tol, **options)  # fmt: skip
@@ -128,16 +144,28 @@ def block(
             values[:] = length * share[-1]
         return problem.solve()
 
-    return SimpleNamespace(w=w, W=W, F=F, contact=contact, problem=problem, press=press, mesh=domain, values=bcs[0][1],
-                           bcs=[bc for bc, _ in bcs])  # fmt: skip
+    return SimpleNamespace(
+        w=w, W=W, F=F, contact=contact, problem=problem, press=press, mesh=domain
+    )
 
 
-def ring(bulk, mu=0.0, cells=(2, 8), steps=12, tol=1e-9, jacobian=False):
+def ring(
+    bulk,
+    mu=0.0,
+    cells=(2, 8),
+    steps=12,
+    tol=1e-9,
+    jacobian=False,
+    pressure=("Lagrange", 1),
+    volume=5,
+):
     """Half a ring of rubber of shear modulus 1 between two planes, height down by 30 %; as ``rubber_seal`` in test_any_body.py.
 
     Args:
         bulk: Bulk modulus; None is incompressible.
         jacobian: Whether the change of volume is an unknown, too.
+        pressure: Its element.
+        volume: Degree to which what changes the volume is integrated.
     """
     kind = mesh.CellType.quadrilateral
     domain = mesh.create_rectangle(COMM, [np.zeros(2), np.ones(2)], cells, kind)
@@ -147,7 +175,7 @@ def ring(bulk, mu=0.0, cells=(2, 8), steps=12, tol=1e-9, jacobian=False):
 
     sides = [facets(lambda x, s=s: np.isclose(x[0], 1.0) & (s * (x[1] - 0.5) > 0.1)) for s in (1, -1)]  # fmt: skip
     ends = facets(lambda x: np.isclose(np.abs(x[1] - 0.5), 0.5))
-    W = taylor_hood(domain, *([("Lagrange", 1)] if jacobian else []))
+    W = taylor_hood(domain, *([("Lagrange", 1)] if jacobian else []), pressure=pressure)
     middle, (whole, _) = W.sub(0).sub(1), W.sub(0).sub(1).collapse()
     dofs = fem.locate_dofs_geometrical((middle, whole), lambda x: np.isclose(x[1], 0.5))
     bcs = [held(W, ends, component=0)[0], fem.dirichletbc(fem.Function(whole), dofs, middle)]
@@ -160,10 +188,11 @@ def ring(bulk, mu=0.0, cells=(2, 8), steps=12, tol=1e-9, jacobian=False):
     J = ufl.det(gradient)
     energy = (ufl.tr(gradient.T * gradient) - 2 - 2 * ufl.ln(J)) / 2
     if jacobian:
-        energy += p * (J - 1 - theta[0]) + bulk / 2 * theta[0] ** 2
+        of_volume = p * (J - 1 - theta[0]) + bulk / 2 * theta[0] ** 2
     else:
-        energy += p * (J - 1) - (0 if bulk is None else p**2 / (2 * bulk))
-    F = ufl.derivative(energy * ufl.dx(metadata={"quadrature_degree": 5}), w, ufl.TestFunction(W))
+        of_volume = p * (J - 1) - (0 if bulk is None else p**2 / (2 * bulk))
+    dx = [ufl.dx(metadata={"quadrature_degree": degree}) for degree in (5, volume)]
+    F = ufl.derivative(energy * dx[0] + of_volume * dx[1], w, ufl.TestFunction(W))
     contacts = []
     for side, mine in zip((1.0, -1.0), sides):
         normal = np.array([0.0, -side])

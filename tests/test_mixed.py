@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import twin_solver
 import ufl
-from dolfinx import fem
+from dolfinx import fem, mesh
 from dolfinx.fem.petsc import assemble_matrix
-from mixed_scenes import block, pressed, ring
+from mixed_scenes import block, held, pressed, problem_step, ring, scalars_alone
 from scenes import COMM, MPI
+from test_any_body import BULK, rubber_seal
 
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
 TILTED = pytest.mark.parametrize("tilted", [False, True], ids=["flat", "tilted"])
@@ -65,7 +66,7 @@ def test_even_compression_without_friction(compliance):
     np.testing.assert_allclose(p.x.array, -2 * across, rtol=1e-10)
 
 
-PUSHES = [(0.0, -0.02), (0.03, -0.03), (0.01, -0.02), (-0.05, -0.01)]
+PUSHES = [(0.0, -0.02), (0.03, -0.03), (0.06, -0.02)]
 
 
 @pytest.mark.skipif(COMM.size > 1, reason="dense and slow: one rank is enough")
@@ -154,8 +155,124 @@ def test_rubber_seal_at_30_percent(bulk, mu):
     assert volume == pytest.approx(0.0 if bulk is None else of_pressure / bulk, abs=1e-10)
 
 
+def test_seal_is_that_of_reduced_integration():
+    """With a pressure bilinear in each cell it has the state of the displacement form, whose volume is held at 2 x 2 points."""
+    alone = rubber_seal((2, 8))
+    mixed = ring(BULK, pressure=("DG", 1), volume=3)
+    for one, other in zip(mixed.contacts, alone.contacts):
+        found, expected = (np.concatenate(COMM.allgather(np.hstack((c.x, c.reaction)))) for c in (one, other))  # fmt: skip
+        found, expected = (table[np.argsort(table[:, 1])] for table in (found, expected))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
 def test_seal_with_three_fields():
     """With the change of volume as a third unknown, in the space of the pressure, the seal has the force of two fields."""
     two, three = (ring(100.0, mu=0.3, jacobian=jacobian) for jacobian in (False, True))
     np.testing.assert_allclose(three.contacts[0].force(), two.contacts[0].force(), rtol=1e-8)
     assert [step.iterations for step in three.steps] == [step.iterations for step in two.steps]
+
+
+@pytest.mark.parametrize("name", ["CondensedNewton", "FixedPoint"])
+@pytest.mark.parametrize("compliance", [0.5, 0.0])
+def test_a_block_held_by_contact_alone(compliance, name):
+    """Reactions balance the loads of a block that nothing else holds, as friction allows; without it nothing can."""
+    scene = block(compliance=compliance, load=(0.02, -0.1), solver=SOLVERS[name], tol=1e-10)
+    scene.problem.solve()
+    np.testing.assert_allclose(scene.contact.force(), [-0.04, 0.2], rtol=1e-8)
+    smooth = block(compliance=compliance, load=(0.02, -0.1), mu=0.0)
+    with pytest.raises((ValueError, dc.NotConverged), match="no reactions|translation"):
+        smooth.problem.solve()
+
+
+@pytest.mark.parametrize("name", ["CondensedNewton", "FixedPoint"])
+def test_a_plane_driven_by_force(name):
+    """A plane with a force on it moves to where one that is moved there has that force."""
+    moved, driven = (block(compliance=0.0, solver=SOLVERS[name], tol=1e-11) for _ in range(2))
+    moved.contact.plane.displacement = (0.0, 0.05)
+    moved.press(0.0, 0.0)
+    driven.contact.plane.free = ("n",)
+    driven.contact.plane.force = moved.contact.force() * [0, 1]
+    driven.press(0.0, 0.0)
+    np.testing.assert_allclose(driven.contact.plane.displacement, [0.0, 0.05], rtol=1e-8)
+    np.testing.assert_allclose(driven.contact.force(), moved.contact.force(), rtol=1e-7, atol=1e-9)
+
+
+def test_a_disc_in_incompressible_rubber():
+    """A disc pressed into the block's top by contact has the force of the support, and nodes lie on it."""
+    scene = block(n=8, compliance=0.0, tol=1e-10)
+    W = scene.W
+    bottom, top = (mesh.locate_entities_boundary(scene.mesh, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1))  # fmt: skip
+    disc = dc.RigidSphere((1.0, 1.6), 0.6)
+    contact = dc.Contact(W, top, disc, dc.Friction(0.2))
+    w = fem.Function(W)
+    F = ufl.replace(scene.F, {scene.w: w})
+    bc, _ = held(W, bottom)
+    problem = dc.ContactProblem(F, w, contact, [bc])
+    for _ in range(3):
+        disc.displacement = disc.displacement + np.array([0.0, -0.01])
+        problem.solve()
+    assert contact.force()[1] < 0.0
+    reactions = contact.reaction_function()
+    assert reactions.function_space.dofmap.index_map_bs == 2
+    assert problem.counts().open > 0
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_checkpoint(tmp_path, nonlinear):
+    """A run continued from a checkpoint goes on as if it had not been interrupted, pressures included."""
+    path = COMM.bcast(str(tmp_path / "state.npz"))
+
+    def begun():
+        scene = ring(100.0, mu=0.3, steps=0) if nonlinear else block()
+        if nonlinear:
+            scene.press = lambda *push: problem_step(scene.problem, scene.contacts, -push[1])
+        return scene
+
+    straight, continued = begun(), begun()
+    for push in PUSHES[:2]:
+        straight.press(*push)
+    straight.problem.save(path)
+    continued.problem.load(path)
+    first, second = (scene.press(*PUSHES[2]) for scene in (straight, continued))
+    assert first.iterations == second.iterations
+    (w, r), (w_, r_) = (
+        (s.w.x.array, s.problem.contacts[0].reaction) for s in (straight, continued)
+    )
+    np.testing.assert_allclose(w_, w, rtol=0, atol=1e-11 * np.abs(w).max(initial=1.0))
+    np.testing.assert_allclose(r_, r, rtol=0, atol=1e-11)
+
+
+def test_sub_space_or_whole():
+    """A contact may be made on the mixed space or on its displacements; another sub-space is named."""
+    scene = block(n=2)
+    facets, plane, law = scene.contact.facets, scene.contact.plane, dc.Friction(0.3)
+    part = dc.Contact(scene.W.sub(0), facets, plane, law)
+    np.testing.assert_array_equal(part.points.dofs, scene.contact.points.dofs)
+    with dc.ContactProblem(scene.F, scene.w, part, scene.problem.body.bcs) as problem:
+        before = scene.press(*PUSHES[0])
+        assert problem.solve().counts == before.counts
+    np.testing.assert_allclose(part.reaction, scene.contact.reaction, rtol=1e-12, atol=1e-15)
+    with pytest.raises(ValueError, match="component"):
+        dc.Contact(scene.W.sub(1), facets, plane, law)
+    alone = scene.W.sub(0).collapse()[0]
+    with pytest.raises(ValueError, match="another space"):
+        dc.ContactProblem(scene.F, scene.w, dc.Contact(alone, facets, plane, law), [])
+
+
+def test_mixed_spaces_without_displacements_are_refused():
+    """A mixed space needs displacements, every field has to act on them, and what has no meaning is refused."""
+    scene = block(n=2)
+    scalars = scalars_alone(scene.mesh)
+    with pytest.raises(ValueError, match="none of its sub-spaces is continuous Lagrange with 2"):
+        dc.Contact(scalars, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+    (u, p), (v, q) = ufl.split(scene.w), ufl.split(ufl.TestFunction(scene.W))
+    apart = (ufl.inner(ufl.grad(u), ufl.grad(v)) + q * p) * ufl.dx
+    contact = dc.Contact(scene.W, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+    problem = dc.ContactProblem(apart, scene.w, contact, scene.problem.body.bcs)
+    with pytest.raises(ValueError, match="act on displacements"):
+        problem.solve()
+    with pytest.raises(ValueError, match="dc.estimate does not know mixed spaces"):
+        other = dc.Contact(scene.W, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+        dc.estimate(
+            scene.problem, dc.ContactProblem(scene.F, scene.w, other, scene.problem.body.bcs)
+        )
