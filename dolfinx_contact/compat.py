@@ -47,6 +47,16 @@ def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
     return fem.VectorFunctionSpace(mesh, (family, degree), dim=shape[0][0])
 
 
+def mixed_functionspace(mesh: Any, elements: Any) -> fem.FunctionSpace:
+    """Mixed space from elements, each as ``functionspace`` takes it; ``basix.ufl.mixed_element`` in DOLFINx >= 0.7."""
+    parts = [functionspace(mesh, of).ufl_element() for of in elements]
+    if hasattr(ufl, "MixedElement"):  # legacy UFL elements
+        return fem.FunctionSpace(mesh, ufl.MixedElement(*parts))
+    import basix.ufl
+
+    return fem.functionspace(mesh, basix.ufl.mixed_element(parts))
+
+
 def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
     """Interpolation points of the element of ``V``: a method before DOLFINx 0.10, a property since."""
     points = V.element.interpolation_points

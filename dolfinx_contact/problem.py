@@ -54,7 +54,7 @@ class ContactProblem(ProblemStates):
     Args:
         F: Residual form, internal minus external virtual work.  One that is not linear in ``u`` makes a nonlinear
             body, see docs/nonlinear.md.
-        u: Displacement, a Function.  Holds the solution after a step; at the start of one, the first too, it is
+        u: Displacement, a Function, or one of a mixed space with displacements.  Holds the solution after a step; at the start of one, the first too, it is
             only a guess, the last converged state is kept inside.
         contacts: The contacts; a node of an edge may belong to several.
         bcs: Dirichlet conditions; their values may change between steps.

@@ -11,33 +11,13 @@ from dolfinx import fem, mesh
 from patches import LAME, MU, G, P, box, even_state, turned
 from scenes import COMM
 
+from dolfinx_contact import compat
+
 
 def taylor_hood(domain, *more, pressure=("Lagrange", 1)):
     """Displacements of second order, pressures of first; ``more`` are further elements."""
-    gdim, scalars = domain.geometry.dim, [pressure, *more]
-    if hasattr(ufl, "MixedElement"):  # legacy UFL elements
-        cell = domain.ufl_cell()
-        parts = [ufl.FiniteElement(family, cell, degree) for family, degree in scalars]
-        return fem.FunctionSpace(
-            domain, ufl.MixedElement(ufl.VectorElement("Lagrange", cell, 2), *parts)
-        )
-    import basix.ufl
-
-    cell = domain.basix_cell()
-    parts = [basix.ufl.element(family, cell, degree) for family, degree in scalars]
-    parts.insert(0, basix.ufl.element("Lagrange", cell, 2, shape=(gdim,)))
-    return fem.functionspace(domain, basix.ufl.mixed_element(parts))
-
-
-def scalars_alone(domain):
-    """Two fields without components."""
-    if hasattr(ufl, "MixedElement"):
-        part = ufl.FiniteElement("Lagrange", domain.ufl_cell(), 1)
-        return fem.FunctionSpace(domain, ufl.MixedElement(part, part))
-    import basix.ufl
-
-    part = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
-    return fem.functionspace(domain, basix.ufl.mixed_element([part, part]))
+    displacement = ("Lagrange", 2, (domain.geometry.dim,))
+    return compat.mixed_functionspace(domain, [displacement, pressure, *more])
 
 
 def held(W, facets, values=None, component=None):

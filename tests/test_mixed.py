@@ -9,9 +9,11 @@ import twin_solver
 import ufl
 from dolfinx import fem, mesh
 from dolfinx.fem.petsc import assemble_matrix
-from mixed_scenes import block, held, pressed, problem_step, ring, scalars_alone
+from mixed_scenes import block, held, pressed, problem_step, ring
 from scenes import COMM, MPI
 from test_any_body import BULK, rubber_seal
+
+from dolfinx_contact.compat import mixed_functionspace
 
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
 TILTED = pytest.mark.parametrize("tilted", [False, True], ids=["flat", "tilted"])
@@ -262,7 +264,7 @@ def test_sub_space_or_whole():
 def test_mixed_spaces_without_displacements_are_refused():
     """A mixed space needs displacements, every field has to act on them, and what has no meaning is refused."""
     scene = block(n=2)
-    scalars = scalars_alone(scene.mesh)
+    scalars = mixed_functionspace(scene.mesh, [("Lagrange", 1)] * 2)
     with pytest.raises(ValueError, match="none of its sub-spaces is continuous Lagrange with 2"):
         dc.Contact(scalars, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
     (u, p), (v, q) = ufl.split(scene.w), ufl.split(ufl.TestFunction(scene.W))
