@@ -20,7 +20,7 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 # whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
 programs = accuracy demos docs report stress structure study
 # one test file or two of each feature that needs the mesh: make test has them on 2 ranks
-features = force friction_field held_by_contact history input_errors internal_variables multigrid \
+features = force friction_field held_by_contact history input_errors internal_variables mixed multigrid \
 	nonlinear oblique_supports patch problem rewind shared_nodes surfaces
 # of these a few, on several ranks of another DOLFINx: few, as meshes leave communicators behind
 on_ranks = force history internal_variables multigrid nonlinear problem spence surfaces
