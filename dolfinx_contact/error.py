@@ -8,7 +8,8 @@ should be, over the forces that act in that same state,
 Euclidean over nodes: reactions, external forces, and what the supports carry.
 
 - ``error``: the largest of three. Equilibrium, ``|f - F(u) + r| / S`` on free degrees of freedom, F assembled by
-  DOLFINx, and of planes that force drives, along their free directions; where supports are not at their boundary
+  DOLFINx, equations of pressures as forces (``bodies/unknowns.py``), and of planes that force drives, along their free
+  directions; where supports are not at their boundary
   values, what is missing times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
   paper's projection equation [dSFMH07, Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration,
   ``|kappa max(-x_n, 0)| / S``. The metric ``kappa`` is the normal diagonal entry of the stiffness at the node, never the rho of a solver.

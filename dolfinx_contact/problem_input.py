@@ -279,7 +279,7 @@ def check_step(u, comm, contacts) -> None:
 
 def check_size(body, x: np.ndarray) -> bool:
     """Warn of a displacement far larger than the body; whether it was.  Collective."""
-    largest = body.largest(np.abs(x))
+    largest = body.largest(np.abs(body.displacements.rows(x)))
     if largest <= LARGE * body.extent:
         return False
     warnings.warn(

@@ -82,6 +82,7 @@ def block(
     pressure=1.0,
     whole=True,
     load=None,
+    confined=False,
     solver=None,
     tol=1e-8,
     comm=None,
@@ -93,6 +94,7 @@ def block(
         compliance: Shear modulus over lambda.
         length, modulus, pressure: Units; the last one of the unknown pressure alone, over the modulus.
         whole: Whether the top is held along the plane, too; else the side x = 0 is.
+        confined: Whether the side x = 2 is held along x, too.
         load: Force per volume, over modulus and length, of a block that nothing else holds than the plane.
     """
     corners, cells = [np.zeros(2), length * np.array([2.0, 1.0])], (2 * n, n)
@@ -109,6 +111,9 @@ def block(
     F = 2 * G * ufl.inner(strain, ufl.sym(ufl.grad(v))) + unit * p * ufl.div(v)
     F = (F + q * (ufl.div(u) - C * unit * p)) * ufl.dx
     bcs = [held(W, top)] if whole else [held(W, top, component=1), held(W, side, component=0)]
+    if confined:
+        far = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 2 * length))
+        bcs.append(held(W, far, component=0))
     if load is not None:
         bcs, weight = [], fem.Constant(domain, modulus / length * np.array(load))
         F = F - ufl.inner(weight, v) * ufl.dx

@@ -9,7 +9,7 @@ import twin_solver
 import ufl
 from dolfinx import fem, mesh
 from dolfinx.fem.petsc import assemble_matrix
-from mixed_scenes import block, held, pressed, problem_step, ring
+from mixed_scenes import block, held, pressed, problem_step, ring, taylor_hood
 from scenes import COMM, MPI
 from test_any_body import BULK, rubber_seal
 
@@ -66,6 +66,14 @@ def test_even_compression_without_friction(compliance):
     x = u.function_space.tabulate_dof_coordinates()[:, :2]
     np.testing.assert_allclose(u.x.array.reshape(-1, 2), x * [across, -0.1], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(p.x.array, -2 * across, rtol=1e-10)
+
+
+@pytest.mark.filterwarnings("error")
+def test_compression_between_walls():
+    """Where nearly incompressible rubber cannot escape, the force is that of its bulk; a large pressure is no large displacement."""
+    scene = block(compliance=1e-6, mu=0.0, whole=False, confined=True)
+    scene.press(-0.1)
+    assert scene.contact.force()[1] == pytest.approx(0.2 * (2 + 1e6), rel=1e-9)
 
 
 PUSHES = [(0.0, -0.02), (0.03, -0.03), (0.06, -0.02)]
@@ -200,24 +208,40 @@ def test_a_plane_driven_by_force(name):
     np.testing.assert_allclose(driven.contact.force(), moved.contact.force(), rtol=1e-7, atol=1e-9)
 
 
-def test_a_disc_in_incompressible_rubber():
-    """A disc pressed into the block's top by contact has the force of the support, and nodes lie on it."""
-    scene = block(n=8, compliance=0.0, tol=1e-10)
-    W = scene.W
-    bottom, top = (mesh.locate_entities_boundary(scene.mesh, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1))  # fmt: skip
-    disc = dc.RigidSphere((1.0, 1.6), 0.6)
-    contact = dc.Contact(W, top, disc, dc.Friction(0.2))
+@pytest.mark.parametrize("bulk", [pytest.param(100.0, marks=pytest.mark.slow), None])
+def test_a_ball_in_a_block_of_tetrahedra(bulk):
+    """A ball pressed into rubber, incompressible, too: supports carry its force, touching nodes lie on it, volume stays."""
+    size = np.array([1.0, 1.0, 0.5])
+    domain = mesh.create_box(COMM, [np.zeros(3), size], (4, 4, 2), mesh.CellType.tetrahedron)
+    low, top = (mesh.locate_entities_boundary(domain, 2, lambda x, z=z: np.isclose(x[2], z)) for z in (0, 0.5))  # fmt: skip
+    W = taylor_hood(domain)
     w = fem.Function(W)
-    F = ufl.replace(scene.F, {scene.w: w})
-    bc, _ = held(W, bottom)
+    u, p = ufl.split(w)
+    gradient = ufl.Identity(3) + ufl.grad(u)
+    J, dx = ufl.det(gradient), ufl.dx(metadata={"quadrature_degree": 4})
+    energy = (ufl.tr(gradient.T * gradient) - 3 - 2 * ufl.ln(J)) / 2 + p * (J - 1)
+    energy -= 0 if bulk is None else p**2 / (2 * bulk)
+    bc, _ = held(W, low)
+    ball = dc.RigidSphere((0.5, 0.5, 0.9), 0.4, axis=(1, 0, 0))
+    contact = dc.Contact(W, top, ball, dc.Friction(0.3))
+    F = ufl.derivative(energy * dx, w, ufl.TestFunction(W))
     problem = dc.ContactProblem(F, w, contact, [bc])
-    for _ in range(3):
-        disc.displacement = disc.displacement + np.array([0.0, -0.01])
-        problem.solve()
-    assert contact.force()[1] < 0.0
-    reactions = contact.reaction_function()
-    assert reactions.function_space.dofmap.index_map_bs == 2
-    assert problem.counts().open > 0
+    for depth in (0.03, 0.06, 0.09):
+        ball.displacement = (0.0, 0.0, -depth)
+        assert problem.solve().iterations <= 6
+    body, of = problem.body, problem.body.displacements
+    carried = np.zeros(body.size)
+    carried[body.fixed] = body.residual(body.taken(w.x.array))[body.fixed]
+    carried = COMM.allreduce(of.rows(carried).sum(axis=0))
+    np.testing.assert_allclose(carried, -contact.force(), rtol=0, atol=1e-9)
+    displacement = w.sub(0).collapse().x.array.reshape(-1, 3)[contact.nodes]
+    away = np.linalg.norm(contact.x + displacement - [0.5, 0.5, 0.81], axis=1) - 0.4
+    touching = contact.reaction[:, -1] > 0.0
+    assert COMM.allreduce(int(touching.sum())) >= 4
+    assert np.abs(away[touching]).max(initial=0.0) < 2e-3  # tangent planes of the step before
+    volume = COMM.allreduce(fem.assemble_scalar(fem.form((J - 1) * dx)))
+    pressure = COMM.allreduce(fem.assemble_scalar(fem.form(p * dx)))
+    assert volume == pytest.approx(0.0 if bulk is None else pressure / bulk, abs=1e-9)
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])
