@@ -16,7 +16,9 @@ from test_any_body import BULK, rubber_seal
 from dolfinx_contact.compat import mixed_functionspace
 
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
-TILTED = pytest.mark.parametrize("tilted", [False, True], ids=["flat", "tilted"])
+TILTED = pytest.mark.parametrize(
+    "tilted", [pytest.param(False, marks=pytest.mark.slow), True], ids=["flat", "tilted"]
+)
 SOLVERS = {"CondensedNewton": dc.CondensedNewton(), "SparseNewton": dc.SparseNewton(), "FixedPoint": dc.FixedPoint()}  # fmt: skip
 
 
