@@ -19,9 +19,7 @@ class Unknowns:
     the units of those unknowns do not matter.  ``D`` is that of the first stiffness, and stays.
     """
 
-    scale: np.ndarray | None = (
-        None  # D, owned degrees of freedom; None where it is one, or not yet known
-    )
+    scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
     def show(self, x: np.ndarray) -> None:
         """Let ``u`` have these values, the first of which are the owned ones.  Collective."""

@@ -57,7 +57,7 @@ class Displacements:
             self._dofs = np.reshape(parent, (-1, self.V.dofmap.index_map_bs))
         self.dim, self.count = self.V.dofmap.index_map_bs, self.V.dofmap.index_map.size_local
 
-    @cached_property
+    @property
     def x(self) -> np.ndarray:
         """Positions of the nodes, ghosts included, ``shape=(nodes, 3)``."""
         return self.V.tabulate_dof_coordinates()
