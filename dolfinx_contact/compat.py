@@ -171,7 +171,7 @@ def cell_dofs(V):
     """Local degrees of freedom of each cell, components unrolled, ``shape=(cells, dofs)``."""
     bs = V.dofmap.index_map_bs
     cells = cell_nodes(V)
-    return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), -1)
+    return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), bs * cells.shape[1])
 
 
 def original_cells(mesh):

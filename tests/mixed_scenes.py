@@ -86,6 +86,7 @@ def block(
     solver=None,
     tol=1e-8,
     comm=None,
+    owners=None,
     **options,
 ):
     """A block of 2 by 1 on a plane in plane strain, its top moved by ``press(x, y)``, in shares of its height.
@@ -95,10 +96,12 @@ def block(
         length, modulus, pressure: Units; the last one of the unknown pressure alone, over the modulus.
         whole: Whether the top is held along the plane, too; else the side x = 0 is.
         confined: Whether the side x = 2 is held along x, too.
+        owners: Partitioner; None is DOLFINx's.
         load: Force per volume, over modulus and length, of a block that nothing else holds than the plane.
     """
     corners, cells = [np.zeros(2), length * np.array([2.0, 1.0])], (2 * n, n)
-    domain = mesh.create_rectangle(comm or COMM, corners, cells, mesh.CellType.quadrilateral)
+    shared = {} if owners is None else {"partitioner": owners}
+    domain = mesh.create_rectangle(comm or COMM, corners, cells, mesh.CellType.quadrilateral, **shared)  # fmt: skip
     bottom, top, side = (
         mesh.locate_entities_boundary(domain, 1, lambda x, i=i, at=at: np.isclose(x[i], at * length))
         for i, at in ((1, 0), (1, 1), (0, 0))

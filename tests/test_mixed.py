@@ -13,7 +13,7 @@ from mixed_scenes import block, held, pressed, problem_step, ring, taylor_hood
 from scenes import COMM, MPI
 from test_any_body import BULK, rubber_seal
 
-from dolfinx_contact.compat import mixed_functionspace
+from dolfinx_contact.compat import mixed_functionspace, partitioner
 
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
 TILTED = pytest.mark.parametrize(
@@ -269,6 +269,24 @@ def test_checkpoint(tmp_path, nonlinear):
     )
     np.testing.assert_allclose(w_, w, rtol=0, atol=1e-11 * np.abs(w).max(initial=1.0))
     np.testing.assert_allclose(r_, r, rtol=0, atol=1e-11)
+
+
+@pytest.mark.skipif(COMM.size == 1, reason="needs a rank without cells")
+@pytest.mark.parametrize("name", SOLVERS)
+def test_ranks_without_cells(tmp_path, name):
+    """A rank may have no cells: forces are those of a mesh that all share, a checkpoint of that is taken up."""
+    path = COMM.bcast(str(tmp_path / "state.npz"))
+    last = partitioner(lambda cells, size: np.full(cells, size - 1), 4)
+    spread, gathered = (block(solver=SOLVERS[name], owners=owners, tol=1e-10) for owners in (None, last))  # fmt: skip
+    for push in PUSHES[:2]:
+        for scene in (spread, gathered):
+            scene.press(*push)
+    np.testing.assert_allclose(gathered.contact.force(), spread.contact.force(), rtol=1e-7)
+    spread.problem.save(path)
+    gathered.problem.load(path)
+    for scene in (spread, gathered):
+        scene.press(*PUSHES[2])
+    np.testing.assert_allclose(gathered.contact.force(), spread.contact.force(), rtol=1e-7)
 
 
 def test_sub_space_or_whole():

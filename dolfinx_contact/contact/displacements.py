@@ -54,7 +54,7 @@ class Displacements:
         self.size = V.dofmap.index_map.size_local * V.dofmap.index_map_bs
         if self.mixed:
             self.V, parent = part.collapse()
-            self._dofs = np.reshape(parent, (-1, self.V.dofmap.index_map_bs))
+            self._dofs = np.array(parent, dtype=np.int32).reshape(-1, self.V.dofmap.index_map_bs)
         self.dim, self.count = self.V.dofmap.index_map_bs, self.V.dofmap.index_map.size_local
 
     @property
@@ -75,7 +75,7 @@ class Displacements:
 
     def vectors(self, rows: np.ndarray) -> np.ndarray:
         """Values of owned nodes, ``shape=(nodes, dim, m)``, as ``shape=(owned dofs, m)``; other unknowns are zero."""
-        flat = rows.reshape(self.count * self.dim, -1)
+        flat = rows.reshape(self.count * self.dim, rows.shape[-1])
         if not self.mixed:
             return flat
         vectors = np.zeros((self.size, flat.shape[1]))
