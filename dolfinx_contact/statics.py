@@ -192,12 +192,25 @@ class Statics:
             motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
         )
         least = ROUGH * np.linalg.norm(driven) * np.linalg.norm(sizes)
-        if driven @ self.loads <= least or abs(driven @ left) <= least:
-            return False
         if np.linalg.norm(left) > np.linalg.norm(self.loads):
             return False  # reactions of a body that is lost, not of one that slides
+        if driven @ self.loads <= least or abs(driven @ left) <= least:
+            overcome = [along for along in (self.loads, left) if self._overcome(along, sizes)]
+            if not overcome:
+                return False
+            driven = overcome[0]
         self.said = f"The loads drive {self._body.loose.words(driven)} by more than friction carries: no static state exists"
         return True
+
+    def _overcome(self, along: np.ndarray, sizes: np.ndarray) -> bool:
+        """Whether loads along a motion are more than present normal reactions carry with all their friction.  Collective."""
+        normal = np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
+        velocity = self._motion @ along
+        friction = np.linalg.norm(self._mu * velocity[:, :-1], axis=1)
+        carried = self._body.total([normal @ (friction - velocity[:, -1])])[0]
+        return bool(
+            self.loads @ along - carried > ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
+        )
 
     def balanced(self) -> bool:
         """Whether present reactions balance the loads, roughly: where a body is lost far away rounding hides that they do not.

@@ -155,6 +155,28 @@ def test_a_plate_below_a_body_that_nothing_holds_is_refused():
     assert scene.contact.force() @ scene.up == pytest.approx(1e-3, rel=1e-7)
 
 
+@pytest.mark.parametrize("kind", ["condensed", pytest.param("fixed point", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_clamped_block_is_pushed_out(dim, kind):
+    """Between plates whose pressure is not given: more than friction carries is refused, long before the limit of iterations.
+
+    Nodes that may carry any normal force could hold it: only the search tells that they do not.  What it ends with tells
+    the fixed point which motion it is.
+    """
+    scene = Loose(dim, kind, faces=("low", "high"))
+    scene.contacts[1].plane.displacement = -1e-3 * scene.up
+    scene.load(*np.zeros(dim))
+    most = 2 * 0.3 * (scene.contact.force() @ scene.up)
+    scene.load(*0.5 * most * np.eye(dim)[0])
+    kept = scene.u.x.array.copy()
+    said = r"a translation along \(1, 0(, 0)?\)" if kind == "fixed point" else None
+    for part in (1.1, 1.5)[: 1 if said else 2]:
+        with pytest.raises(dc.NotConverged, match=said) as failure:
+            scene.load(*part * most * np.eye(dim)[0])
+        assert failure.value.step.iterations < 10000  # the limit of the condensed solver is 200000
+        assert np.array_equal(scene.u.x.array, kept)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_block_that_tips_is_refused_as_a_rotation_about_its_edge(dim):
     """Friction enough, side force above half the width over half the height times the weight: it turns about its edge."""

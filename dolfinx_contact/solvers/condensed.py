@@ -21,7 +21,10 @@ from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 from dolfinx_contact.solvers.contact_tangent import next_change
 
-FEW = 3000  # iterations for a loose body that seems to slide away
+FEW, MANY = 3000, 6000  # iterations for a loose body that seems to slide away, and for any other
+
+# Error of a condensed problem above which it is not digits that are missing.
+ASTRAY = 1e-3
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -116,8 +119,8 @@ class CondensedBody:
             previous = error
             for limits in ({"fallbacks": False}, {}) if step.may_slide else ({},):
                 goal = factor * step.tol
-                if not limits and step.statics is not None and step.statics.slides(step):
-                    limits = {"max_iterations": min(FEW, self._options.max_iterations)}
+                if not limits and step.statics is not None:
+                    limits = self._limited(step)
                 near = [start - placed for start in starts]
                 result = self._reactions(step, q + rounding, goal, near, acting, limits)
                 iterations += result.iterations
@@ -137,7 +140,7 @@ class CondensedBody:
                 # The kernel's moves reactions between contacts of a node, which changes nothing else.
                 change = min(change, next_change(step, x))
             best = x, force, result, change
-            if max(error, change) <= step.tol:
+            if (not solved and result.error > ASTRAY) or max(error, change) <= step.tol:
                 break
             # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
             # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
@@ -153,6 +156,11 @@ class CondensedBody:
         self.past.append((rows, force, self._tied))
         forward = max(change, step.measure(x).largest)
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+
+    def _limited(self, step) -> dict:
+        """Limits of the search for a loose body.  Collective."""
+        most = FEW if step.statics.slides(step) else MANY
+        return {"max_iterations": min(most, self._options.max_iterations)}
 
     def _tell_shares(self, reaction: np.ndarray) -> None:
         """Give contacts their reactions: at nodes of several ``x`` tells no more than the sums."""

@@ -26,6 +26,9 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # the iterations until then do without.
 EVERY, SOONER, GROWTH, USELESS = 20, 10, 100.0, 0.9
 
+# Of a loose body, which may slide away, the error has to halve within so many iterations.
+PATIENCE = 60
+
 # Corrections that grow by this mislead.
 ASTRAY = 1e3
 
@@ -140,7 +143,8 @@ class BoundFixedPoint:
 
     def _fall(self, search, factor: float, every: int) -> None:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
-        search.begin(self._options.max_iterations)
+        patience = math.inf if search.step.statics is None else PATIENCE
+        search.begin(self._options.max_iterations, patience)
         while search.goes_on:
             self._accelerate(search, self._set(factor), search.best, every)
 
