@@ -21,10 +21,8 @@ from dolfinx_contact.solvers.condensed_planes import CondensedPlanes
 from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
 from dolfinx_contact.solvers.contact_tangent import next_change
 
-FEW, MANY = 3000, 6000  # iterations for a loose body that seems to slide away, and for any other
-
-# Error of a condensed problem above which it is not digits that are missing.
-ASTRAY = 1e-3
+# Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
+FEW, MANY, ASTRAY = 3000, 6000, 1e-3
 
 KEPT = 64  # earlier steps: more than a cycle has
 
@@ -140,7 +138,8 @@ class CondensedBody:
                 # The kernel's moves reactions between contacts of a node, which changes nothing else.
                 change = min(change, next_change(step, x))
             best = x, force, result, change
-            if (not solved and result.error > ASTRAY) or max(error, change) <= step.tol:
+            lost = step.may_slide and result.error > max(ASTRAY, goal)
+            if lost or max(error, change) <= step.tol:
                 break
             # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
             # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
