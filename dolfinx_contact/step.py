@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.driven import driven_planes
 from dolfinx_contact.contact.shared import shared_nodes
-from dolfinx_contact.contact.sliding import nothing_holds
+from dolfinx_contact.contact.sliding import lost_far_away, nothing_holds
 from dolfinx_contact.error import (
     EPSILON,
     Errors,
@@ -60,8 +60,7 @@ class LoadStep:
         self._shared = shared_nodes(contacts, stiffness, body.fixed)
         self.statics = None
         self._starts, self.unit, self._monitor = starts, unit, monitor
-        self._before = None  # reactions of the state judged before
-        self._told = 0
+        self._before, self._told = None, 0  # reactions of the state judged before, states told
         self._known = None  # a displacement, and the forces b - K x that it leaves
         self._measured = None  # displacement and contact states whose errors were measured with F
 
@@ -290,11 +289,5 @@ class LoadStep:
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
         errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
-        return errors._replace(error=np.inf) if self._lost(errors) else errors
-
-    def _lost(self, errors: Errors) -> bool:
-        """Whether body or planes are so far away that rounding hides the loads on them: no state is one then."""
-        loads = [] if self.statics is None else [self.statics.loads]
-        if self.planes is not None:  # of springs the force would be as large as the way is far
-            loads.append(self.planes.driving()[self.planes.springs == 0.0])
-        return errors.blind and any(load.any() for load in loads)
+        lost = errors.blind and lost_far_away(self.body, self.statics, self.planes, x, errors.acts)
+        return errors._replace(error=np.inf) if lost else errors

@@ -29,6 +29,27 @@ def slides_away(planes, body, contacts, given: bool) -> str:
     return ""
 
 
+def lost_far_away(body, statics, planes, x: np.ndarray, acts: bool) -> bool:
+    """Whether body or planes are so far away that rounding hides the loads on them: no state is one then.  Collective.
+
+    Args:
+        body: The body.
+        statics: Its ``Statics``, None where something holds it.
+        planes: The ``DrivenPlanes``, or None.
+        x: Displacement, owned degrees of freedom, whose rounding is as large as the forces that act, roughly.
+        acts: Whether some act above rounding.
+    """
+    loads, moved = [], body.displacements.rows(x)
+    if statics is not None:
+        loads.append(statics.loads)
+    if planes is not None:  # of springs the force would be as large as the way is far
+        loads.append(planes.driving()[planes.springs == 0.0])
+        moved = np.append(moved, planes.moved)
+    if not any(load.any() for load in loads):
+        return False
+    return not acts or body.largest(np.abs(moved)) > body.extent
+
+
 def nothing_holds(contacts) -> str:
     """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
     planes = [contact.plane for contact in contacts]
