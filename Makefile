@@ -19,7 +19,7 @@ arrays = bipotential condensed_errors condensed_kernel condensed_newton condense
 	friction friction_cone judge return_map
 # whole programs, whose parts have tests of their own, and what looks at sources: make test has them on one rank
 programs = accuracy demos docs report stress structure study
-# one test file or two of each feature that needs the mesh: make test has them on 2 ranks
+# one test file or two of each feature that needs the mesh: make test has each of their tests once on 2 ranks
 features = force friction_field held_by_contact history input_errors internal_variables mixed multigrid \
 	nonlinear oblique_supports patch problem rewind shared_nodes surfaces
 # of these a few, on several ranks of another DOLFINx: few, as meshes leave communicators behind
@@ -47,7 +47,7 @@ docs: .venv/ready
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" $(ARGS)
-	tools/mpitest .venv 2 -m "not slow" $(features_alone) $(ARGS)
+	tools/mpitest .venv 2 -m "not slow" --once $(features_alone) $(ARGS)
 	tools/ctest example
 
 # what make test leaves out; it needs make test to come first
@@ -57,7 +57,7 @@ test-slow: .venv/ready
 	tools/mpitest .venv 1 -m slow
 
 test-ranks: .venv/ready
-	tools/mpitest .venv 2 -m "not slow" $(no_arrays) $(features:%=--ignore=tests/test_%.py)
+	tools/mpitest .venv 2 -m "not slow" $(no_arrays)
 	tools/mpitest .venv 2 -m slow
 	tools/mpitest .venv 3 -m "not slow" $(no_arrays) $(no_programs)
 

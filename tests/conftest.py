@@ -47,6 +47,26 @@ def meet(where):
         time.sleep(1e-4)
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--once",
+        action="store_true",
+        help="of each test function the first set of parameters alone",
+    )
+
+
+@pytest.hookimpl(trylast=True)  # of those that -m and -k leave
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--once"):
+        return
+    first = {}
+    for item in items:
+        first.setdefault((item.path, getattr(item, "originalname", item.name)), item)
+    chosen = list(first.values())
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    items[:] = chosen
+
+
 def pytest_sessionstart(session):
     expected = os.environ.get("EXPECTED_RANKS")
     if expected is not None and comm.size != int(expected):

@@ -1,6 +1,7 @@
 """The six cycles of the study on finer meshes: work of friction of each cycle, and where nodes stick at its ends.
 
-``python -m studies.punch.fine FILE`` writes a table (CSV): the paper's mesh and graded ones of second order, 15 and 60 increments a cycle.
+``python -m studies.punch.fine FILE`` writes a table (CSV): the paper's mesh, and graded ones of second and first order, with the
+paper's 15 increments a cycle and more.
 """
 
 import csv
@@ -12,11 +13,15 @@ import dolfinx_contact as dc
 from studies.punch.limits import build, graded, uniform
 from studies.punch.model import Parameters, programme
 
-MESHES = {
-    "paper": uniform(8, order=1),
-    "graded 4": graded(4),
-    "graded 6": graded(6),
-    "graded 8": graded(8),
+MESHES = {  # and how many times the paper's 15 increments a cycle has
+    "paper": (uniform(8, order=1), (1, 4)),
+    "graded 4": (graded(4), (1, 2, 4, 8)),
+    "graded 6": (graded(6), (1, 2, 4)),
+    "first order, graded 8": (graded(8, order=1), (1, 2)),
+    "first order, graded 12": (graded(12, order=1), (1, 2)),
+    "first order, graded 16": (graded(16, order=1), (1, 2)),
+    "graded 8": (graded(8), (1, 2, 4)),
+    "graded 10": (graded(10), (1, 2)),
 }
 
 
