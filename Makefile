@@ -59,7 +59,7 @@ test-slow: .venv/ready
 test-ranks: .venv/ready
 	tools/mpitest .venv 2 -m "not slow" $(no_arrays)
 	tools/mpitest .venv 2 -m slow
-	tools/mpitest .venv 3 -m "not slow" $(no_arrays) $(no_programs)
+	tools/mpitest .venv 3 -m "not slow" --once $(no_arrays) $(no_programs)
 
 test-all: test
 	$(MAKE) test-rest
