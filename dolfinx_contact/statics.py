@@ -10,7 +10,7 @@ from mpi4py import MPI
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed_input import principal_axes
 
-# Part of the loads whose sum is rounding, part of that sum that may be left, and rays of friction cones that are tried.
+# Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
 ROUNDING, BALANCED, RAYS = 1e-12, 1e-7, 400
 
 # What reactions may leave of loads in a state that is no more than rounding away from a solution.
@@ -74,9 +74,8 @@ class Statics:
         b = step.free(step.b)
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
+        self.start, self._last, self.placed, self.said = last, last, False, ""
         escape = self._escape()
-        self.start, self._last, self.placed = last, last, False
-        self.said = ""
         if escape is not None:
             self.said = (
                 f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
@@ -91,7 +90,6 @@ class Statics:
         the rays that reach farthest along the rest, one after another, and least squares with weights that are not
         negative.  The last ones are reactions that balance the loads.
         """
-
         unit = float(np.linalg.norm(self.loads)) or 1.0
         target, rays, weights = -self.loads / unit, np.zeros((self.loads.size, 0)), np.zeros(0)
         rest, kept, self._balancing = target, [], np.zeros(self._motion.shape[:2])
@@ -150,11 +148,10 @@ class Statics:
         A linear programme for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
         as near as they can be.
         """
-        gaps = [np.zeros(0)]
         for contact in self._contacts:
             contact.move(self.start)
-            gaps.append(contact.gap)
-        mine = self._motion[:, -1], np.concatenate(gaps), self._balancing[:, -1]
+        gaps = np.concatenate([np.zeros(0), *(contact.gap for contact in self._contacts)])
+        mine = self._motion[:, -1], gaps, self._balancing[:, -1]
         parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
         motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
         if motion is not None:
@@ -168,11 +165,12 @@ class Statics:
             unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
         """
         changed = [np.zeros((0, self._felt.size))]
+        least = ROUNDING * self._body.largest(self._pressures())
         for contact, of in zip(self._contacts, step.stiffness):
             map = ReturnMap(of.normal, of.normal)
             state = contact.reaction, contact.gap, contact.slip_increment
             by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
-            by_motion[contact.reaction[:, -1] <= 0.0] = 0.0
+            by_motion[contact.reaction[:, -1] <= least] = 0.0
             changed.append(
                 (by_motion @ contact.points.motion(self._modes)).reshape(-1, self._felt.size)
             )
@@ -204,21 +202,23 @@ class Statics:
 
     def _overcome(self, along: np.ndarray, sizes: np.ndarray) -> bool:
         """Whether loads along a motion are more than present normal reactions carry with all their friction.  Collective."""
-        normal = np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
         velocity = self._motion @ along
         friction = np.linalg.norm(self._mu * velocity[:, :-1], axis=1)
-        carried = self._body.total([normal @ (friction - velocity[:, -1])])[0]
-        return bool(
-            self.loads @ along - carried > ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
-        )
+        carried = self._body.total([self._pressures() @ (friction - velocity[:, -1])])[0]
+        least = ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
+        return bool(self.loads @ along - carried > least)
+
+    def _pressures(self) -> np.ndarray:
+        """Present normal reactions of all contacts."""
+        return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
 
     def balanced(self) -> bool:
-        """Whether present reactions balance the loads, roughly: where a body is lost far away rounding hides that they do not.
+        """Whether reactions balance the loads, roughly: of a body that is lost rounding hides that they do not.  Collective.
 
-        Collective.
+        Along motions without loads reactions may be no more than rounding, and say nothing.
         """
         left, sizes = self._left()
-        return bool((np.abs(left) <= ROUGH * sizes).all())
+        return bool((np.abs(left) <= ROUGH * sizes)[self.loads != 0.0].all())
 
     def _left(self) -> tuple[np.ndarray, np.ndarray]:
         """Sums of loads and present reactions along the motions, and those of their magnitudes."""
@@ -243,7 +243,7 @@ class Statics:
             ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
         """
         motions = self._free_motions(step, UNFELT)
-        if motions.shape[1] == 0:
+        if not motions.size:
             return x
         if choice == "refused":
             raise ValueError(
