@@ -8,7 +8,8 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from patches import LAME, MU, G, P, box, even_state, turned
+from patches import LAME, G, even_block, solved
+from ring_scenes import bend, between_planes, clamped_middle, half_ring
 from scenes import COMM
 
 from dolfinx_contact import compat
@@ -24,10 +25,8 @@ def held(W, facets, values=None, component=None):
     """A condition on displacements, or one of their components, at facets; ``values(x)``, None is zero."""
     part = W.sub(0) if component is None else W.sub(0).sub(component)
     whole, _ = part.collapse()
-    where, value = (
-        fem.locate_dofs_topological((part, whole), W.mesh.topology.dim - 1, facets),
-        fem.Function(whole),
-    )
+    where = fem.locate_dofs_topological((part, whole), W.mesh.topology.dim - 1, facets)
+    value = fem.Function(whole)
     if values is not None:
         value.interpolate(values)
     return fem.dirichletbc(value, where, part), value
@@ -43,34 +42,12 @@ def elasticity(w, test, G, compliance, dx=ufl.dx, sign=1.0):
 
 def pressed(cell, slips, tilted, curved=False, solver=None, sign=1.0, **options):
     """A block under the tractions of an even stress, as ``patches.pressed``, in the mixed form."""
-    domain, bottom, top = box(cell, curved=curved)
-    d = domain.geometry.dim
-    turn = turned(d) if tilted else np.eye(d)
-    domain.geometry.x[:, :d] = domain.geometry.x[:, :d] @ turn.T
-    W = taylor_hood(domain)
-    w = fem.Function(W)
-    gradient, traction, slip = even_state(d, slips)
-    gradient, slip_ = turn @ gradient @ turn.T, turn @ slip
-    strain = (gradient + gradient.T) / 2
-    sigma = LAME * np.trace(strain) * np.eye(d) + 2 * G * strain
-    bc, exact = held(W, top, lambda x: gradient @ x[:d] + slip_[:, None])
-    sides = np.setdiff1d(mesh.exterior_facet_indices(domain.topology), np.union1d(bottom, top))
-    tags = mesh.meshtags(domain, d - 1, sides, np.ones(sides.size, dtype=np.int32))
-    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)(1)
-    dx = ufl.dx(metadata={"quadrature_degree": 6}) if curved else ufl.dx
-    test = ufl.TestFunction(W)
-    load = fem.Constant(domain, sigma) * ufl.FacetNormal(domain)
-    F = elasticity(w, test, G, 1 / LAME, dx, sign) - ufl.inner(load, ufl.split(test)[0]) * ds
-    plane = dc.RigidPlane(np.zeros(d), turn[:, -1], turn[:, 0] if d == 3 else None)
-    friction = dc.Friction(MU, P) if d == 3 else dc.Friction(MU[0])
-    contact = dc.Contact(W, bottom, plane, friction)
-    problem = dc.ContactProblem(F, w, contact, [bc], solver=solver, tol=1e-12, **options)
-    step = problem.solve()
-    pressure = LAME * np.trace(strain)
-    return SimpleNamespace(
-        w=w, contact=contact, problem=problem, exact=exact, traction=traction, slip=slip, step=step, mesh=domain,
-        pressure=pressure,
-    )  # fmt: skip
+    even = even_block(cell, slips, tilted, curved)
+    W = taylor_hood(even.mesh)
+    w, test = fem.Function(W), ufl.TestFunction(W)
+    bc, even.exact = held(W, even.top, even.moved)
+    F = elasticity(w, test, G, 1 / LAME, even.dx, sign) - even.work(ufl.split(test)[0])
+    return solved(even, F, w, bc, solver=solver, tol=1e-12, **options)
 
 
 def block(
@@ -155,21 +132,10 @@ def ring(
         pressure: Its element.
         volume: Degree to which what changes the volume is integrated.
     """
-    kind = mesh.CellType.quadrilateral
-    domain = mesh.create_rectangle(COMM, [np.zeros(2), np.ones(2)], cells, kind)
-
-    def facets(where):
-        return mesh.locate_entities_boundary(domain, 1, where)
-
-    sides = [facets(lambda x, s=s: np.isclose(x[0], 1.0) & (s * (x[1] - 0.5) > 0.1)) for s in (1, -1)]  # fmt: skip
-    ends = facets(lambda x: np.isclose(np.abs(x[1] - 0.5), 0.5))
+    domain, sides = half_ring(2, cells)
     W = taylor_hood(domain, *([("Lagrange", 1)] if jacobian else []), pressure=pressure)
-    middle, (whole, _) = W.sub(0).sub(1), W.sub(0).sub(1).collapse()
-    dofs = fem.locate_dofs_geometrical((middle, whole), lambda x: np.isclose(x[1], 0.5))
-    bcs = [held(W, ends, component=0)[0], fem.dirichletbc(fem.Function(whole), dofs, middle)]
-    x = domain.geometry.x
-    radius, angle = 0.6 + 0.4 * x[:, 0], np.pi * (x[:, 1] - 0.5)
-    x[:, 0], x[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
+    bcs = clamped_middle(W.sub(0))
+    bend(domain)
     w = fem.Function(W)
     u, p, *theta = ufl.split(w)
     gradient = ufl.Identity(2) + ufl.grad(u)
@@ -181,17 +147,7 @@ def ring(
         of_volume = p * (J - 1) - (0 if bulk is None else p**2 / (2 * bulk))
     dx = [ufl.dx(metadata={"quadrature_degree": degree}) for degree in (5, volume)]
     F = ufl.derivative(energy * dx[0] + of_volume * dx[1], w, ufl.TestFunction(W))
-    contacts = []
-    for side, mine in zip((1.0, -1.0), sides):
-        normal = np.array([0.0, -side])
-        contacts.append(dc.Contact(W, mine, dc.RigidPlane(-normal, normal), dc.Friction((mu, mu))))
-    problem = dc.ContactProblem(F, w, contacts, bcs, tol=tol)
-    steps = [problem_step(problem, contacts, depth) for depth in 0.3 * np.arange(1, steps + 1) / steps]  # fmt: skip
-    return SimpleNamespace(problem=problem, contacts=contacts, w=w, steps=steps, J=J, mesh=domain)
-
-
-def problem_step(problem, contacts, depth):
-    """One step of planes that have moved inwards by a depth."""
-    for contact in contacts:
-        contact.plane.displacement = depth * contact.plane.normal
-    return problem.solve()
+    found = between_planes(F, w, sides, bcs, mu, tol)
+    found.w, found.J, found.mesh = w, J, domain
+    found.steps = [found.press(depth) for depth in 0.3 * np.arange(1, steps + 1) / steps]
+    return found

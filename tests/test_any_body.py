@@ -1,12 +1,11 @@
 """Bodies as users bring them: rings, nearly incompressible rubber, misfit, two bodies in a mesh, hysteresis, forms that are NaN."""
 
-from types import SimpleNamespace
-
 import nonlinear_scenes as scenes
 import numpy as np
 import pytest
 import ufl
 from nonlinear_scenes import HEIGHT, MEASURE, MPI, block, move
+from ring_scenes import DEEP, bend, between_planes, clamp, clamped_middle, half_ring
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
@@ -24,17 +23,6 @@ from dolfinx_contact.compat import (
 from mechanics.material import elasticity
 
 COMM = MPI.COMM_WORLD
-INNER, DEEP = 0.6, 0.2  # of the ring of outer radius 1: inner radius, length of half of it
-
-
-def clamp(V, axis, where, value=0.0):
-    """A condition on one component at the nodes of a place."""
-    part = V.sub(axis)
-    whole, _ = part.collapse()
-    dofs = fem.locate_dofs_geometrical((part, whole), where)
-    held = fem.Function(whole)
-    held.x.array[:] = value
-    return fem.dirichletbc(held, dofs, part)
 
 
 def total(form) -> float:
@@ -43,44 +31,18 @@ def total(form) -> float:
 
 def ring(gdim, mu=0.0, plane_strain=False, degree=1, cells=(3, 14), stored=None, tol=1e-10):
     """Half a thick ring (x > 0) between two planes that come down from above and up from below."""
-    size = [*cells, 1][:gdim]
-    kind = mesh.CellType.quadrilateral if gdim == 2 else mesh.CellType.hexahedron
-    create = mesh.create_rectangle if gdim == 2 else mesh.create_box
-    domain = create(COMM, [np.zeros(gdim), np.ones(gdim)], size, kind)
-
-    def touching(side):
-        return mesh.locate_entities_boundary(
-            domain, gdim - 1, lambda x: np.isclose(x[0], 1.0) & (side * (x[1] - 0.5) > 0.1)
-        )
-
-    above, below = touching(1), touching(-1)
+    domain, sides = half_ring(gdim, cells)
     V = functionspace(domain, ("Lagrange", degree, (gdim,)))
-    bcs = [
-        clamp(V, 0, lambda x: np.isclose(np.abs(x[1] - 0.5), 0.5)),
-        clamp(V, 1, lambda x: np.isclose(x[1], 0.5)),
-    ]
+    bcs = clamped_middle(V)
     if gdim == 3:
         ends = (0.0, 1.0) if plane_strain else (0.0,)
         bcs += [clamp(V, 2, lambda x, z=z: np.isclose(x[2], z)) for z in ends]
-    x = domain.geometry.x
-    radius, angle = INNER + (1 - INNER) * x[:, 0], np.pi * (x[:, 1] - 0.5)
-    x[:, 0], x[:, 1], x[:, 2] = radius * np.cos(angle), radius * np.sin(angle), DEEP * x[:, 2]
+    bend(domain)
     u, v = fem.Function(V), ufl.TestFunction(V)
     stored = stored(u) if stored else scenes.energy(u) * ufl.dx(domain=domain, metadata=MEASURE)
-    contacts = []
-    for side, mine in ((1.0, above), (-1.0, below)):
-        normal, axis = np.zeros(gdim), np.eye(gdim)[0]
-        normal[1] = -side
-        plane = dc.RigidPlane(-normal, normal, axis if gdim == 3 else None)
-        contacts.append(dc.Contact(V, mine, plane, dc.Friction((mu, mu))))
-    problem = dc.ContactProblem(ufl.derivative(stored, u, v), u, contacts, bcs, tol=tol)
-
-    def press(depth):
-        for contact in contacts:
-            contact.plane.displacement = depth * contact.plane.normal
-        return problem.solve()
-
-    return SimpleNamespace(problem=problem, contacts=contacts, press=press, stored=stored, u=u, mesh=domain)  # fmt: skip
+    scene = between_planes(ufl.derivative(stored, u, v), u, sides, bcs, mu, tol)
+    scene.stored, scene.u, scene.mesh = stored, u, domain
+    return scene
 
 
 @pytest.mark.parametrize("gdim", [2, 3])
