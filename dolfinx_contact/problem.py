@@ -116,7 +116,7 @@ class ContactProblem(ProblemStates):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
         comm = u.function_space.mesh.comm
         with raised_together(comm):
-            self.contacts, of = checked_contacts(contacts, u)
+            self.contacts = checked_contacts(contacts, u)
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
             self.undetermined = undetermined
@@ -125,6 +125,7 @@ class ContactProblem(ProblemStates):
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
         self.u, self.monitor = u, None
+        of = self.contacts[0].displacements if self.contacts else None
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of)
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)

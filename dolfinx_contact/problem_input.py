@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -27,8 +26,8 @@ LARGE = 10.0  # a displacement of so many times the size of a body is one in oth
 UNDETERMINED = ("refused", "nearest")
 
 
-def checked_contacts(contacts, u) -> tuple[tuple[Contact, ...], Any]:
-    """The contacts, each on the space of ``u``, and the displacements which they mean, None without contacts."""
+def checked_contacts(contacts, u) -> tuple[Contact, ...]:
+    """The contacts, each on the space of ``u``, all with the same displacements."""
     if isinstance(contacts, Contact):
         contacts = [contacts]
     if not isinstance(contacts, (list, tuple)):
@@ -52,7 +51,7 @@ def checked_contacts(contacts, u) -> tuple[tuple[Contact, ...], Any]:
         raise ValueError(
             "contacts mean different sub-spaces of a mixed space as displacements: build all on the same."
         )
-    return tuple(contacts), of[0] if of else None
+    return tuple(contacts)
 
 
 def check_mesh(contact: Contact) -> None:
@@ -279,7 +278,7 @@ def check_step(u, comm, contacts) -> None:
 
 def check_size(body, x: np.ndarray) -> bool:
     """Warn of a displacement far larger than the body; whether it was.  Collective."""
-    largest = body.largest(np.abs(body.displacements.rows(x)))
+    largest = body.farthest(x)
     if largest <= LARGE * body.extent:
         return False
     warnings.warn(

@@ -89,9 +89,7 @@ def _floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
 
 def presses(body, contacts, trial: np.ndarray) -> bool:
     """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
-    return _deepest(body, contacts, trial) > CERTAIN * body.largest(
-        np.abs(body.displacements.rows(trial))
-    )
+    return _deepest(body, contacts, trial) > CERTAIN * body.farthest(trial)
 
 
 def may_touch(body, contacts, trial: np.ndarray) -> bool:

@@ -163,9 +163,7 @@ class ElasticBody(Unknowns, OverRanks):
             ``b`` with ``b - K u`` the residual forces for any ``u`` that has the boundary values
             (which ``b`` holds at fixed degrees of freedom), and the external forces alone.
         """
-        local = np.zeros_like(self._work.x.array)
-        compat.set_bc_values(local, self.bcs)
-        lift = self.taken(local)
+        lift = self.boundary_values()
         digest = digest_of(self._load_parameters)
         if self.comm.allreduce(digest != self._load_digest, op=MPI.LOR):
             self._external = -self.internal_force(np.zeros(self.size))

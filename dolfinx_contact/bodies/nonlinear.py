@@ -123,9 +123,7 @@ class NonlinearBody(ElasticBody):
         Returns:
             An array that is zero but for the boundary values at fixed degrees of freedom, and the forces.
         """
-        values, local = np.zeros(self.size), np.zeros_like(self._work.x.array)
-        compat.set_bc_values(local, self.bcs)
-        values[self.fixed] = self.taken(local)[self.fixed]
+        values = self.boundary_values()
         external = -self.internal_force(np.zeros(self.size))
         external[self.fixed] = 0.0
         check_finite({"boundary values": values, "loads, F at u = 0,": external}, self.comm)

@@ -8,11 +8,12 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from dolfinx_contact import compat
 from dolfinx_contact.collective import raised_together
 
 
 class Unknowns:
-    """Unknowns ``u = D x`` and residuals ``D F``, of a body that has ``u``, ``size`` and ``displacements``.
+    """Unknowns ``u = D x`` and residuals ``D F``, of a body that has ``u``, ``bcs``, ``size``, ``displacements``, and sums over ranks.
 
     ``D`` is one for displacements.  For other unknowns, as pressures, it makes ``x`` a length and the residual, as of
     volumes, a force, see ``scales``: all that compares, adds and minimises is then about lengths and forces alone, and
@@ -34,6 +35,16 @@ class Unknowns:
         """``x`` of values of ``u``, the first of which are the owned ones."""
         values = values[: self.size].copy()
         return values if self.scale is None else values / self.scale
+
+    def boundary_values(self) -> np.ndarray:
+        """``x`` of the Dirichlet conditions' values, zero at free degrees of freedom."""
+        values = np.zeros_like(self.u.x.array)
+        compat.set_bc_values(values, self.bcs)
+        return self.taken(values)
+
+    def farthest(self, x: np.ndarray) -> float:
+        """Largest component of a displacement, of either sign, over all ranks."""
+        return self.largest(np.abs(self.displacements.rows(x)))
 
     def as_forces(self, residual: np.ndarray) -> np.ndarray:
         """Residuals of which the first are the owned ones, as forces."""

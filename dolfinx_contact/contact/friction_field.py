@@ -96,10 +96,8 @@ def _coefficients(contact, name: str, given, state):
 def _axes(contact, given):
     if not is_field(given):
         return given
-    values, (n, gdim) = (
-        _values(contact, "axes", given, {}),
-        (contact.nodes.size, contact.points.dim),
-    )
+    n, gdim = contact.nodes.size, contact.points.dim
+    values = _values(contact, "axes", given, {})
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "

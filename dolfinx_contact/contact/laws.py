@@ -21,9 +21,7 @@ class ContactLaws(ContactHistory):
 
     _guides: tuple | None = None
     _field: Friction | None = None  # the law given, if it follows the state
-    _begun: tuple[Friction, Friction] | None = (
-        None  # what was given, and the law, at the beginning of the step
-    )
+    _begun: tuple[Friction, Friction] | None = None  # ``_given`` and the law as the step began
 
     @property
     def friction(self) -> Friction:
@@ -38,8 +36,9 @@ class ContactLaws(ContactHistory):
     def friction(self, friction: Friction) -> None:
         gdim, field = self.V.mesh.geometry.dim, None
         if getattr(friction, "field", False):
-            field = friction if followed(friction) else None
-            state = self._state(followed(friction), empty="_present" not in self.__dict__)
+            names = followed(friction)
+            field = friction if names else None
+            state = self._state(names, empty="_present" not in self.__dict__)
             with raised_together(self.comm):
                 turned = directed(friction, gdim)
                 friction = on_nodes(self, friction, state)

@@ -94,10 +94,8 @@ class ContactResults(ContactLaws):
 
     def reaction_function(self) -> fem.Function:
         """Nodal reactions in global components as a Function on the space of displacements, zero elsewhere."""
-        function, forces = (
-            fem.Function(self.displacements.V, name="reaction"),
-            np.zeros(self.points.size),
-        )
+        function = fem.Function(self.displacements.V, name="reaction")
+        forces = np.zeros(self.points.size)
         self.points.add_forces(self.reaction, forces)
         rows = self.displacements.rows(forces)
         function.x.array[: rows.size] = rows.ravel()

@@ -39,15 +39,15 @@ def lost_far_away(body, statics, planes, x: np.ndarray, acts: bool) -> bool:
         x: Displacement, owned degrees of freedom, whose rounding is as large as the forces that act, roughly.
         acts: Whether some act above rounding.
     """
-    loads, moved = [], body.displacements.rows(x)
+    loads, moved = [], np.zeros(0)
     if statics is not None:
         loads.append(statics.loads)
     if planes is not None:  # of springs the force would be as large as the way is far
         loads.append(planes.driving()[planes.springs == 0.0])
-        moved = np.append(moved, planes.moved)
+        moved = np.abs(planes.moved)
     if not any(load.any() for load in loads):
         return False
-    return not acts or body.largest(np.abs(moved)) > body.extent
+    return not acts or max(body.farthest(x), moved.max(initial=0.0)) > body.extent
 
 
 def nothing_holds(contacts) -> str:

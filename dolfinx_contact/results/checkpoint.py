@@ -35,15 +35,15 @@ def save(path, body, contacts, states, past, variables) -> None:
     with raised_together(comm):
         _check_path(path)
     body.refresh()
-    mine = nodes | {"ranks": np.array([len(nodes["nodes"])])}
+    mine, rows = nodes | {"ranks": np.array([len(nodes["nodes"])])}, body.displacements.rows
     for name, array in zip(("u", "before"), states):
-        mine[name] = _rows(body, array)
+        mine[name] = rows(array)
     if body.displacements.mixed:
         mine |= {f"mixed_{name}": _by_cells(body, a) for name, a in zip(("u", "before"), states)}
     elif body.known:
         known = body.known
-        mine |= {"digest": known.digest[None], "load": _rows(body, known.load)}
-        mine["free" if known.exact else "rough"] = _rows(body, known.displacement)
+        mine |= {"digest": known.digest[None], "load": rows(known.load)}
+        mine["free" if known.exact else "rough"] = rows(known.displacement)
     for k, contact in enumerate(contacts):
         mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
     if past:
@@ -163,11 +163,6 @@ def _nodes(body, contacts) -> dict[str, np.ndarray]:
     if body.displacements.mixed:
         of_contacts["mixed_nodes"] = compat.original_cells(body.V.mesh)
     return {"nodes": original} | of_contacts
-
-
-def _rows(body, array: np.ndarray) -> np.ndarray:
-    """Displacements among values of owned degrees of freedom, a row a node."""
-    return body.displacements.rows(array)
 
 
 def _by_cells(body, array: np.ndarray) -> np.ndarray:
