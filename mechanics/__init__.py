@@ -1,1 +1,1 @@
-"""What tests and benchmarks share: scenes, a material, a judge of answers, orders of convergence; no part of any solver."""
+"""What tests and benchmarks share: scenes, a material, a judge of answers; no part of any solver."""

@@ -28,7 +28,7 @@ from studies.punch import __main__ as study_punch
 from studies.punch.contact_map import ContactMap, gather, mirrored
 from studies.punch.measures import hysteresis, plateau, zones
 from studies.punch.run import EnergyBalance, Run, compute
-from studies.punch.work import TERMS, comparison, mesh_orders
+from studies.punch.work import TERMS, comparison
 
 COMM = MPI.COMM_WORLD
 ALONE = COMM.size == 1
@@ -190,27 +190,6 @@ def test_variant_that_fails_is_in_the_table(tmp_path, monkeypatch):
         assert [bool(row["not_converged"]) for row in table] == [False, True]
         assert table[1]["not_converged"].startswith("step 1: not converged: error")
         assert np.isnan(table[1]["first_cycle_Nmm"])
-
-
-def run_with_work(work, refine):
-    """A run of one cycle with this work of friction on this mesh."""
-    of_node = dict(x=np.zeros((1, 2)), dissipation=lambda cycle: np.array([cycle * work]))
-    return SimpleNamespace(parameters=SimpleNamespace(refine=refine), **of_node)
-
-
-def test_observed_order_of_known_sequences():
-    """Errors c h^p give order p and the limit to rounding; changes that do not fall give neither."""
-    for order, limit in ((1.0, 300.0), (2.0, -5.0), (0.5, 1.0)):
-        runs = {
-            name: {"A": run_with_work(limit + 7.0 * 2.0 ** (-order * level), level)}
-            for level, name in enumerate(("base", "mesh refined 1x", "mesh refined 2x"))
-        }
-        *first, last = mesh_orders(runs)
-        assert np.isnan([row["observed_order"] for row in first]).all()
-        assert last["observed_order"] == pytest.approx(order, rel=1e-9)
-        assert last["limit_at_that_order_Nmm"] == pytest.approx(limit, rel=1e-9)
-    runs["mesh refined 2x"]["A"] = run_with_work(-50.0, 2)
-    assert np.isnan(mesh_orders(runs)[-1]["limit_at_that_order_Nmm"])
 
 
 def strip(status, slip=None):

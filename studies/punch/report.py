@@ -56,7 +56,7 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
     work.convergence(figures, variants)
     answers = ask({name: cases for name, cases in runs.items() if name != "mesh coarsened"})
     tables = dict(
-        variants=variants, mesh=work.mesh_orders(runs), cycles=work.cycles(figures, wear), answers=answers,
+        variants=variants, cycles=work.cycles(figures, wear), answers=answers,
         statements=verdicts(answers),
     )  # fmt: skip
     for name, rows in tables.items():
@@ -68,8 +68,6 @@ def report(runs: dict[str, dict[str, Run]], output: Path, wear: float, failures=
         "<h2>Work of friction and wear, cycle by cycle</h2>", page.table(tables["cycles"]),
         page.paragraph(f"Worn volume at {wear:g} mm³/(N mm); depth and volume are proportional to it."),
         "<h2>Variants</h2>", page.table(variants),
-        page.paragraph("Against the mesh: order of the last three meshes, and the limit if that order lasted."),
-        page.table(tables["mesh"]),
         "<h2>Parameters</h2>", page.table(settings(base)),
     ]  # fmt: skip
     title = f"Cyclic punch with anisotropic friction: cases {', '.join(base)}"

@@ -3,7 +3,6 @@
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from mechanics.convergence import richardson
 from studies.punch.contact_map import paint
 from studies.punch.figures import COLOURS, NAMES, Figures, write_csv
 from studies.punch.measures import total
@@ -128,28 +127,6 @@ def comparison(runs: dict[str, dict[str, Run]], failures=()) -> list[dict]:
                 energy_left_open=float(relative_residual(run).max()), not_converged="",
             ))  # fmt: skip
     return rows + [dict.fromkeys(rows[0], np.nan) | failure for failure in failures]
-
-
-def mesh_orders(runs: dict[str, dict[str, Run]]) -> list[dict]:
-    """Work of friction in the first cycle against the mesh, whose width halves from row to row; Richardson's order
-    and limit from three meshes, nan where their changes do not fall."""
-    rows = []
-    for case in runs["base"]:
-        meshes = {
-            cases[case].parameters.refine: cases[case]
-            for name, cases in runs.items()
-            if case in cases and name.startswith(("base", "mesh "))
-        }
-        work = {level: total(run, 1) for level, run in meshes.items()}
-        for level in sorted(meshes):
-            last = [work[k] for k in (level - 2, level - 1, level) if k in work]
-            limit, order = richardson([4, 2, 1], last, (1e-9, 60))
-            rows.append(dict(
-                case=case, refine=level, contact_nodes=len(meshes[level].x), first_cycle_Nmm=work[level],
-                change_relative=work[level] / work.get(level - 1, np.nan) - 1, observed_order=order or np.nan,
-                limit_at_that_order_Nmm=limit if order else np.nan,
-            ))  # fmt: skip
-    return rows
 
 
 def convergence(figures: Figures, rows: list[dict]) -> None:
