@@ -58,7 +58,7 @@ test-slow: .venv/ready
 
 test-ranks: .venv/ready
 	tools/mpitest .venv 2 -m "not slow" $(no_arrays)
-	tools/mpitest .venv 2 -m slow
+	tools/mpitest .venv 2 -m slow --once
 	tools/mpitest .venv 3 -m "not slow" --once $(no_arrays) $(no_programs)
 
 test-all: test
@@ -70,9 +70,9 @@ test-cpp: .venv/ready
 test-python: .venv/ready
 	for n in $(RANKS); do tools/mpitest .venv $$n $(ARGS) || exit 1; done
 
-# those of the Python tests that touch DOLFINx, on the newest one on PyPI; on 2 ranks a feature of each kind
+# those of the Python tests that touch DOLFINx, each once, on the newest one on PyPI; on 2 ranks a feature of each kind
 test-wheel: .venv-wheel/ready
-	tools/mpitest .venv-wheel 1 -m "not slow" $(no_arrays) $(ARGS)
+	tools/mpitest .venv-wheel 1 -m "not slow" --once $(no_arrays) $(ARGS)
 
 test-wheel-ranks: .venv-wheel/ready
 	tools/mpitest .venv-wheel 2 -m "not slow" $(on_ranks:%=tests/test_%.py) $(ARGS)
