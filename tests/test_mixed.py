@@ -150,10 +150,12 @@ def test_missing_volume_counts_as_a_force():
 
 @pytest.mark.parametrize("mu", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 @pytest.mark.parametrize("bulk", [pytest.param(100.0, marks=pytest.mark.slow), 1000.0, None])
-def test_rubber_seal_at_30_percent(bulk, mu):
+def test_rubber_seal_at_30_percent(bulk, mu, record_property):
     """Neo-Hookean rubber down to incompressible: both planes carry the same, volumes obey, few iterations."""
     scene = ring(bulk, mu)
     upper, lower = (contact.force() for contact in scene.contacts)
+    record_property("iterations", [step.iterations for step in scene.steps])
+    record_property("force", lower[1])
     np.testing.assert_allclose(lower, upper * [1, -1], rtol=1e-6, atol=1e-9)
     assert max(step.iterations for step in scene.steps) <= 6
     volume = COMM.allreduce(fem.assemble_scalar(fem.form((scene.J - 1) * ufl.dx(domain=scene.mesh, metadata={"quadrature_degree": 5}))))  # fmt: skip
