@@ -159,12 +159,6 @@ class Drive(Guarded):
         self._spin = angle
 
     @property
-    def free_axes(self) -> np.ndarray:
-        """Unit vectors of the free directions, ``shape=(m, gdim)``, global frame."""
-        known = self.directions
-        return self.drive_axes[[known.index(name) for name in self._free if name in known]]
-
-    @property
     def motions(self) -> list[Motion]:
         """The free motions, rotations first."""
         axes = self.drive_axes
