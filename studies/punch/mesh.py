@@ -19,7 +19,8 @@ CORE = 0.5 * 1.15  # half of the core's side over that of the square in the circ
 
 
 def punch_mesh(
-    comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4, lowest=None, order=1, rim=None, quarter=False
+    comm, refine=0, *, radius=10.0, height=10.0, divisions=8, layers=4, lowest=None, order=1, rim=None, quarter=False,
+    tetrahedra=False
 ):  # fmt: skip
     """Mesh of a punch standing on z = 0, its axis along z, distributed over ``comm``.
 
@@ -33,6 +34,7 @@ def punch_mesh(
         order: 2 for bricks of 27 nodes whose outer faces are curved: a circle is one, to the fourth order.
         rim: Width of the quadrilaterals at the rim over that of their block; inwards they grow by the same factor.
         quarter: Only the part x, y > 0, of half as many quadrilaterals along the core's sides; ``divisions`` must be even.
+        tetrahedra: Six in place of each hexahedron, on the same nodes in second order.
 
     Returns:
         A record with ``mesh`` and ``facet_tags`` (CONTACT, TOP), as DOLFINx's ``model_to_mesh``.
@@ -54,7 +56,9 @@ def punch_mesh(
         if comm.rank == 0:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.model.add("punch")
-            shares = _layers(int(layers), lowest and lowest / height)
+            shares = _layers(int(layers), lowest and lowest / height) | dict(
+                recombine=not tetrahedra
+            )
             growth = 1.0 if rim is None else math.exp(_growth(int(divisions), rim))
             build = _build_quarter if quarter else _build
             build(height / radius, int(divisions), growth, **shares)
@@ -126,15 +130,16 @@ def _build_quarter(height, divisions, growth, **layers):
     _extrude(height, loops, None, **layers)
 
 
-def _extrude(height, loops, spare, **layers):
+def _extrude(height, loops, spare, recombine, **layers):
     """The mesh over the plane blocks within the loops; ``spare`` is a point of no element, or None."""
     geo = gmsh.model.geo
     blocks = [geo.addPlaneSurface([geo.addCurveLoop(loop)]) for loop in loops]
     for block in blocks:
         geo.mesh.setTransfiniteSurface(block)
-        geo.mesh.setRecombine(2, block)
+        if recombine:
+            geo.mesh.setRecombine(2, block)
     # extrude answers, for each surface, its copy, the volume and the sides
-    extruded = [geo.extrude([(2, b)], 0, 0, height, recombine=True, **layers) for b in blocks]
+    extruded = [geo.extrude([(2, b)], 0, 0, height, recombine=recombine, **layers) for b in blocks]
     geo.synchronize()
     if spare is not None:
         gmsh.model.removeEntities([(0, spare)])  # or it would be meshed as a node of no element
