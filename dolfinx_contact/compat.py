@@ -174,45 +174,23 @@ def cell_dofs(V):
     return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), bs * cells.shape[1])
 
 
-def original_cells(mesh):
-    """Index of each owned cell in the mesh as it was read or made, whatever the ranks."""
-    owned = mesh.topology.index_map(mesh.topology.dim).size_local
-    return np.array(mesh.topology.original_cell_index[:owned], dtype=np.int64)
+def read_cells(mesh):
+    """Index of each cell in the mesh that was read or made; empty where DOLFINx does not know it, as of submeshes."""
+    try:
+        return mesh.topology.original_cell_index
+    except RuntimeError:  # of submeshes since 0.10
+        return []
 
 
-def original_nodes(V):
-    """A number for each owned node by the mesh as it was read or made, whatever the ranks; ``V`` of degree 1 or 2.
-
-    That of a vertex is its index there. The node of an edge, face or cell is named by two of its vertices that face each
-    other, the lowest and its opposite: two entities of a mesh do not share both.
-    """
-    geometry, nodes, topology = V.mesh.geometry, cell_nodes(V), V.mesh.topology
-    points = getattr(geometry, "dofmaps", None)  # one for each type of cells since 0.8
-    points = geometry.dofmap if points is None else points(0) if callable(points) else points[0]
+def cell_points(mesh):
+    """Points of the geometry of each cell, ``shape=(cells, points)``: one array for each type of cells since 0.8."""
+    points = getattr(mesh.geometry, "dofmaps", None)
+    points = (
+        mesh.geometry.dofmap if points is None else points(0) if callable(points) else points[0]
+    )
     if hasattr(points, "array"):  # an adjacency list before 0.8
         points = points.array.reshape(-1, points.array.size // max(points.num_nodes, 1) or 1)
-    index_map, layout = V.dofmap.index_map, V.dofmap.dof_layout
-    original = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int64)
-    count = dolfinx.cpp.mesh.cell_num_entities(topology.cell_type, 0)
-    vertices = np.asarray(geometry.input_global_indices)[points[: len(nodes), :count]]
-    for dim in range(topology.dim + 1):
-        for entity in range(dolfinx.cpp.mesh.cell_num_entities(topology.cell_type, dim)):
-            own = layout.entity_dofs(dim, entity)
-            if len(own) > 1:
-                raise ValueError("nodes are named by their mesh for spaces of degree 1 and 2 only.")
-            if len(own) == 1 and len(nodes) > 0:  # a rank may have no cells
-                corners = [k for k in layout.entity_closure_dofs(dim, entity) if k < count]
-                original[nodes[:, own[0]]] = _name_of(vertices[:, corners])
-    return original[: index_map.size_local]
-
-
-def _name_of(vertices):
-    """One number from the vertices of an entity, ``shape=(n, m)``, which face each other from both ends of a row."""
-    low, rows = vertices.argmin(axis=1), np.arange(len(vertices))
-    if vertices.shape[1] == 1:
-        return vertices[:, 0]
-    opposite = vertices[rows, vertices.shape[1] - 1 - low]
-    return (vertices[rows, low].astype(np.int64) + 1 << 32) + opposite
+    return points
 
 
 def bc_dofs(bc, size: int):
@@ -233,6 +211,22 @@ def set_bc_values(array, bcs) -> None:
             bc.set(array)
         else:
             fem.set_bc(array, [bc])
+
+
+def compiled(form: Any, entity_maps: Any = None) -> Any:
+    """A compiled form, ``fem.form``, whose Functions may live on several meshes since DOLFINx 0.9.
+
+    Args:
+        form: UFL form.
+        entity_maps: As ``fem.form`` takes it: a dictionary of arrays by mesh before 0.10, a list of ``EntityMap`` since.
+    """
+    if entity_maps is None:
+        return fem.form(form)
+    if "entity_maps" not in signature(fem.form).parameters:
+        raise ValueError(
+            f"entity_maps need DOLFINx 0.9 or newer, this is {version}: here all Functions in F live on the mesh of u."
+        )
+    return fem.form(form, entity_maps=entity_maps)
 
 
 def assemble_into(x: Any, form: Any) -> None:

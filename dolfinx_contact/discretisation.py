@@ -140,7 +140,7 @@ def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[floa
     e.x.array[:] = body.u.x.array - e.x.array
     test, trial = body.tangent.arguments()
     q = ufl.TestFunction(square.function_space)
-    form = fem.form(ufl.replace(body.tangent, {test: e * q, trial: e}))
+    form = compat.compiled(ufl.replace(body.tangent, {test: e * q, trial: e}), body.entity_maps)
     own = square.function_space.dofmap.index_map.size_local
     compat.assemble_into(square.x, form)
     of_difference = square.x.array.copy()

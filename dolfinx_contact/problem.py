@@ -68,6 +68,8 @@ class ContactProblem(ProblemStates):
         before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
             ``state``, and changes no ``state``.  ``J`` has to be given.
         after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
+        entity_maps: How meshes lie in each other, where ``F`` has Functions on other ones than ``u``, as ``fem.form`` takes
+            it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
             "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one.
 
@@ -111,6 +113,7 @@ class ContactProblem(ProblemStates):
         before_residual: Callable[[fem.Function], object] | None = None,
         after_step: Callable[[fem.Function], object] | None = None,
         undetermined: str = "refused",
+        entity_maps: Any = None,
     ) -> None:
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
@@ -122,11 +125,11 @@ class ContactProblem(ProblemStates):
             self.undetermined = undetermined
             petsc_options = checked_options(petsc_options)
             self._variables = InternalVariables(state, after_step)
-        agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix)  # fmt: skip
+        agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
         self.u, self.monitor = u, None
         of = self.contacts[0].displacements if self.contacts else None
-        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of)
+        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of, entity_maps)  # fmt: skip
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
         self._points = [contact.points for contact in self.contacts]

@@ -31,23 +31,23 @@ class ElasticBody(Unknowns, OverRanks):
         u: Displacement.
         bcs: Dirichlet conditions; their values may change between steps, their places not.
         derivative: Of ``F``, as ``derivative_of`` returns it.
-        petsc_options: Options of the solver; by default a factorisation by MUMPS, for large bodies
+        options: PETSc options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
-        petsc_options_prefix: Their prefix.
+        prefix: Their prefix.
         of: Its ``Displacements``, where they are known.
+        entity_maps: Of forms with Functions on other meshes, see ``compat.compiled``.
     """
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose = None  # ``LooseMotions``, where rigid motions cost nothing
 
-    def __init__(
-        self, F, u, bcs, derivative, petsc_options=None, petsc_options_prefix=None, of=None
-    ):
+    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, of=None, entity_maps=None):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
-        self._residual_form = fem.form(F)
-        self._stiffness_form, self.tangent = fem.form(derivative), derivative
+        self.tangent, self.entity_maps = derivative, entity_maps
+        self._residual_form = compat.compiled(F, entity_maps)
+        self._stiffness_form = compat.compiled(derivative, entity_maps)
         coefficients = [c for c in derivative.coefficients() if c is not u]
         self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
@@ -56,8 +56,8 @@ class ElasticBody(Unknowns, OverRanks):
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
         default = DIRECT if self.displacements.mixed else None  # a saddle point: no multigrid
-        self.options = default if petsc_options is None else dict(petsc_options)
-        self.prefix = petsc_options_prefix or f"dolfinx_contact_{next(_instances)}_"
+        self.options = default if options is None else dict(options)
+        self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
         self._assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None

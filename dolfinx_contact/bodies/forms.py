@@ -49,6 +49,25 @@ def derivative_of(F, u, J, moving: bool = False):
     return derivative, linear
 
 
+def check_meshes(form, u, entity_maps) -> None:
+    """Raise a ``ValueError`` if a form has integrals or Functions on another mesh, and nothing says how they lie in each other.
+
+    Args:
+        form: Residual form.
+        u: Displacement.
+        entity_maps: What the user gave.
+    """
+    domains = [integral.ufl_domain() for integral in form.integrals()]
+    domains += [c.ufl_function_space().ufl_domain() for c in form.coefficients()]
+    if entity_maps is None and any(
+        domain != u.ufl_function_space().ufl_domain() for domain in domains
+    ):
+        raise ValueError(
+            "F has integrals or Functions on another mesh than u: give the entity_maps that fem.form needs for it, "
+            "ContactProblem(..., entity_maps=...), with DOLFINx 0.9 or newer."
+        )
+
+
 def depends_on(form, u) -> bool:
     """Whether ``u`` is among the coefficients of a form."""
     return any(c is u for c in form.coefficients())

@@ -11,6 +11,7 @@ from dolfinx import fem
 
 from dolfinx_contact import compat
 from dolfinx_contact.collective import raised_together
+from dolfinx_contact.numbering import original_cells
 
 
 class InternalVariables:
@@ -68,10 +69,14 @@ class InternalVariables:
     # -- checkpoints ---------------------------------------------------------------------------
 
     def cells(self) -> dict[str, np.ndarray]:
-        """Original indices of this rank's cells, by the name of rows; nothing without functions."""
+        """Original indices of this rank's cells, by the name of rows; nothing without functions.  Collective."""
         if not self._functions:
             return {}
-        return {"state_nodes": compat.original_cells(self._functions[0].function_space.mesh)}
+        meshes = [function.function_space.mesh for function in self._functions]
+        with raised_together(meshes[0].comm):
+            if any(mesh.ufl_domain() != meshes[0].ufl_domain() for mesh in meshes):
+                raise ValueError("a checkpoint holds state on one mesh: put all of it there.")
+            return {"state_nodes": original_cells(meshes[0])}
 
     def save(self) -> dict[str, np.ndarray]:
         """Cells, and the values of each function, a row a cell."""

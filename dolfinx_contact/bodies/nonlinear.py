@@ -10,13 +10,13 @@ from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.checks import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.forms import derivative_of
+from dolfinx_contact.bodies.forms import check_meshes, derivative_of
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.petsc.linear_solver import preconditioner
 
 
 def body_of(
-    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None
+    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None, entity_maps=None
 ) -> ElasticBody:
     """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
 
@@ -29,6 +29,7 @@ def body_of(
         prefix: Their prefix.
         before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
         of: Its ``Displacements``, where they are known.
+        entity_maps: Of forms with Functions on other meshes, see ``compat.compiled``.
 
     Raises:
         ValueError: ``F`` is no residual form in ``u``.
@@ -38,9 +39,10 @@ def body_of(
         if moving and not callable(before_residual):
             raise ValueError(f"before_residual must be a function of u, got {before_residual!r}.")
         derivative, linear = derivative_of(F, u, J, moving)
+        check_meshes(F, u, entity_maps)
     if linear:
-        return ElasticBody(F, u, bcs, derivative, options, prefix, of)
-    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of)
+        return ElasticBody(F, u, bcs, derivative, options, prefix, of, entity_maps)
+    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, entity_maps)
 
 
 class NonlinearBody(ElasticBody):
@@ -52,8 +54,8 @@ class NonlinearBody(ElasticBody):
 
     nonlinear = True
 
-    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None):
-        super().__init__(F, u, bcs, derivative, options, prefix, of)
+    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None, entity_maps=None):  # fmt: skip
+        super().__init__(F, u, bcs, derivative, options, prefix, of, entity_maps)
         self._before = before
         self._given = [*self._parameters, *self._load_parameters]
         self._place = None  # where K stands

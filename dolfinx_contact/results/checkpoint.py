@@ -18,6 +18,7 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import FreeState
 from dolfinx_contact.collective import raised_together
+from dolfinx_contact.numbering import original_cells, original_nodes
 
 
 def save(path, body, contacts, states, past, variables) -> None:
@@ -157,11 +158,12 @@ def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
 
 
 def _nodes(body, contacts) -> dict[str, np.ndarray]:
-    """Original indices of this rank's nodes, of the body and of each contact."""
-    original = compat.original_nodes(body.displacements.V)
+    """Original indices of this rank's nodes, of the body and of each contact.  Collective."""
+    original = original_nodes(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
     if body.displacements.mixed:
-        of_contacts["mixed_nodes"] = compat.original_cells(body.V.mesh)
+        with raised_together(body.comm):
+            of_contacts["mixed_nodes"] = original_cells(body.V.mesh)
     return {"nodes": original} | of_contacts
 
 
@@ -182,7 +184,8 @@ def _of_cells(body, rows: np.ndarray) -> np.ndarray:
 
 def _cells(body) -> np.ndarray:
     """Degrees of freedom of each owned cell."""
-    return compat.cell_dofs(body.V)[: len(compat.original_cells(body.V.mesh))]
+    topology = body.V.mesh.topology
+    return compat.cell_dofs(body.V)[: topology.index_map(topology.dim).size_local]
 
 
 def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
