@@ -14,7 +14,7 @@ from dolfinx import fem
 from dolfinx_contact import compat
 from dolfinx_contact.checks import positive
 from dolfinx_contact.collective import agree, raised_together
-from dolfinx_contact.discretisation import QUANTITIES, Estimate, estimate
+from dolfinx_contact.discretisation import QUANTITIES, Estimate, estimate, largest
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
@@ -113,7 +113,7 @@ def adapt(
         tried.append(Tried(_cell_map(mesh).size_global, value, error))
         reached = error <= accuracy
         if reached or len(tried) == meshes:
-            better = mine[quantity](reference)
+            better = largest(mine[quantity](reference))
             return Adapted(better, error, reached, problem, reference, found, tuple(tried))
         mesh = compat.refined(mesh, _largest(found.cells, share))
         problem.close(), reference.close()

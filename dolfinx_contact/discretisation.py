@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
+from numpy.typing import ArrayLike
 
 from dolfinx_contact import compat
 from dolfinx_contact.checks import positive
@@ -79,7 +80,7 @@ QUANTITIES = {
 def estimate(
     problem: ContactProblem,
     reference: ContactProblem,
-    quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,
+    quantities: Mapping[str, Callable[[ContactProblem], ArrayLike]] | None = None,
     share: float = 1.0,
 ) -> Estimate:
     """Estimate the discretisation's error of a problem's present state.  Collective.
@@ -92,10 +93,14 @@ def estimate(
 
     Args:
         problem: Whose error is asked for.
-        reference: The better one.  On the same mesh object, with a space that contains the problem's, cells get indicators.
-        quantities: Functions of a problem that return a number, the same on all ranks, by name.  They come beside
+        reference: The better one.  On the same mesh object, with a space that contains the problem's, tractions are compared,
+            and cells get indicators.
+        quantities: Functions of a problem that return a number, the same on all ranks, by name; or several, such as the force
+            after each step so far: then the value is the largest, and the error the largest of theirs.  They come beside
             ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
-            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.
+            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object there are
+            also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of the nodal normal and tangential
+            tractions, reaction over area, with those of the differences as errors.
         share: The error over the difference.  ``1 / (1 - 2**-p)`` for a reference on cells of half the size where errors fall
             with order p.
 
@@ -120,11 +125,17 @@ def estimate(
     found = {}
     for name, of in {**QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
-            value, better = (_number(name, of(which)) for which in (problem, reference))
-        found[name] = Estimated(value, share * abs(better - value))
+            value, better = (_numbers(name, of(which)) for which in (problem, reference))
+            if value.shape != better.shape:
+                raise ValueError(
+                    f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
+                )
+        found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
     if problem.body.V.mesh is not reference.body.V.mesh:
         return Estimate(found, None, None)
     norm, cells = indicators(problem, reference)
+    for name, of in tractions(problem, reference).items():
+        found.setdefault(name, of._replace(error=share * of.error))
     return Estimate(found, share * norm, cells)
 
 
@@ -153,6 +164,34 @@ def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[floa
     return float(np.sqrt(part / whole)) if part > 0 else 0.0, square
 
 
+def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, Estimated]:
+    """Root mean squares, over the contact surfaces, of pressure and shear and of their differences.  Collective.
+
+    Nodal tractions of the problem, in the local frame, are interpolated at the reference's contact nodes, whose areas are the weights:
+    Simpson's rule on edges and quadrilaterals of second order, the middles of the edges on triangles.
+    """
+    sums, area = np.zeros((2, 2)), 0.0
+    for contact, better in zip(problem.contacts, reference.contacts):
+        here, there = (fem.Function(of.displacements.V) for of in (contact, better))
+        own, other = (of.reaction / of.area[:, None] for of in (contact, better))
+        here.x.array.reshape(-1, own.shape[1])[contact.nodes] = own
+        here.x.scatter_forward()
+        there.interpolate(here)
+        own = there.x.array.reshape(-1, own.shape[1])[better.nodes]
+        area += better.area.sum()
+        for row, of in zip(sums, (own, other - own)):
+            row += better.area @ of[:, -1] ** 2, better.area @ (of[:, :-1] ** 2).sum(axis=1)
+    comm = problem.body.comm
+    means = np.sqrt(comm.allreduce(sums) / comm.allreduce(area)).T
+    return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
+
+
+def largest(numbers: ArrayLike) -> float:
+    """The number of the largest size."""
+    numbers = np.ravel(numbers)
+    return float(numbers[np.abs(numbers).argmax()])
+
+
 def _check_pair(problem, reference) -> None:
     if reference is problem or not hasattr(reference, "contacts"):
         raise ValueError(
@@ -162,6 +201,11 @@ def _check_pair(problem, reference) -> None:
         raise ValueError(f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
                          f"{len(reference.contacts)}.")  # fmt: skip
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
+    pairs = zip(problem.contacts, reference.contacts)
+    if same_mesh and any(set(of.facets) != set(other.facets) for of, other in pairs):
+        raise ValueError(
+            "on the same mesh contacts of problem and reference must have the same facets, in the same order of contacts."
+        )
     if same_mesh and any(of.body.displacements.mixed for of in (problem, reference)):
         raise ValueError(
             "on the same mesh dc.estimate does not know mixed spaces, which have no energy norm of their own: give a "
@@ -175,8 +219,8 @@ def _check_pair(problem, reference) -> None:
         )
 
 
-def _number(name: str, value) -> float:
-    value = float(value)
-    if not np.isfinite(value):
-        raise ValueError(f"quantity {name!r} must be a finite number, got {value!r}.")
+def _numbers(name: str, value) -> np.ndarray:
+    value = np.ravel(np.asarray(value, dtype=float))
+    if value.size == 0 or not np.isfinite(value).all():
+        raise ValueError(f"quantity {name!r} must be a finite number or several, got {value!r}.")
     return value

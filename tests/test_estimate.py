@@ -1,4 +1,4 @@
-"""The estimate of the discretisation's error against closed forms: even stress, a column under its weight, a ball of Hertz."""
+"""The estimate of the discretisation's error against closed forms: even stress, a column under its weight, Hertz, partial slip."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
@@ -6,12 +6,13 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 import pytest
 import ufl
-from demo_hertz import FORCE, NU, A, E, far_field
-from dolfinx import fem, mesh
-from helpers import hooke, rounded_body
+from demo_hertz import FORCE, A
+from dolfinx import fem
+from helpers import rounded_body
 from patches import CELLS, box
 from scenes import COMM, elasticity
 
+from benchmarks.effectivity import ROUGH, ball, hertz, partial_slip
 from dolfinx_contact.compat import functionspace
 
 
@@ -46,6 +47,7 @@ def test_an_even_stress_has_no_error(cell):
     assert found["normal_force"].relative < 1e-8 and found["tangential_force"].error < 1e-12
     assert found["dissipation"].error < 1e-12 and found["peak_pressure"].relative < 1e-7
     assert found.energy_norm < 1e-7
+    assert found["pressure"].relative < 1e-7 and found["shear"].error < 1e-12
     assert np.max(found.cells.x.array, initial=0) < 1e-10
 
 
@@ -68,30 +70,6 @@ def test_a_column_under_its_weight(cell):
     assert found["normal_force"].value == pytest.approx(1e-3 + 0.5e-4, rel=1e-8)
 
 
-def ball(domain, face, far, order) -> dc.ContactProblem:
-    """The ball of demo_hertz, far boundary as in the closed form."""
-    V = functionspace(domain, ("Lagrange", order, (2,)))
-    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(domain)[0]
-
-    def strain(w):
-        rr, rz, zz = w[0].dx(0), (w[0].dx(1) + w[1].dx(0)) / 2, w[1].dx(1)
-        return ufl.as_matrix([[rr, rz, 0], [rz, zz, 0], [0, 0, w[0] / r]])
-
-    dx = ufl.dx(metadata={"quadrature_degree": 2 * order + 1})
-    F = 2 * np.pi * r * ufl.inner(hooke(strain(u), E, NU), strain(v)) * dx
-    held, radial = fem.Function(V), V.sub(0)
-    held.interpolate(lambda x: far_field(x, FORCE))
-    axis = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
-    bcs = [
-        fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far)),
-        fem.dirichletbc(
-            fem.Constant(domain, 0.0), fem.locate_dofs_topological(radial, 1, axis), radial
-        ),
-    ]
-    contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
-    return dc.ContactProblem(F, u, contact, bcs, tol=1e-10)
-
-
 @pytest.mark.parametrize("cells", [8, 16])
 def test_the_force_of_hertz(cells):
     """The estimated error of the force lies between half and three times the true one, and cells far away have none of it."""
@@ -108,6 +86,71 @@ def test_the_force_of_hertz(cells):
     assert doubled.energy_norm == pytest.approx(found.energy_norm / 2)
 
 
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_norms_of_tractions(cell):
+    """Pressures 1 + x and 1 + 2x differ by x, whose mean square on 0 < x < 1 is 1/3; shears 1 - x and 2 - x by 1."""
+    scene = box(cell)
+    problem, reference = (pressed_box(*scene, order) for order in (1, 2))
+    for of, slope in ((problem, 1), (reference, 2)):
+        contact = of.contacts[0]
+        x = contact.x[:, 0]
+        tractions = np.zeros(contact.reaction.shape)
+        tractions[:, -1], tractions[:, 0] = 1 + slope * x, slope - x
+        contact.take(reaction=contact.area[:, None] * tractions)
+    found = dc.estimate(problem, reference, share=2.0)
+    assert found["pressure"] == pytest.approx((np.sqrt(7 / 3), 2 * np.sqrt(1 / 3)))
+    assert found["shear"] == pytest.approx((np.sqrt(1 / 3), 2.0))
+
+
+def test_hertz_in_two_dimensions():
+    """Errors of force and pressure are estimated between half and three times those against the closed form."""
+    rows = hertz(8)[""]
+    assert 0.5 < rows["normal_force"]["effectivity"] < 3
+    assert 0.5 < rows["pressure"]["effectivity"] < 3
+
+
+def test_cattaneo_and_mindlin():
+    """In partial slip and after it has turned round so are those of shear, tangential force and work, at each state and along the programme."""
+    states = partial_slip(8)
+    for name, rows in states.items():
+        for key in {
+            "pressure",
+            "shear",
+            "tangential_resultant",
+            "dissipation",
+            "resultant",
+            "work",
+        } & set(rows):
+            assert 0.5 < rows[key]["effectivity"] < 3, (name, key)
+
+
+def test_the_closed_form_of_partial_slip():
+    """The field for the far boundary closes the gap, keeps the inner part stuck after a turn, slips as the surface's formula says."""
+    parts = ROUGH.sheared(-0.2, turned=0.6)
+    x = np.linspace(-2, 2, 41) * ROUGH.a
+    u = ROUGH.displacement(np.array([x, 0 * x + 1e-9 * ROUGH.a]), parts, points=4000)
+    scale, inside = ROUGH.a**2 / ROUGH.radius, np.abs(x) < 0.95 * ROUGH.a
+    gap = x**2 / (2 * ROUGH.radius) + u[1]
+    # pressure moves the surface sideways, shear lifts it: as 1 - 2 nu over 2 - 2 nu
+    assert np.abs(gap[inside]).max() < 5e-3 * scale and (gap > -5e-3 * scale).all()
+    assert np.abs(u[0] - ROUGH.slipped(x, parts)).max() < 5e-3 * scale
+    s = np.linspace(-1, 1, 20_001) * ROUGH.a
+    force = ROUGH.shear(s, parts).sum() * (s[1] - s[0])
+    assert force == pytest.approx(-0.2 * ROUGH.mu * ROUGH.force, rel=1e-3)
+    assert (np.abs(ROUGH.shear(s, parts)) <= ROUGH.mu * ROUGH.pressure(s) * (1 + 1e-9)).all()
+
+
+def test_several_numbers():
+    """The error of a list of numbers is the largest of theirs, beside the largest number; lists must be as long."""
+    scene = box("triangle")
+    problem, reference = (pressed_box(*scene, order) for order in (1, 2))
+    lists = {problem: [1.0, -5.0, 2.0], reference: [1.5, -4.9, 2.0]}
+    assert dc.estimate(problem, reference, {"loop": lists.get})["loop"] == (-5.0, 0.5)
+    lists[reference].append(1.0)
+    with pytest.raises(ValueError, match="3 numbers of the problem, 4 of the reference"):
+        dc.estimate(problem, reference, {"loop": lists.get})
+
+
 def test_pairs_that_do_not_belong_together():
     """The order of the two, their contacts and quantities are checked on all ranks."""
     scene = box("triangle")
@@ -120,5 +163,9 @@ def test_pairs_that_do_not_belong_together():
         dc.estimate(problem, reference, share=0)
     with pytest.raises(ValueError, match="'nothing' must be a finite number"):
         dc.estimate(problem, reference, {"nothing": lambda p: np.nan})
+    domain, bottom, top = scene
+    turned = pressed_box(domain, top, bottom, 2)
+    with pytest.raises(ValueError, match="must have the same facets"):
+        dc.estimate(problem, turned)
     other = pressed_box(*box("triangle"), 1)  # of another mesh: quantities alone
     assert dc.estimate(problem, other).cells is None and COMM.size > 0
