@@ -129,9 +129,10 @@ def cycle(variant: str, punch: Punch, body: Body) -> dict:
         reaction, slipped = now.reaction, now.status == int(dc.Status.SLIP)
         moved[:, :2] += now.motion[:, :2]
         failed += now.failed
+    weights = even(body.X, body.T)  # of vertices: zero but for the curved rim
     return dict(
         scene="punch", unknowns=body.unknowns, points=len(points.area), work=punch.parts * work, failed=failed,
-        seconds=process_time() - begin,
+        seconds=process_time() - begin, vertices=np.abs(weights[body.T[:, :3]]).max() / weights.max(),
     )  # fmt: skip
 
 
