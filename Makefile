@@ -23,7 +23,7 @@ programs = accuracy demos docs report stress structure study
 features = force friction_field held_by_contact history input_errors internal_variables mixed multigrid \
 	nonlinear oblique_supports patch problem rewind shared_nodes surfaces
 # of these a few, on several ranks of another DOLFINx: few, as meshes leave communicators behind
-on_ranks = force history internal_variables multigrid nonlinear problem spence surfaces
+on_ranks = force history internal_variables multigrid nonlinear problem spence submeshes surfaces
 no_arrays = $(arrays:%=--ignore=tests/test_%.py)
 no_programs = $(programs:%=--ignore=tests/test_%.py)
 features_alone = $(patsubst %,--ignore=%,$(filter-out $(features:%=tests/test_%.py),$(wildcard tests/test_*.py)))

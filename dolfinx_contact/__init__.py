@@ -56,6 +56,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     )
     from dolfinx_contact.solvers.condensed_result import CondensedResult as CondensedResult
     from dolfinx_contact.solvers.fixed_point import FixedPoint as FixedPoint
+    from dolfinx_contact.solvers.snes import SNES as SNES
     from dolfinx_contact.solvers.sparse_newton import SparseNewton as SparseNewton
 
     __version__: str
@@ -82,6 +83,7 @@ _NAMES = {  # by their module
     "solvers.condensed_newton": ["CondensedNewton", "solve_condensed"],
     "solvers.condensed_result": ["CondensedNotConverged", "CondensedResult"],
     "solvers.fixed_point": ["FixedPoint"],
+    "solvers.snes": ["SNES"],
     "solvers.sparse_newton": ["SparseNewton"],
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

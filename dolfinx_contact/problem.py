@@ -180,7 +180,7 @@ class ContactProblem(ProblemStates):
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not converged(step.errors, done, self.tol):
                 raise NotConverged(
-                    f"not converged: {done}, tol {self.tol:.1e}. {refusal(step, self.contacts)}.",
+                    f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {refusal(step, self.contacts)}.",
                     done,
                     self.body.values(found.x),
                     [contact.reaction for contact in self.contacts],

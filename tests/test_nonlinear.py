@@ -229,6 +229,23 @@ def test_a_step_that_is_too_large_is_refused():
     assert forces[1] == pytest.approx(forces[0], rel=1e-9)
 
 
+def test_a_guess_that_is_the_solution():
+    """A first step that starts at its solution, within the tolerance, has no tangent yet: it makes one, and goes on."""
+    for form in (scenes.rubber, elasticity_of_rubber):
+        first = block(form, cells=(4, 3), held=True, mu=0.3, tol=1e-12)
+        move(first, 0.02, -0.1)
+        first.problem.solve()
+        again = block(form, cells=(4, 3), held=True, mu=0.3, solver=SOLVERS["sparse"])
+        move(again, 0.02, -0.1)
+        again.u.x.array[:] = first.u.x.array
+        assert again.problem.solve().iterations <= 1
+        np.testing.assert_allclose(again.contact.force(), first.contact.force(), rtol=1e-8)
+
+
+def elasticity_of_rubber(u, v, modulus):
+    return elasticity(u, v, modulus, 0.3)
+
+
 class Lazy:
     """A solver that hands back where the step starts, and takes that for the solution."""
 

@@ -56,6 +56,25 @@ def _options(A, options) -> dict:
     return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
 
 
+@contextmanager
+def options_given(prefix: str, options: dict):
+    """PETSc's database with options; a list that afterwards has the names of those that PETSc did not ask for.
+
+    They are deleted again at the end: PETSc 3.18 has room for 512.  What stands there already (PETSC_OPTIONS, the command
+    line) goes before them.
+    """
+    database, unread = PETSc.Options(prefix), []
+    ours = {key: value for key, value in options.items() if not database.hasName(key)}
+    for key, value in ours.items():
+        database[key] = value
+    try:
+        yield unread
+        unread += [key for key in ours if not compat.option_was_read(f"{prefix}{key}")]
+    finally:
+        for key in ours:
+            del database[key]
+
+
 def _heed_signals(*_) -> None:
     """A monitor of every iteration: Python answers Ctrl-C only while it runs itself."""
 
@@ -116,17 +135,9 @@ class LinearSolver:
                 vectors[-1].array_w[:] = mode
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.ksp.setOperators(A)
-        # What is set is deleted again below: PETSc 3.18 has room for 512 options.
-        # What stands there already (PETSC_OPTIONS, the command line) goes before ours.
-        database = PETSc.Options(prefix)
-        ours = {key: value for key, value in options.items() if not database.hasName(key)}
-        for key, value in ours.items():
-            database[key] = value
-        self.ksp.setFromOptions()
-        self.ksp.setUp()  # reads the options of the levels, which must still be there
-        self.unread = [key for key in ours if not compat.option_was_read(f"{prefix}{key}")]
-        for key in ours:
-            del database[key]
+        with options_given(prefix, options) as self.unread:
+            self.ksp.setFromOptions()
+            self.ksp.setUp()  # reads the options of the levels, which must still be there
         if not self.exact:
             self.ksp.setMonitor(_heed_signals)
         self._right, self._left = A.createVecs()

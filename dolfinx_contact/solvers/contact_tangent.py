@@ -46,6 +46,22 @@ class ContactTangent:
             self._solver.destroy()
         self._solver = None
 
+    def _factors(self) -> LinearSolver:
+        if self._solver is None:
+            prefix = f"{self._body.prefix}tangent_"
+            self._solver = LinearSolver(self._A, DIRECT, prefix, None)
+        return self._solver
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """``J``, once it was linearised; ``linearise`` changes its values."""
+        return self._A
+
+    @property
+    def ksp(self) -> PETSc.KSP:
+        """The linear solver of ``matrix``."""
+        return self._factors().ksp
+
     def linearise(self, derivatives) -> None:
         """Set up at the present ``K`` and at derivatives of the nodal maps.  Collective.
 
@@ -94,11 +110,8 @@ class ContactTangent:
             LinearSolverError: ``J`` is singular.
         """
         for last in (self._solver is None, True):
-            if self._solver is None:
-                prefix = f"{self._body.prefix}tangent_"
-                self._solver = LinearSolver(self._A, DIRECT, prefix, None)
             try:
-                return self._solver.solve(residual)
+                return self._factors().solve(residual)
             except (LinearSolverError, PETSc.Error):
                 self._forget_factors()  # an old ordering may not fit
                 if last:

@@ -93,7 +93,7 @@ class BoundSparseNewton:
         x = step.start() if start is None else start
         search = Search(step, x, self._options.max_seconds)
         search.begin(self._options.max_iterations, PATIENCE)
-        descent = _Descent(step, self._tangent, stands=start is None)
+        descent = Descent(step, self._tangent, stands=start is None)
         for tangential in cycle(TANGENTIAL):
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
             try:
@@ -119,7 +119,7 @@ class BoundSparseNewton:
                 return x
 
 
-class _Descent:
+class Descent:
     """Steps of Newton's method, each no longer than it helps.
 
     Supports that are not where they should be are moved with the step: where ``d`` is missing, ``J d`` is part of the
@@ -142,7 +142,7 @@ class _Descent:
             chord: Whether the last tangent is good enough.
         """
         step, maps = self._step, self._maps
-        if not chord:
+        if not chord or self._tangent.matrix is None:
             if self._body.nonlinear and not self._stands:
                 self._body.linearise(x)
             maps = self._following(x) if self._stands else maps
