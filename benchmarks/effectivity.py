@@ -7,7 +7,8 @@ error.  The paper's punch is ``studies.punch.effectivity``.
 
 import json
 import sys
-from functools import partial
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -74,18 +75,32 @@ def field(found, **true) -> dict:
     return {key: row(off / of, found[key].error / of) for key, (off, of) in true.items()}
 
 
-def hertz(cells: int) -> dict:
-    """A cylinder, plane strain, without friction."""
-    scene = rounded_body(SMOOTH.radius, SMOOTH.a, 16 * SMOOTH.a, cells, order=2)
-    pair = [plane_strain(scene, SMOOTH, order) for order in (1, 2)]
-    for problem, held in pair:
-        held.interpolate(SMOOTH.displacement)
-        problem.solve()
-    found = dc.estimate(*(problem for problem, _ in pair))
-    exact = dict(normal_force=SMOOTH.force, peak_pressure=SMOOTH.pressure(np.zeros(1))[0])
-    rows = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
-    contact = pair[0][0].contacts[0]
-    return {"": rows | field(found, pressure=off_line(contact, 1, SMOOTH.pressure))}
+def references(cells: int) -> dict:
+    """Cells and orders: of the problem, and of two references."""
+    return {"problem": (cells, 1), "same cells": (cells, 2), "half cells": (2 * cells, 2)}
+
+
+def hertz(cells: int, edge: float = 1.0) -> dict:
+    """A cylinder, plane strain, without friction; the contact ends at ``edge`` times where the mesh has a node."""
+    law, solved, rows = replace(SMOOTH, a=edge * SMOOTH.a), {}, {}
+    for name, (n, order) in references(cells).items():
+        scene = scenes(SMOOTH, n)
+        solved[name], held = plane_strain(scene, law, order)
+        held.interpolate(law.displacement)
+        solved[name].solve()
+    problem = solved.pop("problem")
+    exact = dict(normal_force=law.force, peak_pressure=law.pressure(np.zeros(1))[0])
+    for name, reference in solved.items():
+        found = dc.estimate(problem, reference)
+        rows[name] = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
+        rows[name] |= field(found, pressure=off_line(problem.contacts[0], 1, law.pressure))
+    return rows
+
+
+@cache
+def scenes(law: Cylinder, cells: int, crossed: bool = False):
+    """One mesh for problem and reference."""
+    return rounded_body(law.radius, law.a, 16 * law.a, cells, crossed=crossed, order=2)
 
 
 def second_moment(problem) -> float:
@@ -96,85 +111,94 @@ def second_moment(problem) -> float:
 
 def flat_punch(cells: int) -> dict:
     """A flat punch without friction; the square of its pressure has no integral."""
-    scene = rounded_body(1e9, PUNCH.a, 16 * PUNCH.a, cells)
-    under = np.abs(mesh.compute_midpoints(scene[0], 1, scene[1])[:, 0]) < PUNCH.a
-    pair = [plane_strain(scene, PUNCH, order, under) for order in (1, 2)]
-    for problem, held in pair:
+    solved, rows = {}, {}
+    for name, (n, order) in references(cells).items():
+        scene = rounded_body(1e9, PUNCH.a, 16 * PUNCH.a, n)
+        under = np.abs(mesh.compute_midpoints(scene[0], 1, scene[1])[:, 0]) < PUNCH.a
+        solved[name], held = plane_strain(scene, PUNCH, order, under)
         held.interpolate(PUNCH.displacement)
-        problem.solve()
-    found = dc.estimate(*(problem for problem, _ in pair), {"second_moment": second_moment})
+        solved[name].solve()
+    problem = solved.pop("problem")
     exact = dict(normal_force=PUNCH.force, second_moment=PUNCH.second_moment)
-    rows = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
-    return {"": rows | dict(pressure=dict(estimate=found["pressure"].relative))}
+    for name, reference in solved.items():
+        found = dc.estimate(problem, reference, {"second_moment": second_moment})
+        rows[name] = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
+        rows[name] |= dict(pressure=dict(estimate=found["pressure"].relative))
+    return rows
 
 
-def partial_slip(cells: int) -> dict:
+def partial_slip(cells: int, edge: float = 1.0, names=("same cells", "half cells")) -> dict:
     """Cattaneo's and Mindlin's cylinder: sheared, and sheared back; at ``STATES``, and along the programme."""
-    scene = rounded_body(ROUGH.radius, ROUGH.a, 16 * ROUGH.a, cells, crossed=True, order=2)
-    pair = [plane_strain(scene, ROUGH, order) for order in (1, 2)]
-    for problem, held in pair:  # pressed without friction: no shear, as in the closed form
-        held.interpolate(ROUGH.displacement)
-        problem.solve()
-        problem.contacts[0].friction = dc.Friction(ROUGH.mu)
-    path = [ROUGH.sheared(t) for t in THERE] + [ROUGH.sheared(t, THERE[-1]) for t in BACK]
-    forces = ROUGH.mu * ROUGH.force * np.append(THERE, BACK)
-    names, rows, found = {step: name for name, step in STATES.items()}, {}, None
-    series = {problem: [] for problem, _ in pair}
-    along = {
-        name: lambda p, k=k: [of[k] for of in series[p]]
-        for k, name in enumerate(("resultant", "sum", "work"))
-    }
+    law, pairs = replace(ROUGH, a=edge * ROUGH.a), {}
+    for name, (n, order) in references(cells).items():
+        if name in ("problem", *names):
+            pairs[name] = problem, held = plane_strain(scenes(ROUGH, n, True), law, order)
+            held.interpolate(law.displacement)
+            problem.solve()  # pressed without friction: no shear, as in the closed form
+            problem.contacts[0].friction = dc.Friction(law.mu)
+    path = [law.sheared(t) for t in THERE] + [law.sheared(t, THERE[-1]) for t in BACK]
+    forces = law.mu * law.force * np.append(THERE, BACK)
+    series, rows = {problem: [] for problem, _ in pairs.values()}, {}
     for step, parts in enumerate(path, start=1):
-        for problem, held in pair:
-            held.interpolate(partial(ROUGH.displacement, parts=parts))
+        for problem, held in pairs.values():
+            held.interpolate(partial(law.displacement, parts=parts))
             problem.solve()
-            contact = problem.contacts[0]
-            force, size = contact.force()[0], of_sizes(contact)
-            work = contact.comm.allreduce(float(contact.dissipation.sum()))
-            series[problem].append((float(force), size, work))
-        found = dc.estimate(*series, {"tangential_resultant": lambda p: series[p][-1][0], **along})
-        if step in names:
-            rows[names[step]] = state(pair[0][0], found, path[:step], forces[step - 1])
-    sums = [sum_of_shear(parts) for parts in path]
-    works = [ROUGH.work(path[:step]) for step in range(1, len(path) + 1)]
-    exact = dict(resultant=forces, sum=sums, work=works)
-    mine = {key: (along[key](pair[0][0]), of) for key, of in exact.items()}
-    return rows | {"all steps": compared(found, mine)}
+            series[problem].append(sums(problem.contacts[0]))
+        for name in (name for name, at in STATES.items() if at == step):
+            problem, *others = series
+            for which, reference in zip(names, others):
+                found = dc.estimate(
+                    problem, reference, {"tangential_resultant": lambda p: series[p][-1][0]}
+                )
+                rows[f"{name}, {which}"] = state(law, problem, found, path[:step], forces[step - 1])
+    exact = dict(resultant=forces, sum=[sum_of_shear(law, parts) for parts in path])
+    exact["work"] = [law.work(path[:step]) for step in range(1, len(path) + 1)]
+    along = {key: lambda p, k=k: [of[k] for of in series[p]] for k, key in enumerate(exact)}
+    for which, reference in zip(names, others):
+        found = dc.estimate(problem, reference, along)
+        rows[f"all steps, {which}"] = compared(
+            found, {key: (along[key](problem), of) for key, of in exact.items()}
+        )
+    return rows
 
 
-def of_sizes(contact) -> float:
-    return contact.comm.allreduce(float(np.abs(contact.reaction[:, 0]).sum()))
+def sums(contact) -> tuple[float, float, float]:
+    """Tangential resultant, sum of the sizes of tangential reactions, work of friction."""
+    mine = (
+        contact.reaction[:, 0].sum(),
+        np.abs(contact.reaction[:, 0]).sum(),
+        contact.dissipation.sum(),
+    )
+    return tuple(contact.comm.allreduce(float(of)) for of in mine)
 
 
-def sum_of_shear(parts) -> float:
-    x = np.linspace(-ROUGH.a, ROUGH.a, 200_001)
-    return float(np.abs(ROUGH.shear(x, parts)).sum() * (x[1] - x[0]))
+def sum_of_shear(law: Cylinder, parts) -> float:
+    x = np.linspace(-law.a, law.a, 200_001)
+    return float(np.abs(law.shear(x, parts)).sum() * (x[1] - x[0]))
 
 
-def state(problem, found: dc.Estimate, path, force: float) -> dict:
+def state(law: Cylinder, problem, found: dc.Estimate, path, force: float) -> dict:
     """Rows of one state of partial slip, against the closed form."""
     exact = dict(
-        normal_force=ROUGH.force,
-        peak_pressure=ROUGH.pressure(np.zeros(1))[0],
+        normal_force=law.force,
+        peak_pressure=law.pressure(np.zeros(1))[0],
         tangential_resultant=force,
-        tangential_force=sum_of_shear(path[-1]),
-        dissipation=ROUGH.work(path),
+        tangential_force=sum_of_shear(law, path[-1]),
+        dissipation=law.work(path),
     )
     rows = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
     contact = problem.contacts[0]
-    shear = off_line(contact, 0, lambda x: ROUGH.shear(x, path[-1]))
-    return rows | field(found, pressure=off_line(contact, 1, ROUGH.pressure), shear=shear)
+    shear = off_line(contact, 0, lambda x: law.shear(x, path[-1]))
+    return rows | field(found, pressure=off_line(contact, 1, law.pressure), shear=shear)
 
 
 def off_disc(contact, exact) -> tuple[float, float]:
     """As ``off_line`` for the pressure of a surface in space; ``exact`` is a UFL expression of its coordinates."""
     domain = contact.V.mesh
-    tags = mesh.meshtags(
-        domain, 2, np.sort(contact.facets), np.ones(contact.facets.size, dtype=np.int32)
-    )
-    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags, metadata={"quadrature_degree": 12})(
-        1
-    )
+    facets = np.sort(contact.facets)
+    tags = mesh.meshtags(domain, 2, facets, np.ones(facets.size, dtype=np.int32))
+    fine = {"quadrature_degree": 12}
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags, metadata=fine)(1)
     pressure = contact.function(contact.pressure)
     parts = [(pressure - exact) ** 2 * ds, exact**2 * ds, fem.Constant(domain, 1.0) * ds]
     off, whole, area = (domain.comm.allreduce(fem.assemble_scalar(fem.form(of))) for of in parts)
@@ -189,17 +213,21 @@ def ball_on_flat(scene, order: int) -> dc.ContactProblem:
     return problem
 
 
-def ball_in_space(cells: int) -> dict:
+def ball_in_space(cells: int, halved: bool = False) -> dict:
     """The rigid sphere of demo_ball_on_flat, in three dimensions."""
-    scene = flat.scene(cells)
-    pair = [ball_on_flat(scene, order) for order in (1, 2)]
-    found = dc.estimate(*pair)
+    scene, rows = flat.scene(cells), {}
+    problem = ball_on_flat(scene, 1)
     exact = dict(normal_force=flat.FORCE / 4, peak_pressure=flat.P0)
-    rows = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
-    x = ufl.SpatialCoordinate(scene[0])
-    inside = 1 - (x[0] ** 2 + x[1] ** 2) / flat.A**2
-    pressure = flat.P0 * ufl.sqrt(ufl.conditional(ufl.gt(inside, 0), inside, 0))
-    return {"": rows | field(found, pressure=off_disc(pair[0].contacts[0], pressure))}
+    others = {"same cells": scene} | ({"half cells": flat.scene(2 * cells)} if halved else {})
+    for name, of in others.items():
+        found = dc.estimate(problem, ball_on_flat(of, 2))
+        rows[name] = compared(found, {key: (found[key].value, of) for key, of in exact.items()})
+        if name == "same cells":
+            x = ufl.SpatialCoordinate(scene[0])
+            inside = 1 - (x[0] ** 2 + x[1] ** 2) / flat.A**2
+            pressure = flat.P0 * ufl.sqrt(ufl.conditional(ufl.gt(inside, 0), inside, 0))
+            rows[name] |= field(found, pressure=off_disc(problem.contacts[0], pressure))
+    return rows
 
 
 def ball(domain, face, far, order: int) -> dc.ContactProblem:
@@ -227,33 +255,41 @@ def ball(domain, face, far, order: int) -> dc.ContactProblem:
 
 def ball_in_axial_symmetry(cells: int) -> dict:
     """Nodal tractions are those of rings: ``2 pi r p``."""
-    scene = rounded_body(1000.0, A, 16 * A, cells, half=True, order=2)
-    pair = [ball(*scene, order) for order in (1, 2)]
-    for problem in pair:
-        problem.solve()
-    found = dc.estimate(*pair)
-    rows = compared(found, dict(normal_force=(found["normal_force"].value, FORCE)))
+    solved, rows = {}, {}
+    for name, (n, order) in references(cells).items():
+        if name != "same cells":  # which has the mesh of the problem
+            scene = rounded_body(1000.0, A, 16 * A, n, half=True, order=2)
+        solved[name] = ball(*scene, order)
+        solved[name].solve()
+    problem = solved.pop("problem")
 
     def of_ring(r):
         return 2 * np.pi * r * P0 * np.sqrt(np.maximum(1 - (r / A) ** 2, 0))
 
-    return {"": rows | field(found, pressure=off_line(pair[0].contacts[0], 1, of_ring))}
+    for name, reference in solved.items():
+        found = dc.estimate(problem, reference)
+        rows[name] = compared(found, dict(normal_force=(found["normal_force"].value, FORCE)))
+        rows[name] |= field(found, pressure=off_line(problem.contacts[0], 1, of_ring))
+    return rows
 
 
-SCENES = {
-    "cylinder of Hertz, 2-D": (hertz, (8, 12, 16, 24, 32)),
-    "ball of Hertz, axial symmetry": (ball_in_axial_symmetry, (8, 12, 16, 24, 32)),
-    "ball on a flat, 3-D": (ball_in_space, (8, 12)),
-    "flat punch, 2-D": (flat_punch, (8, 16, 32)),
-    "partial slip, 2-D": (partial_slip, (8, 12, 16, 24, 32)),
+EDGES = (1.0, 0.95, 0.9, 0.85)  # of the contact, over the place of a node
+SCENES = {  # and arguments
+    "cylinder of Hertz, 2-D": (hertz, [(n, edge) for n in (8, 16) for edge in EDGES]),
+    "ball of Hertz, axial symmetry": (ball_in_axial_symmetry, [(n,) for n in (8, 12, 16, 24)]),
+    "ball on a flat, 3-D": (ball_in_space, [(6, True), (7, True), (8,), (10,), (12,)]),
+    "flat punch, 2-D": (flat_punch, [(n,) for n in (8, 16, 32)]),
+    "partial slip, 2-D": (partial_slip, [(n, edge) for n in (8, 16) for edge in EDGES]),
 }
 
 
 def main(path: Path, chosen=()) -> None:
     for name in chosen or SCENES:
         compute, meshes = SCENES[name]
-        for cells in meshes:
-            record = json.dumps(dict(scene=name, cells=cells, states=compute(cells)))
+        for mesh_and_edge in meshes:
+            record = json.dumps(
+                dict(scene=name, cells=mesh_and_edge, states=compute(*mesh_and_edge))
+            )
             if MPI.COMM_WORLD.rank == 0:
                 with path.open("a") as file:
                     file.write(record + "\n")

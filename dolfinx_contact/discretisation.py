@@ -12,6 +12,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from numpy.typing import ArrayLike
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import KDTree
 
 from dolfinx_contact import compat
 from dolfinx_contact.checks import positive
@@ -98,9 +100,9 @@ def estimate(
         quantities: Functions of a problem that return a number, the same on all ranks, by name; or several, such as the force
             after each step so far: then the value is the largest, and the error the largest of theirs.  They come beside
             ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
-            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object there are
-            also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of the nodal normal and tangential
-            tractions, reaction over area, with those of the differences as errors.
+            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object, or where all
+            contacts are with planes, there are also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of
+            the nodal normal and tangential tractions, reaction over area, with those of the differences as errors.
         share: The error over the difference.  ``1 / (1 - 2**-p)`` for a reference on cells of half the size where errors fall
             with order p.
 
@@ -131,11 +133,13 @@ def estimate(
                     f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
                 )
         found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
-    if problem.body.V.mesh is not reference.body.V.mesh:
+    same_mesh = problem.body.V.mesh is reference.body.V.mesh
+    if same_mesh or not any(contact.plane.curved for contact in problem.contacts):
+        for name, of in tractions(problem, reference).items():
+            found.setdefault(name, of._replace(error=share * of.error))
+    if not same_mesh:
         return Estimate(found, None, None)
     norm, cells = indicators(problem, reference)
-    for name, of in tractions(problem, reference).items():
-        found.setdefault(name, of._replace(error=share * of.error))
     return Estimate(found, share * norm, cells)
 
 
@@ -168,22 +172,41 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
     """Root mean squares, over the contact surfaces, of pressure and shear and of their differences.  Collective.
 
     Nodal tractions of the problem, in the local frame, are interpolated at the reference's contact nodes, whose areas are the weights:
-    Simpson's rule on edges and quadrilaterals of second order, the middles of the edges on triangles.
+    of second order Simpson's rule on edges and quadrilaterals, the middles of the edges on triangles.
     """
     sums, area = np.zeros((2, 2)), 0.0
     for contact, better in zip(problem.contacts, reference.contacts):
-        here, there = (fem.Function(of.displacements.V) for of in (contact, better))
-        own, other = (of.reaction / of.area[:, None] for of in (contact, better))
-        here.x.array.reshape(-1, own.shape[1])[contact.nodes] = own
-        here.x.scatter_forward()
-        there.interpolate(here)
-        own = there.x.array.reshape(-1, own.shape[1])[better.nodes]
+        own, other = interpolated(contact, better), better.reaction / better.area[:, None]
         area += better.area.sum()
         for row, of in zip(sums, (own, other - own)):
             row += better.area @ of[:, -1] ** 2, better.area @ (of[:, :-1] ** 2).sum(axis=1)
     comm = problem.body.comm
     means = np.sqrt(comm.allreduce(sums) / comm.allreduce(area)).T
     return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
+
+
+def interpolated(contact, better) -> np.ndarray:
+    """Nodal tractions of a contact at the nodes of another, local frame.  Collective.
+
+    On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.
+    """
+    tractions, dim = contact.reaction / contact.area[:, None], contact.reaction.shape[1]
+    if contact.V.mesh is better.V.mesh:
+        here, there = (fem.Function(of.displacements.V) for of in (contact, better))
+        here.x.array.reshape(-1, dim)[contact.nodes] = tractions
+        here.x.scatter_forward()
+        there.interpolate(here)
+        return there.x.array.reshape(-1, dim)[better.nodes]
+    along = contact.plane.frame[:-1, :dim].T
+    x, y = (of.x[:, :dim] @ along for of in (contact, better))
+    x, values = map(np.concatenate, zip(*contact.comm.allgather((x, tractions))))
+    if dim == 2:
+        order = np.argsort(x[:, 0])
+        return np.array([np.interp(y[:, 0], x[order, 0], of[order]) for of in values.T]).T
+    found = LinearNDInterpolator(x, values)(y)
+    outside = np.isnan(found[:, 0])
+    found[outside] = values[KDTree(x).query(y[outside])[1]]
+    return found
 
 
 def largest(numbers: ArrayLike) -> float:

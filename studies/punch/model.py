@@ -64,7 +64,7 @@ class Punch:
     """Body, plane, friction and supports; ``press`` computes one load step after another.
 
     ``solver``, ``petsc_options`` as in ``dc.ContactProblem``; ``friction``: arguments of ``dc.Friction`` in place of the case's;
-    ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.  With ``quarter=True`` only a quarter is computed, planes of symmetry
+    ``degree``: of the displacements, in place of the cells' order; ``on``: another Punch of these options, whose mesh it takes; ``mesh_options`` as in ``punch_mesh``, such as ``divisions``.  With ``quarter=True`` only a quarter is computed, planes of symmetry
     hold it, and the sums of forces and work that ``press`` and ``dissipation`` return are those of the whole.
     """
 
@@ -75,15 +75,17 @@ class Punch:
         solver=None,
         friction=None,
         petsc_options=None,
+        degree=None,
+        on=None,
         **mesh_options,
     ):
         self.parameters, self.comm = parameters, comm
         self.friction = friction or CASES[parameters.case]
         self.parts = 4 if mesh_options.get("quarter") else 1  # of the whole punch
         shape = {key: getattr(parameters, key) for key in ("radius", "height", "lowest")}
-        punch = punch_mesh(comm, parameters.refine, **shape, **mesh_options)
+        punch = on or punch_mesh(comm, parameters.refine, **shape, **mesh_options)
         self.mesh, self.facet_tags = punch.mesh, punch.facet_tags
-        order = mesh_options.get("order", 1)
+        order = degree or mesh_options.get("order", 1)
         self.V = functionspace(self.mesh, ("Lagrange", order, (3,)))
         self.u = fem.Function(self.V, name="displacement")
         self.approach = fem.Constant(self.mesh, PETSc.ScalarType(0))  # u_z of the top face
