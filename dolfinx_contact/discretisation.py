@@ -127,12 +127,7 @@ def estimate(
     found = {}
     for name, of in {**QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
-            value, better = (_numbers(name, of(which)) for which in (problem, reference))
-            if value.shape != better.shape:
-                raise ValueError(
-                    f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
-                )
-        found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
+            found[name] = _compared(name, of(problem), of(reference), share)
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     if same_mesh or not any(contact.plane.curved for contact in problem.contacts):
         for name, of in tractions(problem, reference).items():
@@ -141,6 +136,16 @@ def estimate(
         return Estimate(found, None, None)
     norm, cells = indicators(problem, reference)
     return Estimate(found, share * norm, cells)
+
+
+def _compared(name: str, value: ArrayLike, better: ArrayLike, share: float) -> Estimated:
+    """Of one quantity."""
+    value, better = _numbers(name, value), _numbers(name, better)
+    if value.shape != better.shape:
+        raise ValueError(
+            f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
+        )
+    return Estimated(largest(value), share * float(np.abs(better - value).max()))
 
 
 def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
