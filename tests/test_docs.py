@@ -32,7 +32,7 @@ TEXTS = {
     if "gallery" not in file.parts
 }
 SCRIPTS = {page: parts for page, text in TEXTS.items() if (parts := blocks(text))}
-FAST = {"tutorial/2_friction.md", "howto/condensed.md", "howto/fields.md", "howto/submeshes.md", "own_solver.md", "solvers.md"}  # fmt: skip
+FAST = {"tutorial/2_friction.md", "howto/condensed.md", "howto/external_operator.md", "howto/fields.md", "howto/submeshes.md", "own_solver.md", "solvers.md"}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts interpreters")
 
