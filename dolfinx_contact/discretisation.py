@@ -127,7 +127,8 @@ def estimate(
     found = {}
     for name, of in {**QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
-            found[name] = _compared(name, of(problem), of(reference), share)
+            value, better = _numbers(name, of(problem), of(reference))
+        found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     if same_mesh or not any(contact.plane.curved for contact in problem.contacts):
         for name, of in tractions(problem, reference).items():
@@ -136,16 +137,6 @@ def estimate(
         return Estimate(found, None, None)
     norm, cells = indicators(problem, reference)
     return Estimate(found, share * norm, cells)
-
-
-def _compared(name: str, value: ArrayLike, better: ArrayLike, share: float) -> Estimated:
-    """Of one quantity."""
-    value, better = _numbers(name, value), _numbers(name, better)
-    if value.shape != better.shape:
-        raise ValueError(
-            f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
-        )
-    return Estimated(largest(value), share * float(np.abs(better - value).max()))
 
 
 def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
@@ -247,8 +238,15 @@ def _check_pair(problem, reference) -> None:
         )
 
 
-def _numbers(name: str, value) -> np.ndarray:
-    value = np.ravel(np.asarray(value, dtype=float))
-    if value.size == 0 or not np.isfinite(value).all():
-        raise ValueError(f"quantity {name!r} must be a finite number or several, got {value!r}.")
-    return value
+def _numbers(name: str, *of) -> list[np.ndarray]:
+    value, better = found = [np.ravel(np.asarray(numbers, dtype=float)) for numbers in of]
+    for numbers in found:
+        if numbers.size == 0 or not np.isfinite(numbers).all():
+            raise ValueError(
+                f"quantity {name!r} must be a finite number or several, got {numbers!r}."
+            )
+    if value.size != better.size:
+        raise ValueError(
+            f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
+        )
+    return found
