@@ -3,6 +3,7 @@
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
+import demo_ball_on_flat as ball_on_flat
 import numpy as np
 import pytest
 import ufl
@@ -102,6 +103,15 @@ def test_norms_of_tractions(cell, other):
     found = dc.estimate(problem, reference, share=2.0)
     assert found["pressure"] == pytest.approx((np.sqrt(7 / 3), 2 * np.sqrt(1 / 3)))
     assert found["shear"] == pytest.approx((np.sqrt(1 / 3), 2.0))
+
+
+def test_curved_surfaces_on_two_meshes():
+    """Between meshes tractions are compared on planes alone; on one mesh everywhere."""
+    scenes = [ball_on_flat.scene(cells) for cells in (4, 6)]
+    problem = ball_on_flat.ball_on_flat(*scenes[0])[0]
+    for scene, known in zip(scenes, (True, False)):
+        found = dc.estimate(problem, ball_on_flat.ball_on_flat(*scene, order=2)[0])
+        assert ("pressure" in found.quantities) == known
 
 
 def test_hertz_in_two_dimensions():
