@@ -79,7 +79,7 @@ def adapt(
         compute: From a mesh two problems on it, of lower and of higher order, at the programme's end.
         mesh: Of triangles or tetrahedra, to begin with.
         accuracy: Of the quantity, relative.
-        quantity: Name of one of ``estimate``'s quantities, or of ``quantities``, which are as there.
+        quantity: Name of one of ``estimate``'s quantities, ``pressure`` and ``shear`` excepted, or of ``quantities``, which are as there.
         meshes: At most so many.
         share: Between 0 and 1; less makes more meshes, each better adapted.
 
