@@ -57,7 +57,8 @@ test-slow: .venv/ready
 	tools/mpitest .venv 1 -m slow
 
 test-ranks: .venv/ready
-	tools/mpitest .venv 2 -m "not slow" $(no_arrays)
+	tools/mpitest .venv 2 -m "not slow" $(features:%=tests/test_%.py)
+	tools/mpitest .venv 2 -m "not slow" --once $(no_arrays) $(features:%=--ignore=tests/test_%.py)
 	tools/mpitest .venv 2 -m slow --once
 	tools/mpitest .venv 3 -m "not slow" --once $(no_arrays) $(no_programs)
 
