@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -15,6 +17,9 @@ from dolfinx_contact.collective import raised_together
 
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
 ZERO = 1e-10
+
+# What an even pressure may make at a node that is left out, over the largest at others, before a user is told.
+UNEVEN = 0.01
 
 
 def areas(V, facets: np.ndarray, reference: bool = False) -> np.ndarray:
@@ -61,7 +66,26 @@ def contact_nodes(V, facets: np.ndarray) -> np.ndarray:
                 f"{V.tabulate_dof_coordinates()[nodes[node]].tolist()} over the facets is negative: under an even pressure "
                 "it would have to pull, which contact cannot. Take degree 1 or 2."
             )
-    return nodes[weights > zero]
+    kept = weights > zero
+    _warn_of_curved_edges(V, facets, nodes[kept], nodes[~kept])
+    return nodes[kept]
+
+
+def _warn_of_curved_edges(V, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray) -> None:
+    """Tell that an even pressure acts on nodes that are left out.  Collective."""
+    comm, dim = V.mesh.comm, V.mesh.geometry.dim
+    if comm.allreduce(left_out.size) == 0:
+        return
+    acting = np.abs(areas(V, facets))
+    most = [acting[dim * of].max(initial=0.0) for of in (left_out, kept)]
+    missed, largest = (comm.allreduce(float(of), op=MPI.MAX) for of in most)
+    if missed > UNEVEN * largest:
+        warnings.warn(
+            f"edges of contact facets are curved: an even pressure would make forces of up to {missed / largest:.1%} of "
+            "the largest at vertices of second-order tetrahedra, which are no contact nodes. Results are off by about that "
+            "there. Take smaller cells there, or bricks.",
+            stacklevel=4,
+        )
 
 
 def scalar(V, nodes: np.ndarray, values, name: str, elsewhere: float):
