@@ -139,3 +139,24 @@ def next_change(step, x: np.ndarray) -> float:
         tangent.destroy()
     acting = max(step.size(step.forces(x)), body.norm(step.external))
     return step.size(body.multiply(dx)) / acting if acting > 0.0 else np.inf
+
+
+class OnTangent:
+    """A solver on the tangent of one body, bound; keeps its ordering."""
+
+    def __init__(self, options, body, contacts):
+        if any(contact.plane.free for contact in contacts):
+            raise ValueError(
+                f"{type(options).__name__}() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "
+                "dc.FixedPoint()."
+            )
+        self._options, self._body = options, body
+        self._tangent = ContactTangent(body, contacts)
+
+    def destroy(self) -> None:
+        """Free the tangent.  Collective."""
+        self._tangent.destroy()
+
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``: nothing that is kept knows the law."""
+        return True

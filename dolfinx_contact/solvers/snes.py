@@ -16,7 +16,7 @@ from dolfinx_contact.bodies.checks import warn_of_unread
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
 from dolfinx_contact.solvers.base import BoundSolver, SolverResult
-from dolfinx_contact.solvers.contact_tangent import ContactTangent
+from dolfinx_contact.solvers.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.solvers.sparse_newton import NORMAL, Descent
 
@@ -57,27 +57,11 @@ class SNES:
 
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``Solver``."""
-        if any(contact.plane.free for contact in contacts):
-            raise ValueError(
-                "SNES() does not know planes driven by force: use solver=None, dc.CondensedNewton() or dc.FixedPoint()."
-            )
         return BoundSNES(self, body, contacts)
 
 
-class BoundSNES:
-    """SNES for one body; keeps the tangent's ordering."""
-
-    def __init__(self, options: SNES, body, contacts):
-        self._options, self._body = options, body
-        self._tangent = ContactTangent(body, contacts)
-
-    def destroy(self) -> None:
-        """Free the tangent.  Collective."""
-        self._tangent.destroy()
-
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``: nothing that is kept knows the law."""
-        return True
+class BoundSNES(OnTangent):
+    """SNES for one body."""
 
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
         """Let SNES iterate until the errors are at most the tolerance, or it gives up.

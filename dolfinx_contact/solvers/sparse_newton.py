@@ -16,7 +16,7 @@ from dolfinx_contact.checks import positive
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
 from dolfinx_contact.solvers.base import BoundSolver, SolverResult
-from dolfinx_contact.solvers.contact_tangent import ContactTangent
+from dolfinx_contact.solvers.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.search import Search
 
 NAME = "SparseNewton"
@@ -60,28 +60,11 @@ class SparseNewton:
 
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``Solver``."""
-        if any(contact.plane.free for contact in contacts):
-            raise ValueError(
-                "SparseNewton() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "
-                "dc.FixedPoint()."
-            )
         return BoundSparseNewton(self, body, contacts)
 
 
-class BoundSparseNewton:
-    """The method for one body; keeps the tangent's ordering."""
-
-    def __init__(self, options: SparseNewton, body, contacts):
-        self._options, self._body = options, body
-        self._tangent = ContactTangent(body, contacts)
-
-    def destroy(self) -> None:
-        """Free the tangent.  Collective."""
-        self._tangent.destroy()
-
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``: nothing that is kept knows the law."""
-        return True
+class BoundSparseNewton(OnTangent):
+    """The method for one body."""
 
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or nothing helps any more.
