@@ -13,13 +13,14 @@ from pathlib import Path
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.petsc.linear_solver import DIRECT
 from mechanics.half_plane import Cylinder, FlatPunch
 
 # isort: split
 import demo_ball_on_flat as flat
 import numpy as np
 import ufl
-from demo_hertz import FORCE, NU, P0, A, E, far_field
+from demo_hertz import FORCE, P0, A, ball
 from dolfinx import fem, mesh
 from helpers import along_face, hooke, rounded_body
 from mpi4py import MPI
@@ -27,7 +28,6 @@ from mpi4py import MPI
 SMOOTH = Cylinder(young=1000.0, nu=0.3, radius=1000.0, a=0.1)
 ROUGH = Cylinder(young=1000.0, nu=0.499, radius=1000.0, a=0.1, mu=0.3)
 PUNCH = FlatPunch(young=1000.0, nu=0.3, a=0.1, force=0.01)
-FACTORISED = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 THERE = np.linspace(0.0, 0.8, 9)[1:]  # tangential forces over mu P, and back
 BACK = np.linspace(0.8, -0.8, 17)[1:]
 STATES = {"there, 0.4": 4, "there, 0.8": 8, "back, 0.4": 12, "back, -0.4": 20, "back, -0.8": 24}
@@ -42,7 +42,7 @@ def plane_strain(scene, law, order: int, facets=None) -> tuple[dc.ContactProblem
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far))]
     face = face if facets is None else face[facets]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
-    options = dict(solver=dc.CondensedNewton(), petsc_options=FACTORISED, tol=1e-9)
+    options = dict(solver=dc.CondensedNewton(), petsc_options=DIRECT, tol=1e-9)
     return dc.ContactProblem(F, u, [contact], bcs, **options), held
 
 
@@ -229,29 +229,6 @@ def ball_in_space(cells: int, halved: bool = False) -> dict:
             pressure = flat.P0 * ufl.sqrt(ufl.conditional(ufl.gt(inside, 0), inside, 0))
             rows[name] |= field(found, pressure=off_disc(problem.contacts[0], pressure))
     return rows
-
-
-def ball(domain, face, far, order: int) -> dc.ContactProblem:
-    """The ball of demo_hertz in axial symmetry, far boundary as in the closed form."""
-    V = functionspace(domain, ("Lagrange", order, (2,)))
-    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(domain)[0]
-
-    def strain(w):
-        rr, rz, zz = w[0].dx(0), (w[0].dx(1) + w[1].dx(0)) / 2, w[1].dx(1)
-        return ufl.as_matrix([[rr, rz, 0], [rz, zz, 0], [0, 0, w[0] / r]])
-
-    dx = ufl.dx(metadata={"quadrature_degree": 2 * order + 1})
-    F = 2 * np.pi * r * ufl.inner(hooke(strain(u), E, NU), strain(v)) * dx
-    held, radial = fem.Function(V), V.sub(0)
-    held.interpolate(lambda x: far_field(x, FORCE))
-    axis = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
-    on_axis = fem.locate_dofs_topological(radial, 1, axis)
-    bcs = [
-        fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far)),
-        fem.dirichletbc(fem.Constant(domain, 0.0), on_axis, radial),
-    ]
-    contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
-    return dc.ContactProblem(F, u, contact, bcs, tol=1e-10)
 
 
 def ball_in_axial_symmetry(cells: int) -> dict:

@@ -90,10 +90,9 @@ def far_field(x, point_force: float):
     return np.array([b_r, b * (2 * (1 - NU) + z**2 / rho**2) - DELTA])
 
 
-def press(cells: int, size: float, point_force: float) -> dict:
-    """Press the ball on the plane; errors relative to the closed form."""
-    domain, face, far = rounded_body(R, A, size, cells, half=True)
-    V = functionspace(domain, ("Lagrange", 1, (2,)))
+def ball(domain, face, far, order: int = 1, point_force: float = FORCE) -> dc.ContactProblem:
+    """The ball on the plane, in finite elements of an order."""
+    V = functionspace(domain, ("Lagrange", order, (2,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
     r = ufl.SpatialCoordinate(domain)[0]
 
@@ -101,7 +100,7 @@ def press(cells: int, size: float, point_force: float) -> dict:
         rr, rz, zz = w[0].dx(0), (w[0].dx(1) + w[1].dx(0)) / 2, w[1].dx(1)
         return ufl.as_matrix([[rr, rz, 0], [rz, zz, 0], [0, 0, w[0] / r]])
 
-    dx = ufl.dx(metadata={"quadrature_degree": 3})  # 2 x 2 Gauss points, none on the axis
+    dx = ufl.dx(metadata={"quadrature_degree": 2 * order + 1})  # Gauss points, none on the axis
     F = 2 * np.pi * r * ufl.inner(hooke(strain(u), E, NU), strain(v)) * dx
 
     held = fem.Function(V)
@@ -112,16 +111,22 @@ def press(cells: int, size: float, point_force: float) -> dict:
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far)), on_axis]
     plane = dc.RigidPlane(point=(0, 0), normal=(0, 1))
     contact = dc.Contact(V, face, plane, dc.Friction(mu=0.0))
-    dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10).solve()
-    return compare(contact, r)
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10)
 
 
-def compare(contact: dc.Contact, r) -> dict:
+def press(cells: int, size: float, point_force: float) -> dict:
+    """Press the ball on the plane; errors relative to the closed form."""
+    problem = ball(*rounded_body(R, A, size, cells, half=True), point_force=point_force)
+    problem.solve()
+    return compare(problem.contacts[0])
+
+
+def compare(contact: dc.Contact) -> dict:
     """Errors of force, pressure and radius; ``h`` is the width of a cell at the edge of contact.
 
     With them the pressure itself, over that in the middle, against r over a.
     """
-    rings = fem.Function(contact.V)
+    rings, r = fem.Function(contact.V), ufl.SpatialCoordinate(contact.V.mesh)[0]
     assemble_into(rings.x, fem.form(2 * np.pi * r * ufl.TestFunction(contact.V)[1] * ufl.ds))
     rings = rings.x.array.reshape(-1, 2)[contact.nodes, 1]
     x, area, force = along_face(contact, rings, contact.reaction[:, 1])

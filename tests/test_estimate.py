@@ -7,13 +7,13 @@ import demo_ball_on_flat as ball_on_flat
 import numpy as np
 import pytest
 import ufl
-from demo_hertz import FORCE, A
+from demo_hertz import FORCE, A, ball
 from dolfinx import fem
 from helpers import rounded_body
 from patches import CELLS, box
 from scenes import COMM, elasticity
 
-from benchmarks.effectivity import ROUGH, ball, hertz, partial_slip
+from benchmarks.effectivity import ROUGH, hertz, partial_slip
 from dolfinx_contact.compat import functionspace
 
 

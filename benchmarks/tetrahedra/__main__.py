@@ -10,8 +10,10 @@ from pathlib import Path
 from time import process_time
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.law.dissipation import work_of_friction
+from dolfinx_contact.petsc.linear_solver import DIRECT
 
 # isort: split
 import numpy as np
@@ -24,10 +26,10 @@ from scipy import linalg, sparse
 
 from benchmarks.tables import table
 from benchmarks.tetrahedra.ball import Ball, ball
-from benchmarks.tetrahedra.bodies import Body, Touching, body_of
+from benchmarks.tetrahedra.bodies import Body, Touching
 from benchmarks.tetrahedra.points import VARIANTS, Points, contact_points, even
 from mechanics.material import elasticity
-from studies.punch.accuracy import FACTORISED, mesh_options
+from studies.punch.accuracy import mesh_options
 from studies.punch.mesh import CONTACT
 from studies.punch.model import Parameters, Punch, programme
 
@@ -58,7 +60,7 @@ def patch(variant: str, slips: bool, tilted: bool, curved: bool) -> dict:
     held.x.array[:] = block.moved(V.tabulate_dof_coordinates().T).T.ravel()
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, block.top))
     F = elasticity(u, v, E, NU, block.dx) - block.work(v)
-    body = Body(body_of(F, u, [bc]), block.contact(V).facets, block.plane.frame)
+    body = Body(body_of(F, u, [bc], options=DIRECT), block.contact(V).facets, block.plane.frame)
     points = contact_points(variant, body.X, body.T)
     found = Touching(points, body.S).solve(body.free(), dc.Friction(MU, P))
     forces = even(body.X, body.T)[:, None] * block.traction
@@ -84,7 +86,7 @@ def uneven_block(cells: int) -> Body:
     bc = fem.dirichletbc(
         fem.Constant(domain, np.zeros(3)), fem.locate_dofs_topological(V, 2, top), V
     )
-    return Body(body_of(F, u, [bc]), bottom, UP)
+    return Body(body_of(F, u, [bc], options=DIRECT), bottom, UP)
 
 
 def stability(points: Points, body: Body, cells: int) -> dict:
@@ -109,7 +111,7 @@ def tetrahedral_punch(n: int) -> tuple[Punch, Body]:
     lowest = start.height / options["layers"] ** 2
     parameters = replace(start, case="A", tol=1e-8, lowest=lowest)
     punch = Punch(
-        parameters, solver=dc.CondensedNewton(), petsc_options=FACTORISED, quarter=True, tetrahedra=True, **options
+        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=True, tetrahedra=True, **options
     )  # fmt: skip
     return punch, Body(punch.problem.body, punch.facet_tags.find(CONTACT), UP)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.compat import second_order
+from dolfinx_contact.petsc.linear_solver import DIRECT
 
 # isort: split
 import numpy as np
@@ -11,7 +13,7 @@ from dolfinx import fem, mesh
 from helpers import elastic, point_force_field
 from mpi4py import MPI
 
-from benchmarks.tetrahedra.bodies import Body, Touching, body_of
+from benchmarks.tetrahedra.bodies import Body, Touching
 from benchmarks.tetrahedra.points import contact_points, even, reference_values
 
 DOWN = np.diag([1.0, 1.0, -1.0])  # frame of a body below its surface
@@ -77,7 +79,7 @@ class Ball:
         for k, facets in held:
             dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
             bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
-        return Body(body_of(F, u, bcs), top, DOWN)
+        return Body(body_of(F, u, bcs, options=DIRECT), top, DOWN)
 
     def drag(self, touching: Touching, a: float) -> dict:
         """Pressed until the radius of contact is ``a``, and dragged: errors against H. Hertz, and R. D. Mindlin."""

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.forms import derivative_of
 from dolfinx_contact.compat import cell_nodes
 from dolfinx_contact.solvers.compliance import Rows, compliance
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
@@ -18,7 +17,6 @@ import numpy as np
 from scipy import sparse
 
 from benchmarks.tetrahedra.points import Points
-from studies.punch.accuracy import FACTORISED
 
 SECONDS = 10.0  # after which a step counts as failed
 
@@ -58,11 +56,6 @@ class Body:
     def free(self) -> np.ndarray:
         """Motion of the nodes without reactions, ``shape=(m, 3)``."""
         return self._rows.of(self._body.free_state(self._body.load()[0])).reshape(-1, 3)
-
-
-def body_of(F, u, bcs) -> ElasticBody:
-    """The body of a form, factorised."""
-    return ElasticBody(F, u, bcs, derivative_of(F, u, None)[0], FACTORISED)
 
 
 class Touching:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import dolfinx_contact as dc
+from dolfinx_contact.petsc.linear_solver import DIRECT
 from studies.punch.contact_map import gather
 from studies.punch.model import Parameters, Punch, programme
 
@@ -27,7 +28,6 @@ DIVISIONS = (2, 4, 6, 8, 10)  # of the meshes, one after another
 TRIAL = 1  # the place in them of the finest one on which increments are tried
 SHARE = 0.7  # of the accuracy that is left to the increments
 HALVINGS = 6  # of the increments, at most
-FACTORISED = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
 
 @dataclass
@@ -148,7 +148,7 @@ def build(parameters: Parameters, divisions: int, comm=None) -> Punch:
     lowest = parameters.height / (2 * divisions) ** 2
     given = {} if comm is None else {"comm": comm}
     # the compliance of the contact nodes takes thousands of solves: by a factorisation, on fine meshes, too
-    given |= dict(solver=dc.CondensedNewton(), petsc_options=FACTORISED)
+    given |= dict(solver=dc.CondensedNewton(), petsc_options=DIRECT)
     quarter = min(parameters.target) >= 0 and divisions % 2 == 0
     parameters = replace(parameters, refine=0, lowest=lowest)
     return Punch(parameters, **given, **mesh_options(divisions), quarter=quarter)

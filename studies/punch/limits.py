@@ -11,7 +11,8 @@ from pathlib import Path
 from time import process_time
 
 import dolfinx_contact as dc
-from studies.punch.accuracy import FACTORISED, mesh_options
+from dolfinx_contact.petsc.linear_solver import DIRECT
+from studies.punch.accuracy import mesh_options
 from studies.punch.model import Parameters, Punch, programme
 
 # What the runs tend to with mesh and increments, and half of the width that is left: N when loaded; N mm.  Judgements from two
@@ -81,7 +82,7 @@ def build(run: Run, quarter: bool = True, tol: float = 1e-8) -> tuple[Punch, flo
         rim=None if run.rim == 1 else run.rim,
     )
     punch = Punch(
-        parameters, solver=dc.CondensedNewton(), petsc_options=FACTORISED, quarter=quarter, **mesh
+        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=quarter, **mesh
     )
     punch.press(start.depth)  # the first step makes it
     return punch, process_time() - begin
