@@ -63,6 +63,14 @@ def test_the_interior_point_method_is_a_start(kind):
     assert "interior point" in branches
 
 
+@pytest.mark.slow
+def test_a_path_through_points_where_it_turns_back():
+    """A wall of 340 contacts with W of rank 288 of 1020, 3e-3 unsymmetric, mu = 0.7, where the interior
+    point method and the proximal points from its end stop at 1e-6: solved from the end of a path."""
+    scene = problem("wall", 48, 3, motion=0.1, spread=0.5, uneven=3e-3)
+    check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=200)
+
+
 def test_sparse_and_dense_storage():
     """A W of many zeros gives the same contact forces' sum and velocities whether its zeros are used
     or hidden by entries too small to matter."""

@@ -211,11 +211,12 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
         if found.change <= tol or found.error <= found.rounding:
             break
         try:
-            found = finer.solve_condensed(
+            nearer = finer.solve_condensed(
                 operator, friction, q, max(factor * tol, 1e-14), [found.reaction]
             )
         except CondensedNotConverged:
             break
+        found = replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
     return found
 
 

@@ -50,8 +50,13 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
-        if (InteriorPoint<T>::applies(scaling_.make()) &&
-            attempt("interior point", [this] { this->interior(); }))
+        const System<T> system = scaling_.make();
+        const bool smooth = InteriorPoint<T>::applies(system), sparse = system.pattern != nullptr;
+        const auto path = [&](bool now) {
+            return T > 0 && smooth && now && attempt("path", [this] { this->path(); });
+        };
+        // rigid bodies need paths, elastic ones hardly
+        if ((smooth && attempt("interior point", [this] { this->interior(); })) || path(sparse))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
@@ -61,7 +66,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         constexpr int few = 5;
         if (attempt("continuation", [&] { paths(few); }) ||
             attempt("proximal point", [&] { this->swept(given, 300); }) ||
-            attempt("sweeps", [&] { this->swept(zero, 2000); }))
+            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!sparse))
             return;
         const auto size = static_cast<double>(scaling_.size());
         attempt("continuation, many starts",

@@ -6,6 +6,7 @@
 
 #include "condensed_interior.h"
 #include "condensed_judge.h"
+#include "condensed_path.h"
 #include "condensed_plane.h"
 #include "condensed_proximal.h"
 #include "condensed_scaling.h"
@@ -91,6 +92,24 @@ template <int T, int P> class Attempts {
         newton(r);
         if (!best_.converged)
             proximal_from(r);
+    }
+
+    /// Newton's method from the end of a path that starts at the best state, and the proximal point
+    /// method from there.
+    void path() {
+        if constexpr (T > 0) {
+            const System<T> system = scaling_.make();
+            const VectorXd r = scaling_.scaled(best_.reaction);
+            std::minstd_rand random(1);
+            if (r.isZero(0.0) || system.q.isZero(0.0))
+                return;
+            Path<T> path(system, r, random, budget_);
+            if (!path.run())
+                return;
+            newton(path.reactions());
+            if (!best_.converged)
+                proximal_from(path.reactions());
+        }
     }
 
     /// Newton's method from where sweeps come to from r, and the proximal point method from there.

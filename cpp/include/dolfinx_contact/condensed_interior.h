@@ -5,6 +5,7 @@
 /// way through very many states of contacts. A start for Newton's method.
 #pragma once
 
+#include "condensed_blocks.h"
 #include "condensed_newton.h"
 #include <algorithm>
 
@@ -19,8 +20,7 @@ template <int T> class InteriorPoint {
     using Node = Eigen::Matrix<double, D, 1>;
     using Block = Eigen::Matrix<double, D, D>;
 
-    explicit InteriorPoint(const System<T> &system)
-        : system_(system), dense_(system.pattern == nullptr) {}
+    explicit InteriorPoint(const System<T> &system) : system_(system), linear_(system) {}
 
     /// Whether there are no tied rows and no contacts without friction beside others with it.
     static bool applies(const System<T> &system) {
@@ -155,9 +155,10 @@ template <int T> class InteriorPoint {
             c.segment<D>(D * i) = P_[k] * quotient(lambda, b);
             rhs.segment<D>(D * i) += E_[k] * at(c, i);
         }
-        if (target > 0.0)
-            dr = linear_.again(rhs);
-        else if (!factors(rhs, dr))
+        if (target == 0.0 && !factors())
+            return false;
+        dr = linear_.solve(rhs);
+        if (!dr.allFinite())
             return false;
         dy = c;
         for (Index i = 0; i < system_.nodes; ++i) {
@@ -167,43 +168,17 @@ template <int T> class InteriorPoint {
         return true;
     }
 
-    /// Factors of W + E P^2, and its solution.
-    bool factors(const VectorXd &rhs, VectorXd &dr) {
-        const auto n = static_cast<std::size_t>(system_.nodes);
-        std::vector<Block> diagonal(n);
-        for (std::size_t k = 0; k < n; ++k)
-            diagonal[k] = E_[k] * P_[k] * P_[k];
-        if (dense_) {
-            MatrixXd J =
-                system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();
-            for (Index i = 0; i < system_.nodes; ++i)
-                J.block<D, D>(D * i, D * i) += diagonal[static_cast<std::size_t>(i)];
-            return linear_.solve(J, rhs, dr, true) && dr.allFinite();
-        }
-        std::vector<Eigen::Triplet<double>> entries;
-        for (Index column = 0; column < system_.size(); ++column) {
-            const Index j = column / D;
-            const auto &block = diagonal[static_cast<std::size_t>(j)];
-            for (const Index i : (*system_.pattern)[static_cast<std::size_t>(j)])
-                for (int l = 0; l < D; ++l) {
-                    const Index row = D * i + l;
-                    entries.emplace_back(row, column,
-                                         system_.left[row] * (*system_.W)(row, column) *
-                                                 system_.right[column] +
-                                             (i == j ? block(l, column % D) : 0.0));
-                }
-        }
-        Eigen::SparseMatrix<double> J(system_.size(), system_.size());
-        J.setFromTriplets(entries.begin(), entries.end());
-        const bool solved = linear_.solve(J, rhs, dr);
-        dense_ = linear_.filled();
-        return solved;
+    /// Of W + E P^2.
+    bool factors() {
+        std::vector<Block> blocks(P_.size());
+        for (std::size_t k = 0; k < P_.size(); ++k)
+            blocks[k] = E_[k] * P_[k] * P_[k];
+        return linear_.factor(blocks);
     }
 
     const System<T> &system_;
     VectorXd r_, y_, rest_;
     std::vector<Block> P_, inverse_, E_;
-    LinearSolver linear_;
-    bool dense_; // factors would be
+    BlockSolver<T> linear_;
 };
 } // namespace dolfinx_contact::condensed

@@ -10,6 +10,18 @@ namespace dolfinx_contact::condensed {
 /// Solves J y = rhs and keeps the factors.
 class LinearSolver {
   public:
+    /// Factors of J, regular, in double precision.
+    void factor(const MatrixXd &J) {
+        kind_ = Kind::in_double;
+        double_.compute(J);
+    }
+    /// Of a sparse one; false if it is singular.
+    bool factor(const Eigen::SparseMatrix<double> &J) {
+        kind_ = Kind::sparse;
+        sparse_.compute(J);
+        return sparse_.info() == Eigen::Success;
+    }
+
     /// J of few unknowns may be singular: the shortest of the solutions that fit best is taken
     /// then. Of many unknowns a singular one is refused, unless it is `regularised`.
     bool solve(const MatrixXd &J, const VectorXd &rhs, VectorXd &y, bool regularised) {
@@ -18,8 +30,7 @@ class LinearSolver {
         kind_ = Kind::in_single;
         if (J.rows() >= worth_it && !regularised && solve_in_single(J, rhs, y))
             return true;
-        kind_ = Kind::in_double;
-        double_.compute(J);
+        factor(J);
         if (regularised || double_.rcond() > smallest_rcond) {
             y = double_.solve(rhs);
             return true;
@@ -34,9 +45,7 @@ class LinearSolver {
 
     /// J sparse; false if it is singular.
     bool solve(const Eigen::SparseMatrix<double> &J, const VectorXd &rhs, VectorXd &y) {
-        kind_ = Kind::sparse;
-        sparse_.compute(J);
-        if (sparse_.info() != Eigen::Success)
+        if (!factor(J))
             return false;
         y = sparse_.solve(rhs);
         return y.allFinite();
