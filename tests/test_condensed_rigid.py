@@ -71,6 +71,14 @@ def test_a_path_through_points_where_it_turns_back():
     check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=200)
 
 
+@pytest.mark.slow
+def test_sweeps_in_random_order():
+    """A pyramid of 364 spheres with mu = 0.898, where the interior point method and paths stop at 6e-4:
+    solved by Newton's method after sweeps in random order."""
+    scene = problem("spheres", 65, 805385, 0.898, 0.98)
+    check(scene.W, scene.q, Friction(0.898), 0.898, max_seconds=200)
+
+
 def test_sparse_and_dense_storage():
     """A W of many zeros gives the same contact forces' sum and velocities whether its zeros are used
     or hidden by entries too small to matter."""

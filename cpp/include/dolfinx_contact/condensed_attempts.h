@@ -115,10 +115,28 @@ template <int T, int P> class Attempts {
     /// Newton's method from where sweeps come to from r, and the proximal point method from there.
     void swept(VectorXd r, int sweeps) {
         System<T> system = scaling_.make();
-        sweep(system, r, 1e-6, sweeps, budget_);
+        Sweeps<T>(system).run(r, 1e-6, sweeps, budget_);
         newton(r);
         if (!best_.converged)
             proximal_from(r);
+    }
+
+    /// Newton's method after every 500 sweeps in an order of chance, up to `rounds` times: where no
+    /// order converges, they come by chance to where Newton's method does. Every 40 rounds from
+    /// zero again.
+    void wandering(int rounds) {
+        std::minstd_rand random(1);
+        const System<T> system = scaling_.make();
+        Sweeps<T> sweeps(system);
+        VectorXd r;
+        for (int k = 0; k < rounds && !best_.converged && !budget_.spent(); ++k) {
+            if (k % 40 == 0)
+                r = VectorXd::Zero(system.size());
+            const bool still = sweeps.run(r, 1e-9, 500, budget_, &random);
+            newton(r);
+            if (still)
+                return;
+        }
     }
 
     /// The proximal point method from r, the errors those of the problem itself.

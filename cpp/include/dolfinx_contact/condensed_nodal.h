@@ -46,17 +46,25 @@ template <class Scalar> struct Trigonometric {
     /// reach zero is given, too: it may be a double root that rounding took away.
     std::vector<Scalar> roots() const {
         constexpr int parts = 48;
+        const Scalar step = 8 * std::atan(Scalar(1)) / parts;
+        static const auto points = [&] { // they are the same for every equation
+            std::array<std::array<Scalar, 2>, parts + 1> found;
+            for (int k = 0; k <= parts; ++k)
+                found[static_cast<std::size_t>(k)] = at(k * step);
+            return found;
+        }();
         std::vector<Scalar> found;
         const Trigonometric slope = derivative();
-        const Scalar step = 8 * std::atan(Scalar(1)) / parts;
+        Scalar left = value(points[0]), left_slope = slope.value(points[0]);
         for (int k = 0; k < parts; ++k) {
-            const Scalar low = k * step, high = low + step;
-            const Scalar left = value(at(low)), right = value(at(high));
+            const auto &next = points[static_cast<std::size_t>(k) + 1];
+            const Scalar low = k * step, high = (k + 1) * step;
+            const Scalar right = value(next), right_slope = slope.value(next);
             if (left == 0)
                 found.push_back(low);
             else if ((left > 0) != (right > 0)) {
                 found.push_back(zero(low, high));
-            } else if (slope.value(at(low)) * left < 0 && slope.value(at(high)) * left > 0) {
+            } else if (left_slope * left < 0 && right_slope * left > 0) {
                 const Scalar turn = slope.zero(low, high);
                 if (value(at(turn)) * left < 0) {
                     found.push_back(zero(low, turn));
@@ -64,6 +72,8 @@ template <class Scalar> struct Trigonometric {
                 } else
                     found.push_back(turn);
             }
+            left = right;
+            left_slope = right_slope;
         }
         return found;
     }

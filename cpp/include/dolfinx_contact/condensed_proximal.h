@@ -33,7 +33,7 @@ bool proximal(System<T> system, VectorXd &r, double compliance, Budget &budget, 
             alpha = std::max(smallest, alpha * down);
             down = std::max(fastest, down * down);
         } else {
-            sweep(system, r, 1e-9, sweeps, budget);
+            Sweeps<T>(system).run(r, 1e-9, sweeps, budget);
             alpha = std::min(largest, alpha * up);
             down = std::sqrt(down);
         }

@@ -7,7 +7,10 @@
 
 #include "condensed_newton.h"
 #include "condensed_nodal.h"
+#include <algorithm>
 #include <numeric>
+#include <optional>
+#include <random>
 
 namespace dolfinx_contact::condensed {
 /// Blocks of a scaled W that are not zero, row by row.
@@ -48,42 +51,69 @@ template <int T> struct Couplings {
     }
 };
 
-/// Sweeps, forward and backward in turn, until they change r by less than `target` of it or for
-/// `max_sweeps`. A sweep counts as one iteration.
-template <int T>
-void sweep(const System<T> &system, VectorXd &r, double target, int max_sweeps, Budget &budget) {
-    constexpr int D = T + 1;
+/// Sweeps over the contacts of a System, each contact solved for what the others give.
+template <int T> class Sweeps {
+  public:
+    static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
-    if (system.tied > 0)
-        return;
-    const Couplings<T> couplings(system);
-    std::vector<Nodal<T>> nodal;
-    for (Index i = 0; i < system.nodes; ++i)
-        for (const auto &[j, block] : couplings.rows[static_cast<std::size_t>(i)])
-            if (j == i) {
-                if (!(block(T, T) > 0.0))
-                    return;
-                nodal.emplace_back(block, system.smooth[static_cast<std::size_t>(i)]);
-            }
-    const VectorXd free = system.left.cwiseProduct(system.q);
-    for (int k = 0; k < max_sweeps && !budget.spent(); ++k, ++budget.iterations) {
-        double change = 0.0, size = 0.0;
-        for (Index c = 0; c < system.nodes; ++c) {
-            const Index i = k % 2 == 0 ? c : system.nodes - 1 - c;
-            Node q = free.segment<D>(D * i);
-            for (const auto &[j, block] : couplings.rows[static_cast<std::size_t>(i)])
-                if (j != i)
-                    q += block * r.segment<D>(D * j);
-            const Node before = r.segment<D>(D * i);
-            Node after = before;
-            nodal[static_cast<std::size_t>(i)].solve(q, after);
-            r.segment<D>(D * i) = after;
-            change += (after - before).squaredNorm();
-            size += after.squaredNorm();
-        }
-        budget.tell(system, r);
-        if (!(change > target * target * size))
+
+    explicit Sweeps(const System<T> &system)
+        : system_(system), free_(system.left.cwiseProduct(system.q)) {
+        if (!applies())
             return;
+        couplings_.emplace(system);
+        order_.resize(static_cast<std::size_t>(system.nodes));
+        std::iota(order_.begin(), order_.end(), Index{0});
+        for (const Index i : order_)
+            for (const auto &[j, block] : couplings_->rows[static_cast<std::size_t>(i)])
+                if (j == i)
+                    nodal_.emplace_back(block, system.smooth[static_cast<std::size_t>(i)]);
     }
-}
+
+    /// Until they change r by less than `target` of it, which is returned, or for `max_sweeps`:
+    /// forward and backward in turn, or in an order of chance. A sweep counts as one iteration.
+    bool run(VectorXd &r, double target, int max_sweeps, Budget &budget,
+             std::minstd_rand *random = nullptr) {
+        for (int k = 0; k < max_sweeps && couplings_ && !budget.spent(); ++k, ++budget.iterations) {
+            if (random != nullptr)
+                std::shuffle(order_.begin(), order_.end(), *random);
+            double change = 0.0, size = 0.0;
+            for (const Index i : order_) {
+                const Node before = r.segment<D>(D * i);
+                solve(i, r);
+                change += (r.segment<D>(D * i) - before).squaredNorm();
+                size += r.segment<D>(D * i).squaredNorm();
+            }
+            if (random == nullptr)
+                std::reverse(order_.begin(), order_.end());
+            budget.tell(system_, r);
+            if (!(change > target * target * size))
+                return true;
+        }
+        return false;
+    }
+
+  private:
+    /// No rows but those of contacts, all of which give way.
+    bool applies() const {
+        for (Index i = 0; i < system_.nodes; ++i)
+            if (!((*system_.W)(D * i + T, D * i + T) + system_.shift > 0.0))
+                return false;
+        return system_.tied == 0;
+    }
+    void solve(Index i, VectorXd &r) const {
+        Node q = free_.segment<D>(D * i), found = r.segment<D>(D * i);
+        for (const auto &[j, block] : couplings_->rows[static_cast<std::size_t>(i)])
+            if (j != i)
+                q += block * r.segment<D>(D * j);
+        nodal_[static_cast<std::size_t>(i)].solve(q, found);
+        r.segment<D>(D * i) = found;
+    }
+
+    const System<T> &system_;
+    VectorXd free_;
+    std::optional<Couplings<T>> couplings_;
+    std::vector<Nodal<T>> nodal_;
+    std::vector<Index> order_;
+};
 } // namespace dolfinx_contact::condensed
