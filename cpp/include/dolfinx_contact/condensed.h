@@ -55,13 +55,9 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         const auto path = [&](bool now) {
             return T > 0 && smooth && now && attempt("path", [this] { this->path(); });
         };
-        const auto wandering = [&] {
-            constexpr int rounds = 400;
-            return sparse && attempt("sweeps in random order", [&] { this->wandering(rounds); });
-        };
         // rigid bodies need paths and sweeps, elastic ones hardly
         if ((smooth && attempt("interior point", [this] { this->interior(); })) || path(sparse) ||
-            wandering())
+            (sparse && attempt("sweeps in random order", [this] { this->wandering(); })))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {

@@ -121,21 +121,20 @@ template <int T, int P> class Attempts {
             proximal_from(r);
     }
 
-    /// Newton's method after every 500 sweeps in an order of chance, up to `rounds` times: where no
-    /// order converges, they come by chance to where Newton's method does. Every 40 rounds from
-    /// zero again.
-    void wandering(int rounds) {
+    /// Newton's method after every 500 sweeps in an order of chance: where no order converges, they
+    /// come by chance to where Newton's method does. From zero again every 40 rounds.
+    void wandering() {
+        constexpr int rounds = 400, sweeps_of_round = 500, rounds_of_start = 40;
         std::minstd_rand random(1);
         const System<T> system = scaling_.make();
         Sweeps<T> sweeps(system);
         VectorXd r;
-        for (int k = 0; k < rounds && !best_.converged && !budget_.spent(); ++k) {
-            if (k % 40 == 0)
+        bool settled = false;
+        for (int k = 0; k < rounds && !settled && !best_.converged && !budget_.spent(); ++k) {
+            if (k % rounds_of_start == 0)
                 r = VectorXd::Zero(system.size());
-            const bool still = sweeps.run(r, 1e-9, 500, budget_, &random);
+            settled = sweeps.run(r, 1e-9, sweeps_of_round, budget_, &random);
             newton(r);
-            if (still)
-                return;
         }
     }
 

@@ -72,9 +72,12 @@ template <int T> class Sweeps {
 
     /// Until they change r by less than `target` of it, which is returned, or for `max_sweeps`:
     /// forward and backward in turn, or in an order of chance. A sweep counts as one iteration.
+    /// True at once where sweeps do not apply: none changes r.
     bool run(VectorXd &r, double target, int max_sweeps, Budget &budget,
              std::minstd_rand *random = nullptr) {
-        for (int k = 0; k < max_sweeps && couplings_ && !budget.spent(); ++k, ++budget.iterations) {
+        if (!couplings_)
+            return true;
+        for (int k = 0; k < max_sweeps && !budget.spent(); ++k, ++budget.iterations) {
             if (random != nullptr)
                 std::shuffle(order_.begin(), order_.end(), *random);
             double change = 0.0, size = 0.0;
