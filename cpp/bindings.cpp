@@ -128,13 +128,18 @@ PYBIND11_MODULE(_kernel, m) {
         "associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).");
     bind_condensed(m);
     m.def(
-        "has_avx2",
+        "instruction_sets",
         [] {
+            std::vector<std::string> sets;
 #if defined(__x86_64__)
-            return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-            return false;
+            if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+                sets.emplace_back("avx512");
+            if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+                sets.emplace_back("avx2");
 #endif
+            return sets;
         },
-        "Whether this processor can run _kernel_avx2.");
+        "What this processor can run beyond what every one can, the widest first: _kernel_avx512, "
+        "_kernel_avx2.");
 }

@@ -18,7 +18,7 @@ __all__: list[str] = [
     "CondensedSolution",
     "Law2D",
     "Law3D",
-    "has_avx2",
+    "instruction_sets",
     "make_law",
 ]
 
@@ -358,9 +358,9 @@ class CondensedOperator:
     @property
     def tied(self) -> int: ...
 
-def has_avx2() -> bool:
+def instruction_sets() -> list[str]:
     """
-    Whether this processor can run _kernel_avx2.
+    What this processor can run beyond what every one can, the widest first: _kernel_avx512, _kernel_avx2.
     """
 
 def make_law(

@@ -1,9 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The condensed solver for processors with AVX2, and factors that serve several iterations."""
+"""The condensed solver for processors with AVX2 or AVX-512, and factors that serve several iterations."""
 
+import importlib
 import warnings
 from fractions import Fraction
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -18,7 +20,8 @@ TOL = 1e-10
 
 def modules():
     """What is compiled, and runs here."""
-    return {module.__name__: module for module in (_kernel, condensed_kernel.fastest(3))}.values()
+    wide = [f"{_kernel.__name__}_{name}" for name in _kernel.instruction_sets()]
+    return [_kernel, *(importlib.import_module(name) for name in wide if find_spec(name))]
 
 
 def body(rng, nodes):
@@ -47,9 +50,10 @@ def test_every_compiled_solver_gives_the_same_answer():
 
 
 def test_processor_decides(monkeypatch):
-    """Without AVX2, and for other than three components, the module that every processor can run is taken."""
+    """The widest instructions; without any, and for other than three components, what every processor can run."""
     assert condensed_kernel.fastest(1) is condensed_kernel.fastest(2) is _kernel
-    monkeypatch.setattr(_kernel, "has_avx2", lambda: False)
+    assert condensed_kernel.fastest(3) is modules()[min(1, len(modules()) - 1)]
+    monkeypatch.setattr(_kernel, "instruction_sets", lambda: ["none", "such"])
     assert condensed_kernel.fastest(3) is _kernel
 
 

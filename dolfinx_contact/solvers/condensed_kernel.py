@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The compiled condensed solver for this processor: with AVX2 and FMA, or what every processor has."""
+"""The compiled condensed solver for this processor: with AVX-512, with AVX2 and FMA, or what every processor has."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dolfinx_contact import _kernel
 
 def fastest(dim: int) -> Any:
     """The module with ``CondensedOperator`` for so many components.  Answers of two modules differ by rounding."""
-    if dim == 3 and _kernel.has_avx2():
+    for instructions in _kernel.instruction_sets() if dim == 3 else ():
         try:
-            return importlib.import_module("dolfinx_contact._kernel_avx2")
+            return importlib.import_module(f"dolfinx_contact._kernel_{instructions}")
         except ImportError:  # not built on this platform
             pass
     return _kernel
