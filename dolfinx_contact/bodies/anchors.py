@@ -7,8 +7,6 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.petsc.linear_solver import LinearSolver
-
 
 class Anchors:
     """Springs at as many degrees of freedom as there are soft rigid motions, so that none is left.
@@ -24,7 +22,8 @@ class Anchors:
         dofs: Those with a spring that this rank owns, ``shape=(m,)``.
         stiffness: ``a`` of each, ``shape=(m,)``, force per length.
         count: Number of springs of all ranks.
-        solver: The linear solver of A.
+        A: The stiffness with the springs, a PETSc matrix.
+        solver: Its ``LinearSolver``.
     """
 
     def __init__(self, body):
@@ -36,8 +35,7 @@ class Anchors:
         added.array_w[:] = 0.0
         added.array_w[self.dofs] = self.stiffness
         A.setDiagonal(added, addv=True)
-        self.solver: LinearSolver = body.solver(A)
-        A.destroy()  # the solver has its own reference
+        self.A, self.solver = A, body.solver(A)
 
     @property
     def ksp(self):
@@ -61,14 +59,10 @@ class Anchors:
         forces[self.dofs, first + np.arange(self.dofs.size)] = self.stiffness
         return forces, np.concatenate(self._body.comm.allgather(self.stiffness))
 
-    @property
-    def A(self):
-        """The stiffness with the springs, a PETSc matrix."""
-        return self.ksp.getOperators()[0]
-
     def destroy(self) -> None:
-        """Free the factors.  Collective."""
+        """Free matrix and factors.  Collective."""
         self.solver.destroy()
+        self.A.destroy()
 
 
 def _pivots(modes: np.ndarray, comm) -> np.ndarray:

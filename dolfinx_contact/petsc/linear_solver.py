@@ -11,6 +11,10 @@ from dolfinx_contact import compat
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
+# Of symmetric matrices half of the factors; the ordering, PORD, leaves up to a third fewer entries than METIS, never more
+# (notes/2026-11-22-condensed-speed.md).
+SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
+
 # Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
 # from zero, so that a run continued from a checkpoint has the same bits.
 MULTIGRID = {
@@ -27,6 +31,9 @@ MULTIGRID = {
 
 # Of a rough solve: enough to see that a body is pressed on a plane, and how hard.
 ROUGH = 1e-3
+
+# Over the largest sum of a row, an entry's difference from the one across the diagonal that is none.
+_ROUNDING = 1e-14
 
 # Unknowns beyond which a multigrid cycle is cheaper than a back-solve with a factorisation.
 LARGE = 50_000
@@ -54,6 +61,21 @@ def _options(A, options) -> dict:
     if options is not None:
         return options
     return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
+
+
+def _to_factorise(A):
+    """A matrix without its zeros, which factors would fill, and the options for it.  Collective.
+
+    Zeros are, among others, all couplings of fixed degrees of freedom.
+    """
+    symmetric = A.isSymmetric(_ROUNDING * A.norm(PETSc.NormType.INFINITY))
+    rows, columns, values = A.getValuesCSR()
+    stored = values != 0.0
+    rows = np.append(0, np.cumsum(stored))[rows].astype(PETSc.IntType)
+    A = PETSc.Mat().createAIJ(
+        A.getSizes(), csr=(rows, columns[stored], values[stored]), comm=A.comm
+    )
+    return A, SYMMETRIC if symmetric else DIRECT
 
 
 @contextmanager
@@ -115,7 +137,7 @@ class LinearSolver:
 
     Args:
         A: Assembled PETSc matrix.
-        options: PETSc options without prefix; None takes ``DIRECT``, or ``MULTIGRID`` if ``A`` is large.
+        options: PETSc options without prefix; None takes ``SYMMETRIC`` or ``DIRECT``, or ``MULTIGRID`` if ``A`` is large.
         prefix: Prefix of the options.
         near_nullspace: Function that returns the rigid motions, ``shape=(n, 6 or 3)``, orthonormal, zero
             at fixed degrees of freedom; called only where the preconditioner is no factorisation.
@@ -125,7 +147,10 @@ class LinearSolver:
     """
 
     def __init__(self, A, options, prefix: str, near_nullspace):
-        self._options = options = _options(A, options)
+        given, options = options, _options(A, options)
+        if given is None and options is DIRECT:
+            A, options = _to_factorise(A)
+        self._options = options
         self.ksp = PETSc.KSP().create(A.comm)
         self.ksp.setOptionsPrefix(prefix)
         if options.get("pc_type") not in ("lu", "cholesky"):

@@ -38,7 +38,8 @@ class Rows:
         """Add what a force on each row of all ranks is on owned degrees of freedom."""
         first = sum(self._counts[: self.comm.rank])
         mine = force[first : first + len(self.dofs)]
-        np.add.at(forces, self.dofs, mine[:, None] * self.values)
+        terms = mine[:, None] * self.values
+        forces += np.bincount(self.dofs.ravel(), terms.ravel(), forces.size)
 
     def gather(self, local: np.ndarray) -> np.ndarray:
         """Values of all rows, on all ranks."""
@@ -140,7 +141,7 @@ def block_solver(ksp):
     A = ksp.getOperators()[0]
     comm, (owned, size) = A.comm, A.getSizes()[0]
     ksp.setUp()
-    mumps = ksp.getType() == "preonly" and ksp.getPC().getType() == "lu"
+    mumps = ksp.getType() == "preonly" and ksp.getPC().getType() in ("lu", "cholesky")
     mumps = mumps and ksp.getPC().getFactorSolverType() == "mumps"
 
     def by_block(columns, values):
