@@ -57,13 +57,18 @@ def by_first_rank(comm, work, tell=None):
     with raised_together(comm):
         if failed is not None:
             raise failed
-    return comm.bcast(result, root=0)
+    return from_first(comm, result)
+
+
+def from_first(comm, value):
+    """A value of rank 0, on all ranks.  On one rank it is not taken apart for it."""
+    return value if comm.size == 1 else comm.bcast(value, root=0)
 
 
 def agree(comm, **values) -> None:
     """Raise a ``ValueError`` on every rank if a value that all ranks should have the same differs."""
     mine = {name: described(value) for name, value in values.items()}
-    first = comm.bcast(mine, root=0)
+    first = from_first(comm, mine)
     with raised_together(comm):
         for name, value in mine.items():
             if value != first[name]:

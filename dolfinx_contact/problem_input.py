@@ -13,7 +13,7 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.checks import positive
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.collective import from_first, raised_together
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.solvers.automatic import Automatic
@@ -264,7 +264,7 @@ def check_alive(problem, body, contacts) -> None:
 
 def check_step(u, comm, contacts) -> None:
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
-    first = comm.bcast([contact.described() for contact in contacts], root=0)
+    first = from_first(comm, [contact.described() for contact in contacts])
     with raised_together(comm):
         for contact, described in zip(contacts, first):
             contact.check(described)

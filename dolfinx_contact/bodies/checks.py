@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.collective import from_first, raised_together
 
 
 def check_diagonal(diagonal: np.ndarray, displacements) -> None:
@@ -56,7 +56,7 @@ def agree_on_values(parameters, comm) -> None:
         if hasattr(function, "x"):
             function.x.scatter_forward()
     mine = [np.array(each.value) for each in parameters if not hasattr(each, "x")]
-    first = comm.bcast(mine, root=0)
+    first = from_first(comm, mine)
     with raised_together(comm):
         for here, there in zip(mine, first):
             if not np.array_equal(here, there, equal_nan=True):

@@ -29,9 +29,9 @@ class FreeState(NamedTuple):
         factor = max(comm.allgather(_ratio(b, self.load)))[1]
         sizes = np.abs([b - factor * self.load, b])
         # Forces and boundary values have different units: each to its own rounding.
-        given = np.zeros(b.size, dtype=bool)
-        given[fixed] = True
-        largest = np.array([sizes[:, part].max(axis=1, initial=0.0) for part in (given, ~given)])
+        given = sizes[:, fixed]
+        sizes[:, fixed] = 0.0
+        largest = np.array([part.max(axis=1, initial=0.0) for part in (given, sizes)])
         comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
         same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
         return factor * self.displacement if same else None

@@ -161,6 +161,8 @@ class Drive(Guarded):
     @property
     def motions(self) -> list[Motion]:
         """The free motions, rotations first."""
+        if not self._free:
+            return []
         axes = self.drive_axes
         about = np.ones((1, 1)) if self.point.size == 2 else axes
         springs = dict(zip(self._free, self.springs.tolist()))

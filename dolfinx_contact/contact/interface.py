@@ -35,7 +35,7 @@ class ContactPoints:
         starts = np.arange(0, frames.size + 1, self.dim)
         self.B = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
         self._forces = self.B.T.tocsr()
-        self._magnitudes = abs(self.B)
+        self._magnitudes, self._sizes = abs(self.B), abs(self._forces)
         self.hold(
             np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
         )
@@ -70,7 +70,7 @@ class ContactPoints:
 
     def add_magnitudes(self, reaction: np.ndarray, forces: np.ndarray) -> None:
         """Add the magnitudes of these reactions' components to forces on owned degrees of freedom."""
-        forces += self._magnitudes.T @ np.abs(reaction).ravel()
+        forces += self._sizes @ np.abs(reaction).ravel()
 
     def matrix(self, blocks: np.ndarray):
         """``B^T D B`` of nodal blocks, ``shape=(n, gdim, gdim)``, local frame: sparse, owned rows and columns."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -110,23 +111,24 @@ class RigidPlane(Surface):
         Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal.
         In two dimensions t is the normal turned by -90 degrees.  They turn with the plane.
         """
-        return self.turned(self._frame())
+        return self.turned(self._frame)
 
+    @cached_property
     def _frame(self) -> np.ndarray:
         """The frame as long as the plane is not turned."""
         n = self.normal
         if n.size == 2:
-            return np.array([[n[1], -n[0]], n])
+            return frozen(np.array([[n[1], -n[0]], n]))
         t1 = self.axis
         if t1 is None:
             t1 = np.eye(3)[np.argmin(np.abs(n))]
             t1 = t1 - (t1 @ n) * n
             t1 /= np.linalg.norm(t1)
-        return np.array([t1, np.cross(n, t1), n])
+        return frozen(np.array([t1, np.cross(n, t1), n]))
 
     def frames(self, y: np.ndarray) -> np.ndarray:
         """The same frame at all positions, ``shape=(gdim, gdim)``."""
-        return self._frame()
+        return self._frame
 
     def distance(self, y: np.ndarray) -> np.ndarray:
         """Distance to the plane, ``shape=(n,)``, less the height of its face."""
@@ -143,7 +145,7 @@ class RigidPlane(Surface):
 
     def described(self) -> np.ndarray:
         """Point and frame."""
-        return np.concatenate((self.point, self._frame().ravel()))
+        return np.concatenate((self.point, self._frame.ravel()))
 
     def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()

@@ -265,7 +265,7 @@ class CondensedBody:
         if self._planes.tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
             starts.append(q[-1] / last[0][-1] * last[1])
         scale = np.abs(q[: q.size - self._planes.tied]).max()
-        distances = [self._planes.distance(other[0], q) for other in past]
+        distances = self._planes.distances([other for other, _ in past], q)
         similar = int(np.argmin(distances))
         if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
             starts.append(past[similar][1])

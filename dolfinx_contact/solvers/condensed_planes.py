@@ -76,14 +76,14 @@ class CondensedPlanes:
             moved[stiff] = -(reactions @ self._axes[:, stiff]) / self._springs[stiff]
             step.planes.move_to(self._at_first + moved)
 
-    def distance(self, other: np.ndarray, q: np.ndarray) -> float:
-        """How far two steps are apart, length units; forces that drive planes count by their part of the largest."""
-        apart = np.abs(other - q)
+    def distances(self, others: list[np.ndarray], q: np.ndarray) -> np.ndarray:
+        """How far steps are from that of ``q``, length units; forces that drive planes count by their part of the largest."""
+        apart = np.abs(np.array(others) - q)
         if self.tied:
             lengths, forces = q[: -self.tied], q[-self.tied :]
             largest = np.abs(forces).max() or 1.0
-            apart[-self.tied :] *= np.abs(lengths).max() / largest
-        return float(apart.max())
+            apart[:, -self.tied :] *= np.abs(lengths).max() / largest
+        return apart.max(axis=1)
 
     def driving(self, step) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
