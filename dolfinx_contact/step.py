@@ -51,6 +51,7 @@ class LoadStep:
     Attributes:
         planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
         statics: ``Statics`` of a body that contact alone holds, else None.
+        alone: The displacement without reactions, None where it was not asked for or not found exactly.
     """
 
     def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
@@ -58,7 +59,7 @@ class LoadStep:
         self.b, self.external, self.tol = b, external, tol
         self.planes = driven_planes(body, contacts)
         self._shared = shared_nodes(contacts, stiffness, body.fixed)
-        self.statics = None
+        self.statics = self.alone = None
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before, self._told = None, 0  # reactions of the state judged before, states told
         self._known = None  # a displacement, and the forces b - K x that it leaves
@@ -68,6 +69,10 @@ class LoadStep:
     def may_slide(self) -> bool:
         """Whether a plane, or the body, is held by contact along some direction."""
         return self.planes is not None or self.statics is not None
+
+    def free_state(self) -> np.ndarray:
+        """The displacement without reactions, to all digits.  Collective."""
+        return self.body.free_state(self.b) if self.alone is None else self.alone
 
     def slides(self) -> bool:
         """Whether force pushes a plane, or loads a body, by more than friction carries in the present state.  Collective."""

@@ -25,6 +25,7 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
         trial = body.free_state(step.b, rough=True)
         if not (body.known.exact or presses(body, contacts, trial)):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
+        step.alone = trial if body.known.exact else None
     if not may_touch(body, contacts, trial):
         trial = refined(body, step, trial)
         if step.errors.within(step.tol):

@@ -158,14 +158,13 @@ def block_solver(ksp):
             comm=comm,
         )
         rhs = PETSc.Mat().createTranspose(transposed)
-        answer = PETSc.Mat().createDense(((owned, size), (None, count)), comm=comm)
-        answer.setUp()
+        result = np.empty((owned, count), order="F")
+        answer = PETSc.Mat().createDense(((owned, size), (None, count)), array=result, comm=comm)
         answer.assemble()
         factors = ksp.getPC().getFactorMatrix()
         if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen how many at once
             factors.setMumpsIcntl(*_MUMPS_BLOCK)
         factors.matSolve(rhs, answer)
-        result = answer.getDenseArray().copy()
         for matrix in (rhs, transposed, answer):
             matrix.destroy()
         return result

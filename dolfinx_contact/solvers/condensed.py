@@ -103,7 +103,7 @@ class CondensedBody:
             start: Not used: reactions of earlier steps are better starts.
         """
         held, first = self._held_by.solve, self.dim * self.nodes
-        free = held(step.b) if self._anchored else self._body.free_state(step.b)
+        free = held(step.b) if self._anchored else step.free_state()
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
         self._planes.begin(step, free)
         q = self._motion(step, free)
