@@ -1,10 +1,12 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// Sweeps: where contacts are coupled weakly they come to a solution of the law, of unit friction,
-/// inequality by inequality, in a fixed order as in random ones, dense or sparse.
+/// Sweeps and alternating directions: where contacts are coupled weakly they come to a solution of
+/// the law, of unit friction, inequality by inequality, sweeps in a fixed order as in random ones,
+/// dense or sparse.
 #include "random_states.h"
 #include <dolfinx_contact/condensed_scaling.h>
 #include <dolfinx_contact/condensed_solution.h>
+#include <dolfinx_contact/condensed_splitting.h>
 #include <dolfinx_contact/condensed_sweeps.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +34,10 @@ void check(int seed, Index nodes, Index reach) {
     VectorXd r = VectorXd::Zero(size), shuffled = r;
     ASSERT_TRUE(sweeps.run(r, 1e-13, 1000, budget));
     ASSERT_TRUE(sweeps.run(shuffled, 1e-13, 1000, budget, &order));
+    Splitting<2> splitting(system);
+    splitting.run(1e-13, 10000, budget);
     EXPECT_LT((shuffled - r).norm(), 1e-10 * r.norm()) << seed;
+    EXPECT_LT((splitting.reactions() - r).norm(), 1e-10 * r.norm()) << seed;
     const VectorXd w = system.left.cwiseProduct(q + W * system.right.cwiseProduct(shuffled));
     for (Index i = 0; i < nodes; ++i) {
         const Eigen::Vector2d r_t = shuffled.segment<2>(3 * i), w_t = w.segment<2>(3 * i);
@@ -47,7 +52,7 @@ void check(int seed, Index nodes, Index reach) {
 }
 } // namespace
 
-TEST(CondensedSweeps, AnyOrderComesToTheLaw) {
+TEST(CondensedSweeps, AnyOrderAndAlternatingDirectionsComeToTheLaw) {
     for (int seed = 1; seed <= 10; ++seed) {
         check(seed, 8, 8);
         check(seed, 100, 3);

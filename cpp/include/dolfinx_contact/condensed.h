@@ -42,22 +42,37 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;
-        if (T > 0)
-            for (const double tangential : {3.0, 0.3})
-                if (attempt("newton, other rho_t", [&] { this->newton(given, tangential); }))
-                    return;
+        const System<T> system = scaling_.make();
+        const bool smooth = InteriorPoint<T>::applies(system);
+        // contacts of rigid bodies, whose W is sparse, need methods that others hardly do
+        const bool rigid = system.pattern != nullptr;
+        if (!rigid && other_parameters(given))
+            return;
         constexpr Index pivotable = 64;
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
-        const System<T> system = scaling_.make();
-        const bool smooth = InteriorPoint<T>::applies(system), sparse = system.pattern != nullptr;
+        VectorXd end; // of the interior point method
+        if (smooth && attempt("interior point", [&] { end = this->interior(); }))
+            return;
+        const auto proximal = [&](int patience) {
+            return smooth && attempt("proximal point", [&] { this->proximal_from(end, patience); });
+        };
+        std::optional<Wandering<T>> wandering;
+        const auto by_turns = [&](int rounds) {
+            if (!wandering)
+                wandering.emplace(system);
+            return attempt("sweeps and splitting", [&] { this->by_turns(*wandering, rounds); });
+        };
+        // first as long as these methods take where they are good
+        if (rigid && (proximal(8) || other_parameters(given) || by_turns(5)))
+            return;
+        if (proximal(40))
+            return;
         const auto path = [&](bool now) {
             return T > 0 && smooth && now && attempt("path", [this] { this->path(); });
         };
-        // rigid bodies need paths and sweeps, elastic ones hardly
-        if ((smooth && attempt("interior point", [this] { this->interior(); })) || path(sparse) ||
-            (sparse && attempt("sweeps in random order", [this] { this->wandering(); })))
+        if (path(rigid) || (rigid && by_turns(150)))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
@@ -67,11 +82,20 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         constexpr int few = 5;
         if (attempt("continuation", [&] { paths(few); }) ||
             attempt("proximal point", [&] { this->swept(given, 300); }) ||
-            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!sparse))
+            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!rigid))
             return;
         const auto size = static_cast<double>(scaling_.size());
         attempt("continuation, many starts",
                 [&] { paths(static_cast<int>(std::min(1000.0, 3e6 / (size * size)))); });
+    }
+
+    /// Newton's method with other augmentation parameters.
+    bool other_parameters(const VectorXd &given) {
+        if (T > 0)
+            for (const double tangential : {3.0, 0.3})
+                if (attempt("newton, other rho_t", [&] { this->newton(given, tangential); }))
+                    return true;
+        return false;
     }
 
     /// The start of the smallest residual, scaled; zero is always one.

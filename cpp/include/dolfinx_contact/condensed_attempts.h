@@ -10,10 +10,23 @@
 #include "condensed_plane.h"
 #include "condensed_proximal.h"
 #include "condensed_scaling.h"
+#include "condensed_splitting.h"
 #include "condensed_starts.h"
 #include <utility>
 
 namespace dolfinx_contact::condensed {
+/// Methods that come from zero to where Newton's method may start, and where they are.
+template <int T> struct Wandering {
+    Sweeps<T> sweeps;
+    Splitting<T> splitting;
+    VectorXd swept;
+    std::minstd_rand random{1};
+    int rounds = 0;
+
+    explicit Wandering(const System<T> &system)
+        : sweeps(system), splitting(system), swept(VectorXd::Zero(system.size())) {}
+};
+
 /// P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Attempts {
   public:
@@ -84,14 +97,12 @@ template <int T, int P> class Attempts {
         finish(system, r);
     }
 
-    /// Newton's method from the end of the interior point method, and the proximal point method
-    /// from there.
-    void interior() {
+    /// Newton's method from the end of the interior point method, which is returned.
+    VectorXd interior() {
         const System<T> system = scaling_.make();
         const VectorXd r = InteriorPoint<T>(system).run(budget_);
         newton(r);
-        if (!best_.converged)
-            proximal_from(r);
+        return r;
     }
 
     /// Newton's method from the end of a path that starts at the best state, and the proximal point
@@ -121,32 +132,36 @@ template <int T, int P> class Attempts {
             proximal_from(r);
     }
 
-    /// Newton's method after every 500 sweeps in an order of chance: where no order converges, they
-    /// come by chance to where Newton's method does. From zero again every 40 rounds.
-    void wandering() {
-        constexpr int rounds = 400, sweeps_of_round = 500, rounds_of_start = 40;
-        std::minstd_rand random(1);
-        const System<T> system = scaling_.make();
-        Sweeps<T> sweeps(system);
-        VectorXd r;
-        bool settled = false;
-        for (int k = 0; k < rounds && !settled && !best_.converged && !budget_.spent(); ++k) {
-            if (k % rounds_of_start == 0)
-                r = VectorXd::Zero(system.size());
-            settled = sweeps.run(r, 1e-9, sweeps_of_round, budget_, &random);
-            newton(r);
+    /// Newton's method after every 500 sweeps in an order of chance, and after every 500 iterations
+    /// of alternating directions: where these do not converge, they come by chance to where
+    /// Newton's method does. Sweeps begin anew every 40 rounds.
+    void by_turns(Wandering<T> &at, int rounds) {
+        constexpr int iterations = 500, rounds_of_start = 40;
+        constexpr double target = 1e-9;
+        const auto ended = [this] { return best_.converged || budget_.spent(); };
+        for (int k = 0; k < rounds && !ended(); ++k, ++at.rounds) {
+            if (at.rounds % rounds_of_start == 0)
+                at.swept.setZero();
+            at.sweeps.run(at.swept, target, iterations, budget_, &at.random);
+            if (!at.swept.isZero(0.0)) // sweeps apply
+                newton(at.swept);
+            if (ended())
+                break;
+            at.splitting.run(target, iterations, budget_);
+            newton(at.splitting.reactions());
         }
     }
 
-    /// The proximal point method from r, the errors those of the problem itself.
-    void proximal_from(VectorXd r) {
+    /// The proximal point method from r, the errors those of the problem itself, until so many of
+    /// its steps in a row were in vain.
+    void proximal_from(VectorXd r, int patience = 40) {
         System<T> system = scaling_.make();
         system.inverse = nullptr;
         const auto error = [&](const VectorXd &mapped) {
             last_error_ = 0.0;
             return certify(system, mapped) ? 0.0 : last_error_;
         };
-        if (!proximal(system, r, op_.mean_normal(), budget_, error))
+        if (!proximal(system, r, op_.mean_normal(), patience, budget_, error))
             return;
         Newton<T> newton(system);
         set_change(newton, system, r);

@@ -9,7 +9,8 @@
 #include "condensed_system.h"
 
 namespace dolfinx_contact::condensed {
-/// Factors of W B + A, where A and B have a block for each contact.
+/// Factors of W B + A, where A and B have a block for each contact: of few entries, or of few
+/// unknowns where the rank of W is low, or dense ones.
 template <int T> class BlockSolver {
   public:
     static constexpr int D = T + 1;
@@ -17,52 +18,136 @@ template <int T> class BlockSolver {
     using Blocks = std::vector<Block>; // of the contacts
 
     explicit BlockSolver(const System<T> &system)
-        : system_(system), dense_(system.pattern == nullptr) {}
+        : system_(system), sparse_(system.pattern != nullptr) {}
 
     /// False if the matrix is singular. Without B it is I.
     bool factor(const Blocks &A, const Blocks *B = nullptr) {
-        const auto n = static_cast<std::size_t>(system_.nodes);
-        if (dense_) {
-            MatrixXd J =
-                system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();
-            for (std::size_t j = 0; j < n; ++j) {
-                const Index first = D * static_cast<Index>(j);
-                if (B != nullptr)
-                    J.middleCols<D>(first) = (J.middleCols<D>(first) * (*B)[j]).eval();
-                J.block<D, D>(first, first) += A[j];
-            }
-            linear_.factor(J);
-            return true;
+        constexpr double filled = 0.25; // entries of factors over those of dense ones
+        A_ = A;
+        B_.clear();
+        if (B != nullptr)
+            B_ = *B;
+        if (sparse_) {
+            const bool regular = factor_sparse();
+            sparse_ = !(linear_.fill() > filled);
+            by_rank_ = false;
+            return regular;
         }
+        by_rank_ = product() != nullptr;
+        if (by_rank_)
+            factor_by_rank();
+        else
+            factor_dense();
+        return true;
+    }
+
+    /// With the last factors; those by rank lose digits, which refinement gives back, else the
+    /// dense ones are made.
+    VectorXd solve(const VectorXd &rhs) {
+        constexpr double accuracy = 1e-10;
+        constexpr int refinements = 3;
+        if (by_rank_) {
+            VectorXd x = solve_by_rank(rhs);
+            for (int k = 0; k < refinements; ++k) {
+                const VectorXd rest = rhs - times(x);
+                if (rest.norm() <= accuracy * rhs.norm())
+                    return x;
+                x += solve_by_rank(rest);
+            }
+            by_rank_ = false;
+            factor_dense();
+        }
+        return linear_.again(rhs);
+    }
+
+  private:
+    const Product *product() const {
+        return system_.product == nullptr ? nullptr : system_.product->get();
+    }
+    static auto of(Index i) { return static_cast<std::size_t>(i); }
+    /// A block for each contact times a vector; no blocks are I.
+    static VectorXd times(const Blocks &blocks, VectorXd x) {
+        for (std::size_t i = 0; i < blocks.size(); ++i) {
+            auto part = x.template segment<D>(D * static_cast<Index>(i));
+            part = (blocks[i] * part).eval();
+        }
+        return x;
+    }
+    VectorXd times(const VectorXd &x) const { return system_.change(times(B_, x)) + times(A_, x); }
+
+    void factor_dense() {
+        MatrixXd J = system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();
+        for (Index j = 0; j < system_.nodes; ++j) {
+            if (!B_.empty())
+                J.middleCols<D>(D * j) = (J.middleCols<D>(D * j) * B_[of(j)]).eval();
+            J.block<D, D>(D * j, D * j) += A_[of(j)];
+        }
+        linear_.factor(J);
+    }
+
+    bool factor_sparse() {
         std::vector<Eigen::Triplet<double>> entries;
-        for (std::size_t j = 0; j < n; ++j)
-            for (const Index i : (*system_.pattern)[j]) {
-                const Index row = D * i, column = D * static_cast<Index>(j);
+        for (Index j = 0; j < system_.nodes; ++j)
+            for (const Index i : (*system_.pattern)[of(j)]) {
                 Block block;
                 for (int k = 0; k < D; ++k)
                     for (int l = 0; l < D; ++l)
-                        block(k, l) = system_.left[row + k] * (*system_.W)(row + k, column + l) *
-                                      system_.right[column + l];
-                if (B != nullptr)
-                    block *= (*B)[j];
-                if (row == column)
-                    block += A[j];
+                        block(k, l) = system_.left[D * i + k] * (*system_.W)(D * i + k, D * j + l) *
+                                      system_.right[D * j + l];
+                if (!B_.empty())
+                    block *= B_[of(j)];
+                if (i == j)
+                    block += A_[of(j)];
                 for (int k = 0; k < D; ++k)
                     for (int l = 0; l < D; ++l)
-                        entries.emplace_back(row + k, column + l, block(k, l));
+                        entries.emplace_back(D * i + k, D * j + l, block(k, l));
             }
         Eigen::SparseMatrix<double> J(system_.size(), system_.size());
         J.setFromTriplets(entries.begin(), entries.end());
-        const bool regular = linear_.factor(J);
-        dense_ = linear_.filled();
-        return regular;
+        return linear_.factor(J);
     }
 
-    VectorXd solve(const VectorXd &rhs) const { return linear_.again(rhs); }
+    /// (C X B + A)^-1 = A^-1 - A^-1 C (I + X B A^-1 C)^-1 X B A^-1, M. A. Woodbury's formula.
+    void factor_by_rank() {
+        inverse_.resize(A_.size());
+        for (std::size_t i = 0; i < A_.size(); ++i)
+            inverse_[i] = A_[i].inverse();
+        const Product &W = *product();
+        const Index r = W.X.rows();
+        MatrixXd S = MatrixXd::Identity(r, r);
+        VectorXd column(system_.size());
+        std::vector<Index> touched; // contacts of the column
+        for (Index k = 0; k < r; ++k) {
+            touched.clear();
+            for (Eigen::SparseMatrix<double>::InnerIterator it(W.C, k); it; ++it) {
+                const Index i = it.row() / D;
+                if (touched.empty() || touched.back() != i) {
+                    touched.push_back(i);
+                    column.template segment<D>(D * i).setZero();
+                }
+                column[it.row()] = system_.left[it.row()] * it.value();
+            }
+            for (const Index i : touched) {
+                Eigen::Matrix<double, D, 1> v = inverse_[of(i)] * column.template segment<D>(D * i);
+                if (!B_.empty())
+                    v = (B_[of(i)] * v).eval();
+                v = v.cwiseProduct(system_.right.template segment<D>(D * i));
+                S.col(k) += W.X.template middleCols<D>(D * i) * v;
+            }
+        }
+        few_.compute(S);
+    }
+    VectorXd solve_by_rank(const VectorXd &rhs) const {
+        const Product &W = *product();
+        const VectorXd y = times(inverse_, rhs);
+        const VectorXd t = few_.solve(W.X * VectorXd(system_.right.cwiseProduct(times(B_, y))));
+        return y - times(inverse_, system_.left.cwiseProduct(W.C * t));
+    }
 
-  private:
     const System<T> &system_;
     LinearSolver linear_;
-    bool dense_; // factors would be
+    Blocks A_, B_, inverse_;
+    Eigen::PartialPivLU<MatrixXd> few_; // unknowns, of factors by rank
+    bool sparse_, by_rank_ = false;
 };
 } // namespace dolfinx_contact::condensed

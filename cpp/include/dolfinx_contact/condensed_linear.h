@@ -51,11 +51,10 @@ class LinearSolver {
         return y.allFinite();
     }
 
-    /// Whether sparse factors have so many entries that dense ones are sooner made.
-    bool filled() const {
-        constexpr Index few = 4; // one of so many entries of dense factors
-        const auto n = sparse_.rows();
-        return kind_ == Kind::sparse && few * (sparse_.nnzL() + sparse_.nnzU()) > n * n;
+    /// The entries of sparse factors over those of dense ones.
+    double fill() const {
+        const auto n = static_cast<double>(sparse_.rows());
+        return static_cast<double>(sparse_.nnzL() + sparse_.nnzU()) / (n * n);
     }
 
     /// Whether there are factors in single precision, which many unknowns have.

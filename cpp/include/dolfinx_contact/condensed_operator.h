@@ -54,6 +54,9 @@ class Operator {
         return *normal_;
     }
 
+    /// W as a product, if its rank is low.
+    const LazyProduct &product() const { return product_; }
+
     /// Empty if W is not sparse.
     const Pattern &pattern() const { return pattern_; }
 
@@ -146,6 +149,7 @@ class Operator {
     bool symmetric_;
     MatrixXd values_, inverse_values_;
     Square W_;
+    LazyProduct product_{W_};
     Pattern pattern_;
     Eigen::SparseMatrix<double> sparse_;
     std::optional<Square> inverse_;

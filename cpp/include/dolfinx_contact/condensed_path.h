@@ -84,9 +84,7 @@ template <int T> class Smoothed {
         return linear_.factor(A, &B_);
     }
     /// dz of W B dz - E (B - I) dz = -rest, with the last factors.
-    VectorXd solution(const VectorXd &rest) const {
-        return linear_.solve(-length_ / force_ * rest);
-    }
+    VectorXd solution(const VectorXd &rest) { return linear_.solve(-length_ / force_ * rest); }
     VectorXd reactions() const { return force_ * r_; }
 
     Part part = Part::correction;

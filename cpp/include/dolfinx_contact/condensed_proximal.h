@@ -13,9 +13,10 @@ namespace dolfinx_contact::condensed {
 /// take it further and alpha, in units of the mean normal compliance, grows; else it falls. Ends
 /// when `patience` of them in turn have not halved the error.
 template <int T, class Error>
-bool proximal(System<T> system, VectorXd &r, double compliance, Budget &budget, Error error) {
+bool proximal(System<T> system, VectorXd &r, double compliance, int patience, Budget &budget,
+              Error error) {
     constexpr double first = 0.1, smallest = 1e-10, largest = 1e3, fastest = 0.2, up = 5.0;
-    constexpr int patience = 40, sweeps = 30, newton_iterations = 30;
+    constexpr int sweeps = 30, newton_iterations = 30;
     const VectorXd q = system.q;
     double alpha = first, down = fastest, least = std::numeric_limits<double>::infinity();
     for (int k = 0, in_vain = 0; in_vain < patience && !budget.spent(); ++k, ++in_vain) {

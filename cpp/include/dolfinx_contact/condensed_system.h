@@ -6,7 +6,7 @@
 /// Curnier.
 #pragma once
 
-#include "condensed_matrix.h"
+#include "condensed_rank.h"
 #include "law.h"
 
 namespace dolfinx_contact::condensed {
@@ -40,10 +40,11 @@ template <int T> struct System {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    const Square *W;                  // physical
-    const Square *inverse;            // of W, or null
-    const Pattern *pattern = nullptr; // of W, if sparse
-    VectorXd q;                       // physical
+    const Square *W;                      // physical
+    const Square *inverse;                // of W, or null
+    const Pattern *pattern = nullptr;     // of W, if sparse
+    const LazyProduct *product = nullptr; // of W, where it may be of low rank
+    VectorXd q;                           // physical
     VectorXd left, right;
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction

@@ -1,0 +1,86 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// W of low rank is the product that is found, whatever its units; one of full rank has none; and
+/// factors of W B + A by rank, of few entries and dense solve the same equations.
+#include "random_states.h"
+#include <dolfinx_contact/condensed_blocks.h>
+#include <dolfinx_contact/condensed_scaling.h>
+#include <gtest/gtest.h>
+
+using namespace dolfinx_contact;
+using namespace dolfinx_contact::testing;
+using namespace dolfinx_contact::condensed;
+
+namespace {
+/// H G' of so many rows and rank, G = H but for a little; with `reach` rows couple to those nearby.
+MatrixXd low_rank(Random &random, Index size, Index rank, double uneven, Index reach) {
+    MatrixXd H(size, rank), G(size, rank);
+    for (Index i = 0; i < size; ++i)
+        for (Index j = 0; j < rank; ++j) {
+            const bool near = std::abs(j * size / rank - i) < reach;
+            H(i, j) = near ? random.normal() * random.power(-1, 1) : 0.0;
+            G(i, j) = H(i, j) * (1.0 + uneven * random.normal());
+        }
+    return H * G.transpose();
+}
+
+void check_factors(int seed, Index reach, double units) {
+    constexpr Index nodes = 80, size = 3 * nodes;
+    Random random(static_cast<std::uint64_t>(seed));
+    const MatrixXd W = units * low_rank(random, size, 60, seed % 2 * 1e-3, reach);
+    const VectorXd q = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+    const Operator op(W, 3);
+    const AnyLaw<2> law = make_law<2>({0.7 * Tangent<2>::Ones()}, {0.7 * Tangent<2>::Ones()}, true);
+    const System<2> system = Scaling<2, 2>(op, law, q).make();
+    ASSERT_TRUE(system.product->get() != nullptr);
+    typename BlockSolver<2>::Blocks A, B;
+    MatrixXd J = system.left.asDiagonal() * W * system.right.asDiagonal();
+    for (Index i = 0; i < nodes; ++i) { // open, slipping and sticking contacts: large to small
+        Eigen::Matrix3d M = Eigen::Matrix3d::NullaryExpr([&] { return random.normal(); });
+        A.emplace_back(random.power(-6, 2) *
+                       (M * M.transpose() + 0.1 * Eigen::Matrix3d::Identity()));
+        B.emplace_back(Eigen::Matrix3d::Identity() + 0.1 * M);
+        J.middleCols<3>(3 * i) = (J.middleCols<3>(3 * i) * B.back()).eval();
+        J.block<3, 3>(3 * i, 3 * i) += A.back();
+    }
+    BlockSolver<2> solver(system);
+    for (int time = 0; time < 3; ++time) { // of few entries first, where W is sparse
+        ASSERT_TRUE(solver.factor(A, &B));
+        const VectorXd rhs = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+        EXPECT_LT((J * solver.solve(rhs) - rhs).norm(), 1e-8 * rhs.norm()) << seed << " " << time;
+    }
+}
+} // namespace
+
+TEST(CondensedRank, AProductIsFoundWhereTheRankIsLow) {
+    Random random(1);
+    for (const Index size : {3, 30, 150})
+        for (const double uneven : {0.0, 1e-3})
+            for (const double units : {1e-12, 1.0, 1e12}) {
+                const MatrixXd W = units * low_rank(random, size, size / 3, uneven, size);
+                const Square view(W.data(), size, size, Square::Part::all);
+                const auto found = product(view, 0.6);
+                ASSERT_TRUE(found.has_value()) << size << " " << uneven;
+                EXPECT_EQ(found->X.rows(), size / 3);
+                EXPECT_LT((found->C * found->X - W).norm(), 1e-9 * W.norm());
+                EXPECT_FALSE(product(view, 0.2).has_value());
+            }
+}
+
+TEST(CondensedRank, NoProductOfFullRankOrNone) {
+    Random random(2);
+    const MatrixXd regular = low_rank(random, 30, 30, 0.0, 30), zero = MatrixXd::Zero(3, 3);
+    EXPECT_FALSE(product({regular.data(), 30, 30, Square::Part::all}, 0.6).has_value());
+    EXPECT_FALSE(product({zero.data(), 3, 3, Square::Part::all}, 0.6).has_value());
+    MatrixXd indefinite = zero; // has a product, but not by pivots on the diagonal
+    indefinite(0, 1) = indefinite(1, 0) = indefinite(2, 2) = 1.0;
+    EXPECT_FALSE(product({indefinite.data(), 3, 3, Square::Part::all}, 0.6).has_value());
+}
+
+TEST(CondensedRank, AllFactorsSolve) {
+    for (int seed = 1; seed <= 10; ++seed)
+        for (const double units : {1e-9, 1.0, 1e9}) {
+            check_factors(seed, 240, units);
+            check_factors(seed, 6, units);
+        }
+}
