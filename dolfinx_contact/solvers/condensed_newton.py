@@ -216,7 +216,10 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
             )
         except CondensedNotConverged:
             break
+        open_still = nearer.change > 0.1 * found.change
         found = replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
+        if open_still:  # no smaller error tells them
+            break
     return found
 
 

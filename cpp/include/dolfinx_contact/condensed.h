@@ -44,8 +44,12 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         const System<T> system = scaling_.make();
         const bool smooth = InteriorPoint<T>::applies(system);
-        // contacts of rigid bodies, whose W is sparse, need methods that others hardly do
-        const bool rigid = system.pattern != nullptr;
+        // many contacts of rigid bodies need methods that others hardly do
+        constexpr Index many = 64;
+        const bool sparse = system.pattern != nullptr,
+                   rigid =
+                       sparse || (op_.nodes() >= many && op_.tied() == 0 &&
+                                  system.product != nullptr && system.product->get() != nullptr);
         if (!rigid && other_parameters(given))
             return;
         constexpr Index pivotable = 64;
@@ -72,7 +76,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         const auto path = [&](bool now) {
             return T > 0 && smooth && now && attempt("path", [this] { this->path(); });
         };
-        if (path(rigid) || (rigid && by_turns(150)))
+        if (path(sparse) || (sparse && by_turns(150)))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
@@ -82,7 +86,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         constexpr int few = 5;
         if (attempt("continuation", [&] { paths(few); }) ||
             attempt("proximal point", [&] { this->swept(given, 300); }) ||
-            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!rigid))
+            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!sparse))
             return;
         const auto size = static_cast<double>(scaling_.size());
         attempt("continuation, many starts",
