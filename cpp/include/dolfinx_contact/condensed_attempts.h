@@ -100,7 +100,7 @@ template <int T, int P> class Attempts {
     /// Newton's method from the end of the interior point method, which is returned.
     VectorXd interior() {
         const System<T> system = scaling_.make();
-        const VectorXd r = InteriorPoint<T>(system).run(budget_);
+        VectorXd r = InteriorPoint<T>(system).run(budget_);
         newton(r);
         return r;
     }

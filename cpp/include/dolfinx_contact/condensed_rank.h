@@ -5,7 +5,6 @@
 #pragma once
 
 #include "condensed_matrix.h"
-#include <algorithm>
 #include <optional>
 
 namespace dolfinx_contact::condensed {
