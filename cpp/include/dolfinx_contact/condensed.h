@@ -59,8 +59,8 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         VectorXd end; // of the interior point method
         if (smooth && attempt("interior point", [&] { end = this->interior(); }))
             return;
-        const auto proximal = [&](int patience) {
-            return smooth && attempt("proximal point", [&] { this->proximal_from(end, patience); });
+        const auto proximal = [&](int in_vain) {
+            return smooth && attempt("proximal point", [&] { this->proximal_from(end, in_vain); });
         };
         std::optional<Wandering<T>> wandering;
         const auto by_turns = [&](int rounds) {
@@ -71,7 +71,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         // first as long as these methods take where they are good
         if (rigid && (proximal(8) || other_parameters(given) || by_turns(5)))
             return;
-        if (proximal(40))
+        if (proximal(Base::patience))
             return;
         const auto path = [&](bool now) {
             return T > 0 && smooth && now && attempt("path", [this] { this->path(); });

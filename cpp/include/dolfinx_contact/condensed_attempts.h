@@ -36,6 +36,8 @@ template <int T, int P> class Attempts {
           scaling_(op, law, q) {}
 
   protected:
+    static constexpr int patience = 40; // of the proximal point method, where it is given its time
+
     /// Whether scaled reactions are a solution; keeps the best state.
     bool certify(System<T> &system, const VectorXd &mapped) {
         Solution found;
@@ -154,14 +156,14 @@ template <int T, int P> class Attempts {
 
     /// The proximal point method from r, the errors those of the problem itself, until so many of
     /// its steps in a row were in vain.
-    void proximal_from(VectorXd r, int patience = 40) {
+    void proximal_from(VectorXd r, int in_vain = patience) {
         System<T> system = scaling_.make();
         system.inverse = nullptr;
         const auto error = [&](const VectorXd &mapped) {
             last_error_ = 0.0;
             return certify(system, mapped) ? 0.0 : last_error_;
         };
-        if (!proximal(system, r, op_.mean_normal(), patience, budget_, error))
+        if (!proximal(system, r, op_.mean_normal(), in_vain, budget_, error))
             return;
         Newton<T> newton(system);
         set_change(newton, system, r);

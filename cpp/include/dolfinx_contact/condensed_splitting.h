@@ -13,7 +13,7 @@ namespace dolfinx_contact::condensed {
 /// x of (W + rho I) x = rho (z - u) - q - rho |u_t| e_n, which is the law's equation with -rho u
 /// for the displacement; z = proj(x + u, C); u grows by x - z. Over-relaxed, with rho so that both
 /// are left alike [S. Boyd, N. Parikh, E. Chu, B. Peleato, J. Eckstein, Found. Trends Mach. Learn.
-/// 3 (2011), Section 3.4]. All contacts have friction.
+/// 3 (2011), Section 3.4]. There are no tied rows.
 template <int T> class Splitting {
   public:
     static constexpr int D = T + 1;
