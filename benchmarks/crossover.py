@@ -49,7 +49,7 @@ def measure(body: str, friction: bool, divisions: int) -> dict:
 
 
 def crossings(rows: list[dict]) -> list[dict]:
-    """Nodes squared over unknowns where both take equally long, interpolated between the two sizes around it.
+    """Nodes cubed over unknowns where both take equally long, interpolated between the two sizes around it.
 
     A family that ends before its crossing gives the largest value that was measured, as a bound.
     """
@@ -59,7 +59,7 @@ def crossings(rows: list[dict]) -> list[dict]:
         if not family:
             continue
         family.sort(key=lambda r: r["nodes"])
-        share = [np.log(r["nodes"] ** 2 / r["unknowns"]) for r in family]
+        share = [np.log(r["nodes"] ** 3 / r["unknowns"]) for r in family]
         ratio = [np.log(r["condensed"] / r["fixed_point"]) for r in family]
         over = next((k for k, value in enumerate(ratio) if value > 0), None)
         if over is None:
@@ -86,9 +86,9 @@ def main(argv=None) -> None:
         options.output.write_text(json.dumps(rows, indent=1) + "\n")
         print(rows[-1], flush=True)
     for row in rows:
-        row["share"] = row["nodes"] ** 2 / row["unknowns"]
+        row["share"] = row["nodes"] ** 3 / row["unknowns"]
     titles = dict(body="body", friction="friction", nodes="contact nodes", unknowns="unknowns",
-                  share="nodes^2 / unknowns", condensed="condensed (s)", fixed_point="fixed point (s)")  # fmt: skip
+                  share="nodes^3 / unknowns", condensed="condensed (s)", fixed_point="fixed point (s)")  # fmt: skip
     for table in (chosen(rows, titles), crossings(rows)):
         for row in table:
             print(row)

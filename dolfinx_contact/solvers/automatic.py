@@ -14,9 +14,14 @@ from dolfinx_contact.solvers.fixed_point import FixedPoint
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.solvers.sparse_newton import SparseNewton
 
-# The most contact nodes for which the condensed solver is tried first, see docs/solvers.md
-CROSSOVER = 600
-WITHOUT_FRICTION = 800
+
+def most_nodes(unknowns: int, friction: bool) -> int:
+    """The most contact nodes of a body for which the condensed solver is tried first, see docs/solvers.md.
+
+    Its time grows with the cube of the nodes, that of the fixed point with the unknowns.
+    """
+    equal, measured = 4e4, 1010
+    return min(measured, round((equal * unknowns) ** (1 / 3))) if friction else measured
 
 
 class Automatic:
@@ -55,7 +60,7 @@ class BoundAutomatic:
         self._components = components(contacts)
         enough = fits(body.comm, nodes, self._components, body.K.getSize()[0])
         self._solvers = [CondensedNewton(), FixedPoint()]
-        most = WITHOUT_FRICTION if self._components == 1 else CROSSOVER
+        most = most_nodes(body.K.getSize()[0], friction=self._components > 1)
         self._why = f"{nodes} contact nodes, at most {most}"
         if nodes > most:
             self._why = f"{nodes} contact nodes, more than {most}"
