@@ -17,8 +17,8 @@ class RoundingWarning(UserWarning):
     """
 
 
-def finite(name: str, value) -> np.ndarray:
-    """A float64 array of finite numbers, or a ``ValueError``."""
+def finite(name: str, value, copy: bool = True) -> np.ndarray:
+    """A float64 array of finite numbers, a new one if ``copy``, or a ``ValueError``."""
     if np.ma.is_masked(value):
         raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...).")
     try:
@@ -29,7 +29,7 @@ def finite(name: str, value) -> np.ndarray:
         raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, but contains NaN or infinity: {value!r}.")
-    return array.astype(np.float64)
+    return array.astype(np.float64, copy=copy)
 
 
 def positive(name: str, value, whole: bool = False, finite: bool = False) -> float:

@@ -1,7 +1,8 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// W of low rank is the product that is found, whatever its units; one of full rank has none; and
-/// factors of W B + A by rank, of few entries and dense solve the same equations.
+/// W of low rank is the product that is found, whatever its units; one of full rank has none;
+/// factors of W B + A by rank, of few entries and dense solve the same equations; and a sparse W is
+/// the dense one, wherever its entries are.
 #include "random_states.h"
 #include <dolfinx_contact/condensed_blocks.h>
 #include <dolfinx_contact/condensed_scaling.h>
@@ -54,11 +55,12 @@ void check_factors(int seed, Index reach, double units) {
 
 TEST(CondensedRank, AProductIsFoundWhereTheRankIsLow) {
     Random random(1);
-    for (const Index size : {3, 30, 150})
+    for (const Index size : {3, 30, 150, 450}) // of the last one in several panels
         for (const double uneven : {0.0, 1e-3})
             for (const double units : {1e-12, 1.0, 1e12}) {
                 const MatrixXd W = units * low_rank(random, size, size / 3, uneven, size);
-                const Square view(W.data(), size, size, Square::Part::all);
+                const auto part = uneven > 0.0 ? Square::Part::all : Square::Part::upper;
+                const Square view(W.data(), size, size, part);
                 const auto found = product(view, 0.6);
                 ASSERT_TRUE(found.has_value()) << size << " " << uneven;
                 EXPECT_EQ(found->X.rows(), size / 3);
@@ -83,4 +85,43 @@ TEST(CondensedRank, AllFactorsSolve) {
             check_factors(seed, 240, units);
             check_factors(seed, 6, units);
         }
+}
+
+TEST(CondensedRank, SparseFactorsOfOneMatrixAfterTheOther) {
+    Random random(3);
+    LinearSolver solver;
+    for (const Index reach : {2, 2, 5, 2, 5, 5}) { // the same places as before, and others
+        constexpr Index size = 60;
+        MatrixXd J = low_rank(random, size, size, 0.1, reach);
+        J.diagonal().array() += 1.0;
+        const VectorXd rhs = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+        ASSERT_TRUE(solver.factor(Eigen::SparseMatrix<double>(J.sparseView())));
+        EXPECT_LT((J * solver.again(rhs) - rhs).norm(), 1e-9 * rhs.norm()) << reach;
+    }
+}
+
+TEST(CondensedRank, ASparseMatrixIsTheDenseOne) {
+    constexpr Index nodes = 100, size = 3 * nodes;
+    Random random(4);
+    for (const double uneven : {0.0, 1e-3}) {
+        MatrixXd W = low_rank(random, size, size / 3, uneven, 4);
+        W.topLeftCorner(60, 60) += low_rank(random, 60, 20, uneven, 60); // some contacts have many
+        if (uneven == 0.0)
+            W = MatrixXd(W + W.transpose());
+        const Operator op(W, 3);
+        ASSERT_EQ(op.pattern().size(), nodes);
+        for (Index j = 0; j < nodes; ++j) {
+            std::vector<Index> expected;
+            for (Index i = 0; i < nodes; ++i)
+                if (i == j || !W.block<3, 3>(3 * i, 3 * j).isZero(0.0))
+                    expected.push_back(i);
+            EXPECT_EQ(op.pattern()[static_cast<std::size_t>(j)], expected) << j;
+        }
+        const VectorXd x = VectorXd::NullaryExpr(size, [&] { return random.normal(); }), b = -W * x;
+        const double rounding = 1e-15 * (W.cwiseAbs() * x.cwiseAbs()).norm();
+        EXPECT_LT((op.W() * x - W * x).norm(), 10.0 * rounding);
+        const VectorXl exact = W.cast<Real>() * x.cast<Real>() + b.cast<Real>();
+        EXPECT_LT((op.W().accurate(b, x) - exact).norm(), 1e-3 * rounding);
+    }
+    EXPECT_TRUE(Operator(MatrixXd::Ones(size, size), 3).pattern().empty());
 }

@@ -19,7 +19,7 @@ def checked_problem(q, W, friction, r0) -> tuple:
     if q.size == 0:
         raise ValueError(f"q is empty, of shape {q.shape}: there is no contact to solve for.")
     q = q.reshape(-1, dim)
-    W = finite("W", W.toarray() if hasattr(W, "toarray") else W)
+    W = _all_entries(W)
     if W.shape != (q.size, q.size):
         raise ValueError(
             f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
@@ -55,6 +55,15 @@ def checked_problem(q, W, friction, r0) -> tuple:
         if r0.size != q.size:
             raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
     return q, W, friction, r0
+
+
+def _all_entries(W) -> np.ndarray:
+    """``W``, dense or sparse, as an array; that of the user if it is of the type."""
+    if not hasattr(W, "toarray"):
+        return finite("W", W, copy=False)
+    W = W.tocsr()
+    finite("W", W.data, copy=False)
+    return W.toarray().astype(np.float64, copy=False)
 
 
 def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:

@@ -40,24 +40,30 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (op_.nodes() == 1 && op_.tied() == 0 &&
             attempt("one contact", [this] { this->one_contact(); }))
             return;
+        const System<T> system = scaling_.make();
+        const bool smooth = InteriorPoint<T>::applies(system), sparse = system.pattern != nullptr;
+        VectorXd end; // of the interior point method
+        const auto interior = [&] {
+            return smooth && end.size() == 0 &&
+                   attempt("interior point", [&] { end = this->interior(); });
+        };
+        // of many contacts without a start few are solved by Newton's method alone
+        if (sparse && options_.fallbacks && given.isZero(0.0) && interior())
+            return;
         if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;
-        const System<T> system = scaling_.make();
-        const bool smooth = InteriorPoint<T>::applies(system);
         // many contacts of rigid bodies need methods that others hardly do
         constexpr Index many = 64;
-        const bool sparse = system.pattern != nullptr,
-                   rigid =
-                       sparse || (op_.nodes() >= many && op_.tied() == 0 &&
-                                  system.product != nullptr && system.product->get() != nullptr);
+        const bool rigid =
+            sparse || (op_.nodes() >= many && op_.tied() == 0 && system.product != nullptr &&
+                       system.product->get() != nullptr);
         if (!rigid && other_parameters(given))
             return;
         constexpr Index pivotable = 64;
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
-        VectorXd end; // of the interior point method
-        if (smooth && attempt("interior point", [&] { end = this->interior(); }))
+        if (interior())
             return;
         const auto proximal = [&](int in_vain) {
             return smooth && attempt("proximal point", [&] { this->proximal_from(end, in_vain); });

@@ -22,6 +22,8 @@ template <int T> struct Wandering {
     VectorXd swept;
     std::minstd_rand random{1};
     int rounds = 0;
+    // the smallest errors that Newton's method left from there
+    double least_swept = std::numeric_limits<double>::infinity(), least_split = least_swept;
 
     explicit Wandering(const System<T> &system)
         : sweeps(system), splitting(system), swept(VectorXd::Zero(system.size())) {}
@@ -136,21 +138,31 @@ template <int T, int P> class Attempts {
 
     /// Newton's method after every 500 sweeps in an order of chance, and after every 500 iterations
     /// of alternating directions: where these do not converge, they come by chance to where
-    /// Newton's method does. Sweeps begin anew every 40 rounds.
+    /// Newton's method does. The one that is far behind has every tenth round. Sweeps begin anew
+    /// every 40 rounds.
     void by_turns(Wandering<T> &at, int rounds) {
-        constexpr int iterations = 500, rounds_of_start = 40;
-        constexpr double target = 1e-9;
-        const auto ended = [this] { return best_.converged || budget_.spent(); };
-        for (int k = 0; k < rounds && !ended(); ++k, ++at.rounds) {
-            if (at.rounds % rounds_of_start == 0)
-                at.swept.setZero();
-            at.sweeps.run(at.swept, target, iterations, budget_, &at.random);
-            if (!at.swept.isZero(0.0)) // sweeps apply
-                newton(at.swept);
-            if (ended())
-                break;
-            at.splitting.run(target, iterations, budget_);
-            newton(at.splitting.reactions());
+        constexpr int iterations = 500, rounds_of_start = 40, seldom = 10;
+        constexpr double target = 1e-9, behind = 10.0;
+        const auto turn = [&](double error, double other) {
+            return !best_.converged && !budget_.spent() &&
+                   (error <= behind * other || at.rounds % seldom == 0);
+        };
+        const auto finish_from = [&](const VectorXd &r, double &least) {
+            newton(r);
+            least = std::min(least, last_error_);
+        };
+        for (int k = 0; k < rounds; ++k, ++at.rounds) {
+            if (turn(at.least_swept, at.least_split)) {
+                if (at.rounds % rounds_of_start == 0)
+                    at.swept.setZero();
+                at.sweeps.run(at.swept, target, iterations, budget_, &at.random);
+                if (!at.swept.isZero(0.0)) // sweeps apply
+                    finish_from(at.swept, at.least_swept);
+            }
+            if (turn(at.least_split, at.least_swept)) {
+                at.splitting.run(target, iterations, budget_);
+                finish_from(at.splitting.reactions(), at.least_split);
+            }
         }
     }
 

@@ -9,8 +9,8 @@
 #include "condensed_system.h"
 
 namespace dolfinx_contact::condensed {
-/// Factors of W B + A, where A and B have a block for each contact: of few entries, or of few
-/// unknowns where the rank of W is low, or dense ones.
+/// Factors of W B + A, where A and B have a block for each contact: of few entries, or of
+/// few unknowns where the rank of W is low, or dense ones.
 template <int T> class BlockSolver {
   public:
     static constexpr int D = T + 1;
@@ -22,11 +22,11 @@ template <int T> class BlockSolver {
 
     /// False if the matrix is singular. Without B it is I.
     bool factor(const Blocks &A, const Blocks *B = nullptr) {
-        constexpr double filled = 0.25; // entries of factors over those of dense ones
-        A_ = A;
+        constexpr double filled = 0.2; // entries of factors over those of dense ones
         B_.clear();
         if (B != nullptr)
             B_ = *B;
+        A_ = A;
         if (sparse_) {
             const bool regular = factor_sparse();
             sparse_ = !(linear_.fill() > filled);
@@ -41,19 +41,19 @@ template <int T> class BlockSolver {
         return true;
     }
 
-    /// With the last factors; those by rank lose digits, which refinement gives back, else the
-    /// dense ones are made.
+    /// With the last factors. Those by rank lose digits; where refinement does not give back as
+    /// many as a step needs, the dense ones are made.
     VectorXd solve(const VectorXd &rhs) {
-        constexpr double accuracy = 1e-10;
+        constexpr double accuracy = 1e-10, needed = 1e-6;
         constexpr int refinements = 3;
         if (by_rank_) {
-            VectorXd x = solve_by_rank(rhs);
-            for (int k = 0; k < refinements; ++k) {
-                const VectorXd rest = rhs - times(x);
-                if (rest.norm() <= accuracy * rhs.norm())
-                    return x;
+            VectorXd x = solve_by_rank(rhs), rest = rhs - times(x);
+            for (int k = 0; k < refinements && !(rest.norm() <= accuracy * rhs.norm()); ++k) {
                 x += solve_by_rank(rest);
+                rest = rhs - times(x);
             }
+            if (rest.norm() <= needed * rhs.norm())
+                return x;
             by_rank_ = false;
             factor_dense();
         }
@@ -86,25 +86,42 @@ template <int T> class BlockSolver {
     }
 
     bool factor_sparse() {
-        std::vector<Eigen::Triplet<double>> entries;
-        for (Index j = 0; j < system_.nodes; ++j)
-            for (const Index i : (*system_.pattern)[of(j)]) {
-                Block block;
-                for (int k = 0; k < D; ++k)
-                    for (int l = 0; l < D; ++l)
-                        block(k, l) = system_.left[D * i + k] * (*system_.W)(D * i + k, D * j + l) *
-                                      system_.right[D * j + l];
-                if (!B_.empty())
-                    block *= B_[of(j)];
-                if (i == j)
-                    block += A_[of(j)];
-                for (int k = 0; k < D; ++k)
-                    for (int l = 0; l < D; ++l)
-                        entries.emplace_back(D * i + k, D * j + l, block(k, l));
-            }
         Eigen::SparseMatrix<double> J(system_.size(), system_.size());
-        J.setFromTriplets(entries.begin(), entries.end());
+        J.reserve(entries());
+        Blocks column;
+        for (Index j = 0; j < system_.nodes; ++j) {
+            const std::vector<Index> &contacts = (*system_.pattern)[of(j)];
+            column.clear();
+            for (const Index i : contacts)
+                column.push_back(block(i, j));
+            for (int k = 0; k < D; ++k) {
+                J.startVec(D * j + k);
+                for (std::size_t a = 0; a < contacts.size(); ++a)
+                    for (int l = 0; l < D; ++l)
+                        J.insertBack(D * contacts[a] + l, D * j + k) = column[a](l, k);
+            }
+        }
+        J.finalize();
         return linear_.factor(J);
+    }
+    Index entries() const {
+        std::size_t blocks = 0;
+        for (const auto &contacts : *system_.pattern)
+            blocks += contacts.size();
+        return D * D * static_cast<Index>(blocks);
+    }
+    /// Of the matrix, at contacts i and j.
+    Block block(Index i, Index j) const {
+        Block found;
+        for (int k = 0; k < D; ++k)
+            for (int l = 0; l < D; ++l)
+                found(k, l) = system_.left[D * i + k] * (*system_.W)(D * i + k, D * j + l) *
+                              system_.right[D * j + l];
+        if (!B_.empty())
+            found *= B_[of(j)];
+        if (i == j)
+            found += A_[of(j)];
+        return found;
     }
 
     /// (C X B + A)^-1 = A^-1 - A^-1 C (I + X B A^-1 C)^-1 X B A^-1, M. A. Woodbury's formula.

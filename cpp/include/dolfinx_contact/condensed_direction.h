@@ -129,36 +129,44 @@ template <int T> class Direction {
             position[static_cast<std::size_t>(active_[a])] = static_cast<Index>(a);
         VectorXd y;
         for (int tries = 0; tries < 4; ++tries, shift *= 1e2) {
-            std::vector<Eigen::Triplet<double>> entries;
+            Eigen::SparseMatrix<double> J(unknowns, unknowns);
+            std::vector<Index> rows; // contacts that take part in column j
+            std::vector<Eigen::Matrix<double, D, D>> column;
             for (std::size_t b = 0; b < active_.size(); ++b) {
                 const Index j = active_[b];
-                for (const Index i : in(*system_.pattern, j)) {
-                    const Index a = in(position, i);
-                    if (a >= 0)
-                        couple_sparse(i, j, in(to_, a), from_[b],
-                                      i == j ? system_.shift + shift : 0.0, entries);
+                rows.clear();
+                column.clear();
+                for (const Index i : in(*system_.pattern, j))
+                    if (const Index a = in(position, i); a >= 0) {
+                        rows.push_back(i);
+                        column.push_back(coupled(i, j, in(to_, a), from_[b],
+                                                 i == j ? system_.shift + shift : 0.0));
+                    }
+                for (int k = 0; k < in(steps_, j).m; ++k) {
+                    J.startVec(offset(j) + k);
+                    for (std::size_t a = 0; a < rows.size(); ++a)
+                        for (int l = 0; l < in(steps_, rows[a]).m; ++l)
+                            J.insertBack(offset(rows[a]) + l, offset(j) + k) = column[a](l, k);
                 }
             }
-            Eigen::SparseMatrix<double> J(unknowns, unknowns);
-            J.setFromTriplets(entries.begin(), entries.end());
+            J.finalize();
             if (linear_.solve(J, rhs, y))
                 return y;
         }
         return VectorXd::Zero(unknowns);
     }
-    void couple_sparse(Index i, Index j, const Eigen::Matrix<double, D, D> &to,
-                       const Eigen::Matrix<double, D, D> &from, double shift,
-                       std::vector<Eigen::Triplet<double>> &entries) const {
+    /// Of a sparse J, at contacts i and j.
+    Eigen::Matrix<double, D, D> coupled(Index i, Index j, const Eigen::Matrix<double, D, D> &to,
+                                        const Eigen::Matrix<double, D, D> &from,
+                                        double shift) const {
         Eigen::Matrix<double, D, D> block;
         for (int k = 0; k < D; ++k)
             for (int l = 0; l < D; ++l)
                 block(l, k) = (*system_.W)(D * i + l, D * j + k) + (k == l ? shift : 0.0);
-        Eigen::Matrix<double, D, D> coupled = to * block * from;
+        Eigen::Matrix<double, D, D> found = to * block * from;
         if (i == j)
-            coupled += in(steps_, i).G;
-        for (int k = 0; k < in(steps_, j).m; ++k)
-            for (int l = 0; l < in(steps_, i).m; ++l)
-                entries.emplace_back(offset(i) + l, offset(j) + k, coupled(l, k));
+            found += in(steps_, i).G;
+        return found;
     }
     double mean_normal() const {
         double mean = 0.0;

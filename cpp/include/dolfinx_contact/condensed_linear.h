@@ -10,15 +10,21 @@ namespace dolfinx_contact::condensed {
 /// Solves J y = rhs and keeps the factors.
 class LinearSolver {
   public:
+    LinearSolver() {
+        constexpr double enough = 1e-2; // of the largest entry of a column: pivots that fill less
+        sparse_.setPivotThreshold(enough);
+    }
     /// Factors of J, regular, in double precision.
     void factor(const MatrixXd &J) {
         kind_ = Kind::in_double;
         double_.compute(J);
     }
-    /// Of a sparse one; false if it is singular.
+    /// Of a sparse one, compressed; false if it is singular.
     bool factor(const Eigen::SparseMatrix<double> &J) {
         kind_ = Kind::sparse;
-        sparse_.compute(J);
+        if (!ordered_for(J))
+            sparse_.analyzePattern(J);
+        sparse_.factorize(J);
         return sparse_.info() == Eigen::Success;
     }
 
@@ -75,6 +81,16 @@ class LinearSolver {
     }
 
   private:
+    /// Whether the last sparse matrix had entries in the same places; keeps those of J.
+    bool ordered_for(const Eigen::SparseMatrix<double> &J) {
+        const int *outer = J.outerIndexPtr(), *inner = J.innerIndexPtr();
+        std::vector<int> places(outer, outer + J.outerSize() + 1);
+        places.insert(places.end(), inner, inner + J.nonZeros());
+        const bool same = places == places_;
+        places_ = std::move(places);
+        return same;
+    }
+
     enum class Kind { in_single, in_double, orthogonal, sparse };
 
     /// By iterative refinement; false if that does not converge, because J is too badly
@@ -102,5 +118,6 @@ class LinearSolver {
     Eigen::PartialPivLU<MatrixXd> double_;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
     Eigen::SparseLU<Eigen::SparseMatrix<double>> sparse_;
+    std::vector<int> places_; // of the entries of the last sparse matrix
 };
 } // namespace dolfinx_contact::condensed

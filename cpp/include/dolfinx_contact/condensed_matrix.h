@@ -88,6 +88,12 @@ class Square {
     /// b + A x in twice the precision; some ten times the time of a product.
     VectorXl accurate(const VectorXd &b, const VectorXd &x) const {
         AccurateSums y(b);
+        if (sparse_ != nullptr) {
+            for (Index j = 0; j < size(); ++j)
+                for (Eigen::SparseMatrix<double>::InnerIterator at(*sparse_, j); at; ++at)
+                    y.add(at.row(), at.value(), x[j]);
+            return y.sums();
+        }
         for (Index j = 0; j < size(); ++j) {
             const auto [first, last] = stored(j, size());
             for (Index i = first; i < last; ++i) {

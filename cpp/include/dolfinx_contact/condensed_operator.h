@@ -5,6 +5,7 @@
 #pragma once
 
 #include "condensed_system.h"
+#include <algorithm>
 #include <optional>
 
 namespace dolfinx_contact::condensed {
@@ -102,42 +103,37 @@ class Operator {
     }
 
   private:
-    /// W is sparse if it is of many contacts that a tenth of the others move at most.
+    /// W is sparse if it is of many contacts and at most a tenth of its entries are not zero.
     void find_pattern() {
         constexpr Index many = 64, densest = 10;
         const Index n = nodes();
         if (n < many || tied_ > 0)
             return;
-        Index blocks = 0;
-        std::vector<Eigen::Triplet<double>> entries;
-        pattern_.resize(static_cast<std::size_t>(n));
-        for (Index j = 0; j < n; ++j) {
-            for (Index i = 0; i < n; ++i) {
-                bool found = false;
-                for (Index k = 0; k < dim_ * dim_; ++k) {
-                    const Index row = dim_ * i + k % dim_, column = dim_ * j + k / dim_;
-                    if (const double value = W_(row, column); value != 0.0) {
-                        entries.emplace_back(row, column, value);
-                        found = true;
-                    }
-                }
-                if (found || i == j) {
-                    pattern_[static_cast<std::size_t>(j)].push_back(i);
-                    ++blocks;
-                }
-            }
-            if (blocks * densest > n * (j + 1) && j * densest > n) {
-                pattern_.clear();
+        const auto stored = values_.rightCols(size_);
+        Eigen::SparseMatrix<double> found(size_, size_);
+        for (Index j = 0; j < size_; ++j) {
+            found.startVec(j);
+            for (Index i = 0; i < (symmetric_ ? j + 1 : size_); ++i)
+                if (stored(i, j) != 0.0)
+                    found.insertBack(i, j) = stored(i, j);
+            if (found.data().size() * (symmetric_ ? 2 : 1) * densest > size_ * size_)
                 return;
-            }
         }
-        if (blocks * densest > n * n) {
-            pattern_.clear();
-            return;
-        }
-        sparse_.resize(size_, size_);
-        sparse_.setFromTriplets(entries.begin(), entries.end());
+        found.finalize();
+        if (symmetric_)
+            sparse_ = found.selfadjointView<Eigen::Upper>();
+        else
+            sparse_.swap(found);
         W_.set_sparse(&sparse_);
+        for (Index j = 0; j < n; ++j) {
+            std::vector<Index> contacts{j};
+            for (Index k = 0; k < dim_; ++k)
+                for (Eigen::SparseMatrix<double>::InnerIterator at(sparse_, dim_ * j + k); at; ++at)
+                    contacts.push_back(at.row() / dim_);
+            std::sort(contacts.begin(), contacts.end());
+            contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+            pattern_.push_back(std::move(contacts));
+        }
     }
 
     Square view(const double *values, Square::Part triangle) const {

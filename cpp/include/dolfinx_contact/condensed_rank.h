@@ -5,6 +5,8 @@
 #pragma once
 
 #include "condensed_matrix.h"
+#include <algorithm>
+#include <numeric>
 #include <optional>
 
 namespace dolfinx_contact::condensed {
@@ -14,37 +16,100 @@ struct Product {
     MatrixXd X;
 };
 
-/// W as a product, r its rank; none if that is more than `share` of its size. By elimination with
-/// the largest of what is left of the diagonal as pivot, for matrices that are symmetric and
-/// positive semidefinite but for a little; whether the product is W is asked of three vectors.
+/// W = L U' but for what is left, by elimination with large pivots of what is left of the diagonal,
+/// of matrices that are symmetric and positive semidefinite but for a little.
+class Elimination {
+  public:
+    explicit Elimination(const Square &W)
+        : A_(W.dense()), symmetric_(W.symmetric()), left_(A_.diagonal()) {}
+
+    /// Until a part `smallest` of the largest diagonal entry is left; false if that takes more than
+    /// `most` columns. Panels of columns are brought up to date at once, for the speed of matrix
+    /// products; pivots are taken from a panel while it has large ones.
+    bool run(double smallest, Index most) {
+        constexpr double large = 0.1; // of the largest of all
+        const double end = smallest * (left_.size() > 0 ? left_.maxCoeff() : 0.0);
+        const auto every = Eigen::seqN(Index{0}, A_.rows());
+        L_.resize(A_.rows(), most);
+        U_.resize(A_.rows(), most);
+        while (left_.size() > 0 && left_.maxCoeff() > end) {
+            const std::vector<Index> panel = largest_left();
+            const MatrixXd columns = brought(A_(every, panel), L_, U_, panel);
+            const MatrixXd rows =
+                symmetric_ ? columns : brought(A_(panel, every).transpose(), U_, L_, panel);
+            const Index first = rank();
+            for (Index a = 0; left_[panel[of(a)]] > std::max(end, large * left_.maxCoeff());) {
+                if (rank() == most)
+                    return false;
+                eliminate(panel[of(a)], columns.col(a), rows.col(a), first);
+                left_(panel).maxCoeff(&a);
+            }
+        }
+        return true;
+    }
+    Index rank() const { return static_cast<Index>(pivots_.size()); }
+
+    /// W = C X.
+    Product product() const {
+        const auto U = U_.leftCols(rank());
+        const MatrixXd corner = U(pivots_, Eigen::seqN(0, rank())).transpose(),
+                       C = A_(Eigen::seqN(0, A_.rows()), pivots_);
+        return {C.sparseView(), corner.triangularView<Eigen::Upper>().solve(U.transpose())};
+    }
+
+  private:
+    static std::size_t of(Index i) { return static_cast<std::size_t>(i); }
+
+    /// Rows of the largest entries of what is left, the largest first.
+    std::vector<Index> largest_left() const {
+        constexpr Index width = 64;
+        std::vector<Index> rows(of(left_.size()));
+        std::iota(rows.begin(), rows.end(), Index{0});
+        const auto end = rows.begin() + std::min(width, left_.size());
+        std::partial_sort(rows.begin(), end, rows.end(),
+                          [this](Index i, Index j) { return left_[i] > left_[j]; });
+        return {rows.begin(), end};
+    }
+    /// Columns of W - L U'.
+    MatrixXd brought(MatrixXd columns, const MatrixXd &L, const MatrixXd &U,
+                     const std::vector<Index> &at) const {
+        const MatrixXd of_columns = U(at, Eigen::seqN(0, rank())).transpose();
+        columns.noalias() -= L.leftCols(rank()) * of_columns;
+        return columns;
+    }
+    /// With p as pivot, its column and row up to date but for those since `first`.
+    void eliminate(Index p, const VectorXd &column, const VectorXd &row, Index first) {
+        const Index k = rank(), since = k - first;
+        L_.col(k) =
+            column - L_.middleCols(first, since) * U_.row(p).segment(first, since).transpose();
+        if (symmetric_)
+            U_.col(k) = L_.col(k);
+        else
+            U_.col(k) =
+                row - U_.middleCols(first, since) * L_.row(p).segment(first, since).transpose();
+        L_.col(k) /= L_(p, k);
+        left_ -= L_.col(k).cwiseProduct(U_.col(k));
+        left_[p] = 0.0;
+        pivots_.push_back(p);
+    }
+
+    MatrixXd A_;
+    bool symmetric_;
+    MatrixXd L_, U_;
+    VectorXd left_; // of the diagonal
+    std::vector<Index> pivots_;
+};
+
+/// W as a product, r its rank; none if that is more than `share` of its size. Whether the product
+/// is W is asked of three vectors.
 inline std::optional<Product> product(const Square &W, double share) {
     constexpr double smallest = 1e-11, accuracy = 1e-9;
-    const Index n = W.size(), most = static_cast<Index>(share * static_cast<double>(n));
-    const MatrixXd A = W.dense();
-    MatrixXd L(n, most), U(n, most); // A = L U', but for what is left
-    VectorXd left = A.diagonal();
-    const double largest = n > 0 ? left.maxCoeff() : 0.0;
-    std::vector<Index> pivots;
-    for (Index k = 0, p = 0; n > 0 && left.maxCoeff(&p) > smallest * largest; ++k) {
-        if (k == most)
-            return {};
-        L.col(k) = A.col(p) - L.leftCols(k) * U.row(p).head(k).transpose();
-        U.col(k) = A.row(p).transpose() - U.leftCols(k) * L.row(p).head(k).transpose();
-        L.col(k) /= L(p, k);
-        left -= L.col(k).cwiseProduct(U.col(k));
-        left[p] = 0.0;
-        pivots.push_back(p);
-    }
-    const auto r = static_cast<Index>(pivots.size());
-    if (r == 0)
+    const Index n = W.size();
+    Elimination elimination(W);
+    if (!elimination.run(smallest, static_cast<Index>(share * static_cast<double>(n))) ||
+        elimination.rank() == 0)
         return {};
-    MatrixXd corner(r, r), columns(n, r);
-    for (Index k = 0; k < r; ++k) {
-        corner.col(k) = U.row(pivots[static_cast<std::size_t>(k)]).head(r).transpose();
-        columns.col(k) = A.col(pivots[static_cast<std::size_t>(k)]);
-    }
-    Product found{columns.sparseView(),
-                  corner.triangularView<Eigen::Upper>().solve(U.leftCols(r).transpose())};
+    Product found = elimination.product();
     for (int sample = 1; sample <= 3; ++sample) {
         const VectorXd x =
             (sample * VectorXd::LinSpaced(n, 1.0, static_cast<double>(n))).array().sin();
