@@ -231,6 +231,11 @@ def test_infeasible_raises():
     with pytest.raises(CondensedNotConverged, match="no solution") as caught:
         solve_condensed(W, q, Friction(0.3))
     assert caught.value.best.error > 1e-3
+    assert caught.value.best.unsolvable
+    W[2, 5] = W[5, 2] = -1.001  # the more, the larger its reaction: no proof, all methods are tried
+    with pytest.raises(CondensedNotConverged, match="no solution") as caught:
+        solve_condensed(W, q, Friction(0.3))
+    assert not caught.value.best.unsolvable
     assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "proximal point"}
 
 

@@ -186,6 +186,40 @@ def test_the_plane_is_decided():
     assert min(outcomes.values()) >= 20
 
 
+def chain(bodies, close):
+    """Spheres in a row on the ground, between two walls that move by ``close`` towards each other."""
+    rows, q = [], []
+    for normal, at, first in [((1, 0, 0), k, k - 1) for k in range(bodies + 1)] + [
+        ((0, 0, 1), k, None) for k in range(bodies)
+    ]:
+        n = np.array(normal, float)
+        frame = np.vstack((np.roll(n, 1), np.roll(n, 2), n))
+        H = np.zeros((3, 6 * bodies))
+        for body, side in ((at, -1.0), (first, 1.0)):
+            if body is not None and 0 <= body < bodies:
+                x, y, z = side * n
+                arm = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+                H[:, 6 * body : 6 * body + 6] = -side * frame @ np.hstack((np.eye(3), arm))
+        rows.append(H)
+        wall = first is not None and (at == bodies or first < 0)
+        q.append((0, 0, -close if wall else 0.0 if first is not None else -0.01))
+    H = np.vstack(rows)
+    inverse_mass = np.diag(np.tile([1.0] * 3 + [2.5] * 3, bodies))
+    return H @ inverse_mass @ H.T, np.array(q)
+
+
+@pytest.mark.parametrize("bodies", [1, 3, 10, 40])
+def test_contacts_that_close_are_refused_with_a_proof(bodies):
+    """Spheres in a row between walls that come together, which no reactions keep from overlapping:
+    refused as unsolvable, in a few iterations; solved where the walls part."""
+    W, q = chain(bodies, 0.01)
+    with pytest.raises(CondensedNotConverged, match="no solution: contacts close") as caught:
+        solve_condensed(W, q, Friction(0.5))
+    assert caught.value.best.unsolvable and caught.value.best.iterations < 300
+    W, q = chain(bodies, -0.01)
+    check(W, q, Friction(0.5), 0.5)
+
+
 def test_jammed():
     """One contact that sticks with reactions hundreds of times the load, r = -W^-1 q."""
     W, q = np.array([[1.001, 1], [1, 1.001]]), np.array([[5, -0.01]])

@@ -39,15 +39,15 @@ def interrupted(seconds: float):
 
 
 def endless(n: int):
-    """W, q of contacts that press against each other in pairs, whatever their reactions, so that every method is tried:
-    of 300 contacts for more than half a minute."""
+    """W, q of contacts that press against each other in pairs, the more the larger their reactions, so that every method is
+    tried: of 300 contacts for more than half a minute."""
     random = np.random.default_rng(0)
     slips = random.normal(size=(3 * n, 3 * n // 2))
     slips[2::3] = 0.0
     W = slips @ slips.T / (3 * n)
     normal = np.arange(2, 3 * n, 3)
     W[normal, normal] = 1.0
-    W[normal[::2], normal[1::2]] = W[normal[1::2], normal[::2]] = -1.0
+    W[normal[::2], normal[1::2]] = W[normal[1::2], normal[::2]] = -1.001
     q = np.full((n, 3), -1.0)
     q[:, :2] = random.normal(size=(n, 2))
     return W, q

@@ -40,8 +40,8 @@ class CondensedResult:
         branch: The method of the cascade that gave the answer.
         tried: All that were tried, in order.
         tied: Forces of the tied rows of a kernel operator, if it has any.
-        unsolvable: Of a failure: it is proved that there is no solution, by trying every state of a
-            few contacts in two dimensions.
+        unsolvable: Of a failure: it is proved that there is no solution, by normal forces that move nothing while
+            contacts close against them, or by trying every state of a few contacts in two dimensions.
 
     Example:
         >>> found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
@@ -81,8 +81,14 @@ class CondensedNotConverged(RuntimeError):
     def __init__(self, best: CondensedResult) -> None:
         self.best, self.tried = best, best.tried
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
+        closing = best.tried and best.tried[-1].branch == "feasibility"
+        proof = (
+            "contacts close whatever the reactions are, as those of a body between planes that come together"
+            if closing
+            else "none of the states of the contacts is one"
+        )
         advice = (
-            "There is no solution: none of the states of the contacts is one."
+            f"There is no solution: {proof}."
             if best.unsolvable
             else "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
             "few degrees of freedom may have no solution at all."

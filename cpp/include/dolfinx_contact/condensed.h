@@ -63,7 +63,8 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (T == 1 && P == 1 && op_.tied() == 0 && op_.nodes() <= pivotable &&
             (attempt("pivots", [this] { this->in_the_plane(); }) || best_.unsolvable))
             return;
-        if (interior())
+        if (interior() || attempt("feasibility", [this] { this->feasibility(); }) ||
+            best_.unsolvable)
             return;
         const auto proximal = [&](int in_vain) {
             return smooth && attempt("proximal point", [&] { this->proximal_from(end, in_vain); });

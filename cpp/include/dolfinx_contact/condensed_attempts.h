@@ -4,6 +4,7 @@
 /// The methods of the cascade, each ended by the judge, and the best state that they found.
 #pragma once
 
+#include "condensed_feasibility.h"
 #include "condensed_interior.h"
 #include "condensed_judge.h"
 #include "condensed_path.h"
@@ -179,6 +180,18 @@ template <int T, int P> class Attempts {
             return;
         Newton<T> newton(system);
         set_change(newton, system, r);
+    }
+
+    /// Whether contacts close whatever the reactions are. A body has a regular W, and no such
+    /// contacts.
+    void feasibility() {
+        if (op_.tied() > 0 || op_.inverse() != nullptr)
+            return;
+        VectorXd q_n(op_.nodes());
+        for (Index i = 0; i < op_.nodes(); ++i)
+            q_n[i] = q_[(P + 1) * i + P];
+        best_.unsolvable = judge_.excludes(closing_forces(op_, q_n, budget_),
+                                           std::max(options_.tol, options_.slip_tol));
     }
 
     /// Contacts in the plane: complementary pivots; of a few contacts every state.

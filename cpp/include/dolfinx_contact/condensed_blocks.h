@@ -9,7 +9,7 @@
 #include "condensed_system.h"
 
 namespace dolfinx_contact::condensed {
-/// Factors of W B + A, where A and B have a block for each contact: of few entries, or of
+/// Factors of (W + shift) B + A, where A and B have a block for each contact: of few entries, or of
 /// few unknowns where the rank of W is low, or dense ones.
 template <int T> class BlockSolver {
   public:
@@ -27,6 +27,8 @@ template <int T> class BlockSolver {
         if (B != nullptr)
             B_ = *B;
         A_ = A;
+        if (system_.shift > 0.0)
+            add_shift();
         if (sparse_) {
             const bool regular = factor_sparse();
             sparse_ = !(linear_.fill() > filled);
@@ -73,7 +75,23 @@ template <int T> class BlockSolver {
         }
         return x;
     }
-    VectorXd times(const VectorXd &x) const { return system_.change(times(B_, x)) + times(A_, x); }
+    VectorXd times(const VectorXd &x) const {
+        const VectorXd forces = system_.right.cwiseProduct(times(B_, x));
+        return system_.left.cwiseProduct(*system_.W * forces) + times(A_, x);
+    }
+
+    /// What is added to the diagonal of W, to A.
+    void add_shift() {
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const Eigen::Matrix<double, D, 1> shift =
+                system_.shift * system_.left.template segment<D>(D * i).cwiseProduct(
+                                    system_.right.template segment<D>(D * i));
+            if (B_.empty())
+                A_[of(i)] += shift.asDiagonal();
+            else
+                A_[of(i)] += shift.asDiagonal() * B_[of(i)];
+        }
+    }
 
     void factor_dense() {
         MatrixXd J = system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();

@@ -88,8 +88,51 @@ template <int P> class Judge {
                s.slip_error <= std::max(slip_tol, s.slip_rounding);
     }
 
+    /// Whether normal forces y >= 0 of the contacts prove that no reactions are accepted. Accepted
+    /// ones r are below those that grow without bound, and leave gaps above -(1 + mu) error S /
+    /// kappa, with S at most the load, so that no error below `seen` hides y w_n = q y + (W' y) r <
+    /// 0. Not for tied rows.
+    bool excludes(const VectorXd &y, double tol) const {
+        constexpr double seen = 1e-6;
+        if (y.size() == 0 || op_.tied() > 0 || !y.allFinite())
+            return false;
+        VectorXd forces = VectorXd::Zero(q_.size());
+        double hidden = 0.0;
+        for (Index i = 0; i < y.size(); ++i) {
+            forces[D * i + P] = y[i];
+            hidden += y[i] / kappa_[i];
+        }
+        const double acting = std::max(load_, external_);
+        hidden *= std::max(seen, tol) * (1.0 + largest_mu()) * acting;
+        return -q_.dot(forces) > hidden + moved(forces) * acting / std::sqrt(eps);
+    }
+
   private:
     static constexpr double eps = std::numeric_limits<double>::epsilon();
+
+    /// |W' f|, summed in twice the precision.
+    double moved(const VectorXd &forces) const {
+        const VectorXd zero = VectorXd::Zero(forces.size());
+        if (op_.W().symmetric())
+            return static_cast<double>(op_.W().accurate(zero, forces).norm());
+        const MatrixXd transposed = op_.W().dense().transpose();
+        const Square W(transposed.data(), zero.size(), zero.size(), Square::Part::all);
+        return static_cast<double>(W.accurate(zero, forces).norm());
+    }
+
+    double largest_mu() const {
+        double largest = 0.0;
+        std::visit(
+            [&](const auto &source) {
+                for (Index i = 0; i < op_.nodes(); ++i) {
+                    const auto &law = source(static_cast<std::size_t>(i));
+                    for (int c = 0; c < std::decay_t<decltype(law)>::tangents; ++c)
+                        largest = std::max<double>(largest, law.mu(c));
+                }
+            },
+            law_);
+        return largest;
+    }
 
     /// What the law and the slip rule leave, and the size of the terms of which it is the
     /// difference; forces, Euclidean over all contacts.
