@@ -58,9 +58,10 @@ class BoundAutomatic:
         body, contacts, *_ = self._arguments
         nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
         self._components = components(contacts)
-        enough = fits(body.comm, nodes, self._components, body.K.getSize()[0])
+        unknowns = body.K.getSize()[0]
+        enough = fits(body.comm, nodes, self._components, unknowns)
         self._solvers = [CondensedNewton(), FixedPoint()]
-        most = most_nodes(body.K.getSize()[0], friction=self._components > 1)
+        most = most_nodes(unknowns, friction=self._components > 1)
         self._why = f"{nodes} contact nodes, at most {most}"
         if nodes > most:
             self._why = f"{nodes} contact nodes, more than {most}"

@@ -40,11 +40,10 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (op_.nodes() == 1 && op_.tied() == 0 &&
             attempt("one contact", [this] { this->one_contact(); }))
             return;
-        const System<T> system = scaling_.make();
-        const bool smooth = InteriorPoint<T>::applies(system), sparse = system.pattern != nullptr;
+        const bool sparse = !op_.pattern().empty();
         VectorXd end; // of the interior point method
         const auto interior = [&] {
-            return smooth && end.size() == 0 &&
+            return end.size() == 0 && InteriorPoint<T>::applies(scaling_.make()) &&
                    attempt("interior point", [&] { end = this->interior(); });
         };
         // of many contacts without a start few are solved by Newton's method alone
@@ -52,11 +51,12 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;
+        const System<T> system = scaling_.make();
+        const bool smooth = InteriorPoint<T>::applies(system);
         // many contacts of rigid bodies need methods that others hardly do
-        constexpr Index many = 64;
         const bool rigid =
-            sparse || (op_.nodes() >= many && op_.tied() == 0 && system.product != nullptr &&
-                       system.product->get() != nullptr);
+            sparse || (op_.nodes() >= Operator::many && op_.tied() == 0 &&
+                       system.product != nullptr && system.product->get() != nullptr);
         if (!rigid && other_parameters(given))
             return;
         constexpr Index pivotable = 64;

@@ -187,9 +187,7 @@ template <int T, int P> class Attempts {
     void feasibility() {
         if (op_.tied() > 0 || op_.inverse() != nullptr)
             return;
-        VectorXd q_n(op_.nodes());
-        for (Index i = 0; i < op_.nodes(); ++i)
-            q_n[i] = q_[(P + 1) * i + P];
+        const VectorXd q_n = q_(Eigen::seqN(Index{P}, op_.nodes(), Index{P + 1}));
         best_.unsolvable = judge_.excludes(closing_forces(op_, q_n, budget_),
                                            std::max(options_.tol, options_.slip_tol));
     }

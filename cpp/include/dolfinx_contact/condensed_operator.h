@@ -18,6 +18,8 @@ namespace dolfinx_contact::condensed {
 /// zero.
 class Operator {
   public:
+    static constexpr Index many = 64; ///< contacts from which zeros and a low rank of W pay
+
     /// W is copied; D = `dim` rows of a contact, tangential components first. D = 1 is contact
     /// without friction, of which the normal rows alone are needed.
     template <class Derived>
@@ -105,7 +107,7 @@ class Operator {
   private:
     /// W is sparse if it is of many contacts and at most a tenth of its entries are not zero.
     void find_pattern() {
-        constexpr Index many = 64, densest = 10;
+        constexpr Index densest = 10;
         const Index n = nodes();
         if (n < many || tied_ > 0)
             return;
