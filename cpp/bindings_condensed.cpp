@@ -18,6 +18,7 @@ using namespace dolfinx_contact::condensed;
 
 namespace {
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Places = py::array_t<int, py::array::c_style | py::array::forcecast>;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 VectorXd vector(const Array &array, Index size, const char *name) {
@@ -27,23 +28,51 @@ VectorXd vector(const Array &array, Index size, const char *name) {
     return Eigen::Map<const VectorXd>(array.data(), size);
 }
 
-std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied) {
+void check_size(Index rows, Index columns, int dim, Index tied) {
 #ifdef THREE_COMPONENTS_ONLY
     if (dim != 3)
         throw py::value_error("this module has systems of three components alone");
 #endif
     if (dim < 1 || dim > 3)
         throw py::value_error("dim must be 1, 2 or 3, not " + std::to_string(dim));
-    if (W.ndim() != 2 || W.shape(0) != W.shape(1) || tied < 0 || W.shape(0) < tied ||
-        (W.shape(0) - tied) % dim != 0)
+    if (rows != columns || tied < 0 || rows < tied || (rows - tied) % dim != 0)
         throw py::value_error("W must be square with " + std::to_string(dim) +
                               " rows per contact and one per tied row");
-    const Eigen::Map<const RowMajor> map(W.data(), W.shape(0), W.shape(1));
-    for (Index i = dim - 1; i < W.shape(0) - tied; i += dim)
-        if (map(i, i) < 0.0)
+}
+
+template <class Matrix>
+std::unique_ptr<Operator> checked_operator(const Matrix &W, int dim, Index tied) {
+    for (Index i = dim - 1; i < W.rows() - tied; i += dim)
+        if (W.coeff(i, i) < 0.0)
             throw py::value_error("W has a negative normal diagonal entry: a contact must give way "
                                   "to its reaction");
-    return std::make_unique<Operator>(map, dim, tied);
+    return std::make_unique<Operator>(W, dim, tied);
+}
+
+std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied) {
+    check_size(W.ndim() == 2 ? W.shape(0) : -1, W.ndim() == 2 ? W.shape(1) : 0, dim, tied);
+    return checked_operator(Eigen::Map<const RowMajor>(W.data(), W.shape(0), W.shape(1)), dim,
+                            tied);
+}
+
+/// Of W by columns, the rows of each in order, as SciPy's csc_array has them.
+std::unique_ptr<Operator> make_sparse_operator(const Array &data, const Places &rows,
+                                               const Places &columns, int dim) {
+    const Index size = columns.size() - 1;
+    check_size(size, size, dim, 0);
+    bool good = rows.size() == data.size() && columns.at(0) == 0 && columns.at(size) == data.size();
+    for (Index j = 0; good && j < size; ++j) {
+        const int first = columns.at(j), last = columns.at(j + 1);
+        good = first <= last && last <= rows.size();
+        for (Index k = first; good && k < last; ++k)
+            good =
+                rows.at(k) >= 0 && rows.at(k) < size && (k == first || rows.at(k - 1) < rows.at(k));
+    }
+    if (!good)
+        throw py::value_error("W must be given by columns, with the rows of each in order");
+    return checked_operator(Sparse(Eigen::Map<const Sparse>(size, size, data.size(), columns.data(),
+                                                            rows.data(), data.data())),
+                            dim, 0);
 }
 
 VectorXd optional(const std::optional<Array> &array) {
@@ -154,6 +183,8 @@ void bind_condensed(py::module_ &m) {
         .def_readonly("tried", &Solution::tried);
     py::class_<Operator>(m, "CondensedOperator", py::module_local())
         .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0)
+        .def_static("by_columns", &make_sparse_operator, py::arg("data"), py::arg("rows"),
+                    py::arg("columns"), py::arg("dim"))
         .def_property_readonly("dim", &Operator::dim)
         .def_property_readonly("nodes", &Operator::nodes)
         .def_property_readonly("tied", &Operator::tied)

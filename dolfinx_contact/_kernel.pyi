@@ -323,6 +323,13 @@ class CondensedSolution:
     def unsolvable(self) -> bool: ...
 
 class CondensedOperator:
+    @staticmethod
+    def by_columns(
+        data: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        columns: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        dim: typing.SupportsInt | typing.SupportsIndex,
+    ) -> CondensedOperator: ...
     def __init__(
         self,
         W: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],

@@ -6,10 +6,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+import scipy.sparse
 from condensed_scenes import judge
 
 from benchmarks.rigid_family import KINDS, problem
-from dolfinx_contact import CondensedNotConverged, Friction
+from dolfinx_contact import CondensedNotConverged, Friction, _kernel
 from dolfinx_contact.solvers.condensed_newton import solve_condensed
 
 pytestmark = pytest.mark.filterwarnings("ignore::dolfinx_contact.checks.RoundingWarning")
@@ -89,6 +90,88 @@ def test_sparse_and_dense_storage():
     dense = check(hidden, scene.q, Friction(0.4), 0.4)
     size = np.abs(scene.q).max()  # reactions are not unique, velocities of this scene are
     assert np.abs(sparse.displacement - dense.displacement).max() <= 1e-6 * size
+
+
+def test_any_sparse_storage():
+    """Formats, number types, entries given twice or given as zero: to the last bit the same answer as of the
+    array, with friction and without; with principal axes accepted by the judge.  What is not finite is refused."""
+    scene = problem("wall", 16, 3, mu=0.4)  # more than 64 contacts
+    n = len(scene.q)
+    angle = np.linspace(0, 3, n)
+    axes = np.column_stack((np.cos(angle), np.sin(angle)))
+    for law in (Friction(scene.mu), Friction(0.0), Friction((0.4, 0.2), axes=axes)):
+        whole = solve_condensed(scene.W.toarray(), scene.q, law).reaction
+        twice = scipy.sparse.coo_matrix(scene.W)
+        half = (np.tile(twice.data, 2) / 2, (np.tile(twice.row, 2), np.tile(twice.col, 2)))
+        zeros = scene.W.tolil()
+        zeros[0, -1] = 1.0
+        zeros = zeros.tocsr()
+        zeros.data[zeros.indptr[1] - 1] = 0.0
+        for W in (
+            scene.W.tocsr(), scene.W.tocsc(), twice, scipy.sparse.coo_matrix(half), zeros,
+            scipy.sparse.csr_array(scene.W),
+        ):  # fmt: skip
+            before = W.copy()
+            found = solve_condensed(W, scene.q, law).reaction
+            if law.axes is None:
+                assert np.array_equal(found, whole)
+            else:
+                assert judged(scene, law, found) and judged(scene, law, whole)
+            assert (W != before).nnz == 0  # the user's own stays what it was
+    counts = scipy.sparse.identity(3 * n, dtype=int)
+    q = np.tile([0.0, 0.0, -1.0], (n, 1))
+    assert np.allclose(solve_condensed(counts, q, Friction(0.3)).reaction, -q)
+    bad = scipy.sparse.identity(3 * n, format="csr") * np.nan
+    with pytest.raises(ValueError, match="W"):
+        solve_condensed(bad, q, Friction(0.3))
+
+
+def judged(scene, law, reaction) -> bool:
+    """Whether the judge accepts reactions with principal axes of friction."""
+    n, turns = len(reaction), np.tile(np.eye(3), (len(reaction), 1, 1))
+    turns[:, 0, :2], turns[:, 1, 0], turns[:, 1, 1] = law.axes, -law.axes[:, 1], law.axes[:, 0]
+    along = np.zeros((3 * n, 3 * n))
+    for i, turn in enumerate(turns):
+        along[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = turn
+    q, r = (np.einsum("nij,nj->ni", turns, v) for v in (scene.q, reaction))
+    return max(judge(along @ scene.W.toarray() @ along.T, q, law.mu, law.p, r)) <= 2 * TOL
+
+
+def test_columns_of_the_kernel_are_checked():
+    """Columns whose rows are out of order, out of range or too few are a ValueError, not a crash."""
+    good = scipy.sparse.identity(210, format="csc")
+    make = _kernel.CondensedOperator.by_columns
+    assert make(good.data, good.indices, good.indptr, 3).nodes == 70
+    for name, at, value in (
+        ("rows", 5, 210), ("rows", 5, -1), ("columns", 3, 9), ("columns", 0, 1), ("columns", 210, 209),
+        ("columns", 4, 2),
+    ):  # fmt: skip
+        arrays = {"rows": good.indices.copy(), "columns": good.indptr.copy()}
+        arrays[name][at] = value
+        with pytest.raises(ValueError, match="by columns"):
+            make(good.data, arrays["rows"], arrays["columns"], 3)
+    with pytest.raises(ValueError, match="square"):
+        make(good.data[:-1], good.indices[:-1], good.indptr[:-1], 3)
+    with pytest.raises(ValueError, match="negative normal"):
+        make(-good.data, good.indices, good.indptr, 3)
+
+
+def test_alternating_directions_come_first():
+    """A pile whose factors fill up and one whose factors do not are solved by Newton's method after few alternating
+    directions, a pile where these stay far away by other methods; with reactions to start from Newton's method is first."""
+    branch = {}
+    for kind, motion in (
+        ("capsules", 0.0),
+        ("tower", 0.0),
+        ("spheres", 1.0),
+    ):  # at rest, at rest, moving
+        scene = problem(kind, 32, 0, motion=motion)
+        found = check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=20)
+        branch[kind] = found.branch
+        assert found.tried[0].branch == "splitting"
+        again = check(scene.W, scene.q, Friction(scene.mu), scene.mu, r0=found.reaction)
+        assert again.branch == "newton" and again.iterations <= 1
+    assert branch["capsules"] == branch["tower"] == "splitting" != branch["spheres"]
 
 
 def random_contact(rng, dim):

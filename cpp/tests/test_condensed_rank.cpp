@@ -100,6 +100,44 @@ TEST(CondensedRank, SparseFactorsOfOneMatrixAfterTheOther) {
     }
 }
 
+namespace {
+/// An operator of W, which is sparse, and its views are those of the dense one.
+void check_sparse(const Operator &op, const MatrixXd &W, Random &random) {
+    const Index nodes = op.nodes(), size = W.rows();
+    ASSERT_TRUE(op.pattern() != nullptr);
+    Index blocks = 0;
+    for (Index j = 0; j < nodes; ++j) {
+        std::vector<Index> expected;
+        for (Index i = 0; i < nodes; ++i)
+            if (i == j || !W.block<3, 3>(3 * i, 3 * j).isZero(0.0)) {
+                EXPECT_EQ(op.pattern()->block<3>(j, static_cast<Index>(expected.size())),
+                          (W.block<3, 3>(3 * i, 3 * j)));
+                EXPECT_EQ(op.pattern()->block<1>(j, static_cast<Index>(expected.size())).value(),
+                          W(3 * i + 2, 3 * j + 2));
+                expected.push_back(i);
+            }
+        EXPECT_EQ(op.pattern()->moved_by(j), expected) << j;
+        blocks += static_cast<Index>(expected.size());
+    }
+    EXPECT_EQ(op.pattern()->blocks(), blocks);
+    EXPECT_EQ(op.W().symmetric(), W == W.transpose());
+    EXPECT_EQ(op.W().dense(), W);
+    EXPECT_EQ(op.W().diagonal(), W.diagonal());
+    EXPECT_EQ(op.W().block<3>(1, 2), (W.block<3, 3>(3, 6)));
+    EXPECT_EQ(op.W()(4, 7), W(4, 7));
+    EXPECT_NEAR(op.W().norm(), W.cwiseAbs().colwise().sum().maxCoeff(), 1e-14 * op.W().norm());
+    const auto normal = Eigen::seqN(Index{2}, nodes, Index{3});
+    EXPECT_EQ(op.normal().dense(), W(normal, normal));
+    EXPECT_NEAR(op.mean_normal(), W.diagonal()(normal).cwiseAbs().mean(), 1e-14 * W.norm());
+    const VectorXd x = VectorXd::NullaryExpr(size, [&] { return random.normal(); }), b = -W * x;
+    const double rounding = 1e-15 * (W.cwiseAbs() * x.cwiseAbs()).norm();
+    EXPECT_LT((op.W() * x - W * x).norm(), 10.0 * rounding);
+    EXPECT_LT((op.W().magnitudes(x) - W.cwiseAbs() * x.cwiseAbs()).norm(), 10.0 * rounding);
+    const VectorXl exact = W.cast<Real>() * x.cast<Real>() + b.cast<Real>();
+    EXPECT_LT((op.W().accurate(b, x) - exact).norm(), 1e-3 * rounding);
+}
+} // namespace
+
 TEST(CondensedRank, ASparseMatrixIsTheDenseOne) {
     constexpr Index nodes = 100, size = 3 * nodes;
     Random random(4);
@@ -108,20 +146,28 @@ TEST(CondensedRank, ASparseMatrixIsTheDenseOne) {
         W.topLeftCorner(60, 60) += low_rank(random, 60, 20, uneven, 60); // some contacts have many
         if (uneven == 0.0)
             W = MatrixXd(W + W.transpose());
-        const Operator op(W, 3);
-        ASSERT_EQ(op.pattern().size(), nodes);
-        for (Index j = 0; j < nodes; ++j) {
-            std::vector<Index> expected;
-            for (Index i = 0; i < nodes; ++i)
-                if (i == j || !W.block<3, 3>(3 * i, 3 * j).isZero(0.0))
-                    expected.push_back(i);
-            EXPECT_EQ(op.pattern()[static_cast<std::size_t>(j)], expected) << j;
-        }
-        const VectorXd x = VectorXd::NullaryExpr(size, [&] { return random.normal(); }), b = -W * x;
-        const double rounding = 1e-15 * (W.cwiseAbs() * x.cwiseAbs()).norm();
-        EXPECT_LT((op.W() * x - W * x).norm(), 10.0 * rounding);
-        const VectorXl exact = W.cast<Real>() * x.cast<Real>() + b.cast<Real>();
-        EXPECT_LT((op.W().accurate(b, x) - exact).norm(), 1e-3 * rounding);
+        check_sparse(Operator(W, 3), W, random);
+        check_sparse(Operator(Sparse(W.sparseView(0.0, 0.0)), 3), W, random);
+        const Operator few(Sparse(W.topLeftCorner(30, 30).sparseView()), 3); // few contacts
+        EXPECT_TRUE(few.pattern() == nullptr);
+        EXPECT_EQ(few.W().dense(), W.topLeftCorner(30, 30));
+        const auto found = product(Operator(W, 3).W(), 0.6);
+        ASSERT_TRUE(found.has_value());
+        EXPECT_LT((found->C * found->X - W).norm(), 1e-9 * W.norm());
     }
-    EXPECT_TRUE(Operator(MatrixXd::Ones(size, size), 3).pattern().empty());
+    EXPECT_TRUE(Operator(MatrixXd::Ones(size, size), 3).pattern() == nullptr);
+    EXPECT_TRUE(Operator(Sparse(MatrixXd::Ones(size, size).sparseView()), 3).pattern() == nullptr);
+}
+
+TEST(CondensedRank, TheInverseOfASparseMatrix) {
+    constexpr Index size = 300;
+    Random random(5);
+    MatrixXd W = low_rank(random, size, size / 3, 0.0, 4);
+    Operator singular(Sparse(W.sparseView()), 3);
+    EXPECT_FALSE(singular.prepare());
+    EXPECT_TRUE(singular.inverse() == nullptr);
+    W.diagonal().array() += 1.0;
+    Operator regular(Sparse(W.sparseView()), 3);
+    ASSERT_TRUE(regular.prepare());
+    EXPECT_LT((regular.inverse()->dense() * W - MatrixXd::Identity(size, size)).norm(), 1e-8);
 }

@@ -39,10 +39,12 @@ void check(int seed, Index nodes, Index reach) {
     VectorXd r = VectorXd::Zero(size), shuffled = r;
     ASSERT_TRUE(sweeps.run(r, 1e-13, 1000, budget));
     ASSERT_TRUE(sweeps.run(shuffled, 1e-13, 1000, budget, &order));
-    Splitting<2> splitting(system);
-    splitting.run(1e-13, 10000, budget);
     EXPECT_LT((shuffled - r).norm(), 1e-10 * r.norm()) << seed;
-    EXPECT_LT((splitting.reactions() - r).norm(), 1e-10 * r.norm()) << seed;
+    for (const double rho : {0.01, 0.3}) {
+        Splitting<2> splitting(system, rho);
+        splitting.run(1e-13, 10000, budget);
+        EXPECT_LT((splitting.reactions() - r).norm(), 1e-10 * r.norm()) << seed << " " << rho;
+    }
     const VectorXd w = system.left.cwiseProduct(q + W * system.right.cwiseProduct(shuffled));
     for (Index i = 0; i < nodes; ++i) {
         const Eigen::Vector2d r_t = shuffled.segment<2>(3 * i), w_t = w.segment<2>(3 * i);

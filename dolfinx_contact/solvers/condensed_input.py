@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from dolfinx_contact.checks import finite
@@ -19,7 +21,7 @@ def checked_problem(q, W, friction, r0) -> tuple:
     if q.size == 0:
         raise ValueError(f"q is empty, of shape {q.shape}: there is no contact to solve for.")
     q = q.reshape(-1, dim)
-    W = _all_entries(W)
+    W = checked_compliance(W)
     if W.shape != (q.size, q.size):
         raise ValueError(
             f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
@@ -42,7 +44,7 @@ def checked_problem(q, W, friction, r0) -> tuple:
         if rows is not None and rows.ndim == 2 and len(rows) != len(q):
             raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")
     friction.law(dim)  # refuses what has no meaning in two dimensions
-    diagonal = np.diag(W)
+    diagonal = W.diagonal()
     if (diagonal < 0).any():
         at = max(np.flatnonzero(diagonal < 0), key=lambda k: k % dim)  # a normal one, if there is
         direction = "normal" if at % dim == dim - 1 else "tangential"
@@ -57,13 +59,16 @@ def checked_problem(q, W, friction, r0) -> tuple:
     return q, W, friction, r0
 
 
-def _all_entries(W) -> np.ndarray:
-    """``W``, dense or sparse, as an array; that of the user if it is of the type."""
-    if not hasattr(W, "toarray"):
+def checked_compliance(W) -> Any:
+    """``W`` as an array, that of the user if it is of the type; or by columns, sorted, if it is sparse."""
+    if not hasattr(W, "tocsc"):
         return finite("W", W, copy=False)
-    W = W.tocsr()
+    given, W = W, W.tocsc()
     finite("W", W.data, copy=False)
-    return W.toarray().astype(np.float64, copy=False)
+    W = W.astype(np.float64, copy=W is given)
+    W.sum_duplicates()
+    W.eliminate_zeros()
+    return W
 
 
 def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:

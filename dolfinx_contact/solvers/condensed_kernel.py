@@ -21,5 +21,11 @@ def fastest(dim: int) -> Any:
 
 
 def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
-    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones."""
-    return fastest(dim).CondensedOperator(W, dim, tied)
+    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones.
+
+    A sparse ``W`` is by columns, sorted, and has no tied rows.
+    """
+    kernel = fastest(dim).CondensedOperator
+    if hasattr(W, "indptr"):
+        return kernel.by_columns(W.data, W.indices, W.indptr, dim)
+    return kernel(W, dim, tied)

@@ -14,7 +14,11 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.solvers.condensed_input import checked_problem, principal_axes
+from dolfinx_contact.solvers.condensed_input import (
+    checked_compliance,
+    checked_problem,
+    principal_axes,
+)
 from dolfinx_contact.solvers.condensed_kernel import condensed_operator
 from dolfinx_contact.solvers.condensed_result import (
     Attempt,
@@ -150,8 +154,8 @@ def solve_condensed(
 
     Args:
         W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix.  May be
-            rank-deficient and slightly unsymmetric.  Stored as a dense matrix; products, sweeps and
-            factors leave out its zeros if it couples a contact to few others, however it was given.
+            rank-deficient and slightly unsymmetric.  Of 64 contacts or more it is kept without its
+            zeros if no more than a fifth of its entries are others, however it was given.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
         friction: A ``Friction``, of coefficients for all contacts or ``shape=(n, 2)`` for each; or an array of one
             coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
@@ -208,8 +212,10 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     options = {"slip_tol": None, "max_iterations": most, "fallbacks": cheap}
     finer = CondensedNewton(**vars(solver) | options)
     for factor in (1e-2, 1e-4):
-        if found.change <= tol or found.error <= found.rounding:
+        if found.change <= tol or found.error <= 10 * found.rounding:
             break
+        if max(found.error, found.slip_error) <= factor * tol:
+            continue
         try:
             nearer = finer.solve_condensed(
                 operator, friction, q, max(factor * tol, 1e-14), [found.reaction]
@@ -228,9 +234,14 @@ def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return np.einsum("nij,nj->ni", turns, vectors)
 
 
-def _turned_matrix(W: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def _turned_matrix(W: Any, turns: np.ndarray) -> Any:
     """``W`` along the principal axes."""
     n, dim, _ = turns.shape
+    if not isinstance(W, np.ndarray):
+        from scipy.sparse import block_diag
+
+        by_contact = block_diag(list(turns), format="csc")
+        return checked_compliance(by_contact @ W @ by_contact.T)
     blocks = W.reshape(n, dim, n, dim)
     return np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
 

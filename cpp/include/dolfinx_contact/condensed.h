@@ -40,14 +40,15 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (op_.nodes() == 1 && op_.tied() == 0 &&
             attempt("one contact", [this] { this->one_contact(); }))
             return;
-        const bool sparse = !op_.pattern().empty();
+        const bool sparse = op_.pattern() != nullptr;
         VectorXd end; // of the interior point method
         const auto interior = [&] {
             return end.size() == 0 && InteriorPoint<T>::applies(scaling_.make()) &&
                    attempt("interior point", [&] { end = this->interior(); });
         };
         // of many contacts without a start few are solved by Newton's method alone
-        if (sparse && options_.fallbacks && given.isZero(0.0) && interior())
+        if (sparse && options_.fallbacks && given.isZero(0.0) &&
+            (attempt("splitting", [this] { this->near(); }) || interior()))
             return;
         if (attempt("newton", [&] { this->newton(given); }) || !options_.fallbacks)
             return;

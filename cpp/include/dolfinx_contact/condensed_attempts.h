@@ -18,6 +18,7 @@
 namespace dolfinx_contact::condensed {
 /// Methods that come from zero to where Newton's method may start, and where they are.
 template <int T> struct Wandering {
+    static constexpr double rho = 0.3; // of alternating directions that do not converge
     Sweeps<T> sweeps;
     Splitting<T> splitting;
     VectorXd swept;
@@ -27,7 +28,7 @@ template <int T> struct Wandering {
     double least_swept = std::numeric_limits<double>::infinity(), least_split = least_swept;
 
     explicit Wandering(const System<T> &system)
-        : sweeps(system), splitting(system), swept(VectorXd::Zero(system.size())) {}
+        : sweeps(system), splitting(system, rho), swept(VectorXd::Zero(system.size())) {}
 };
 
 /// P tangential directions, T of them with friction (T = P or 0).
@@ -56,18 +57,30 @@ template <int T, int P> class Attempts {
         }
         return best_.converged;
     }
-    void set_change(Newton<T> &newton, const System<T> &system, const VectorXd &r) {
-        const VectorXd change = system.right.cwiseProduct(newton.next_change(r));
+    /// By how much Newton's next step would move reactions. Where that is much it is taken if it
+    /// leaves smaller errors; of a sparse W, the factors of which cost far more than the step.
+    void set_change(Newton<T> &newton, System<T> &system, const VectorXd &r) {
+        const VectorXd next = newton.next(r),
+                       change = system.right.cwiseProduct(next - newton.mapped());
         best_.change = scaling_.contact_part(change).norm() / best_.acting;
+        if (system.pattern == nullptr || !best_.converged || best_.change <= options_.tol)
+            return;
+        const Solution before = best_;
+        State<T> state;
+        state.evaluate(system, next, system.displacement(next));
+        certify(system, state.mapped());
+        if (worst(before) < worst(best_))
+            best_ = before;
+        best_.change = before.change;
     }
 
     /// Newton's method to the tolerance, judged on physical reactions.
-    void finish(System<T> &system, VectorXd &r) {
+    void finish(System<T> &system, VectorXd &r) { finish(system, r, options_.newton_iterations); }
+    void finish(System<T> &system, VectorXd &r, int iterations) {
         const auto certified = [&](const VectorXd &mapped) { return certify(system, mapped); };
         const double target = 1e3 * std::min(options_.tol, options_.slip_tol);
         Newton<T> newton(system);
-        if (newton.solve(r, target, budget_, options_.newton_iterations, certified) ==
-            End::converged) {
+        if (newton.solve(r, target, budget_, iterations, certified) == End::converged) {
             set_change(newton, system, r);
         } else {
             State<T> state;
@@ -100,6 +113,30 @@ template <int T, int P> class Attempts {
         System<T> system = scaling_.make();
         system.rho_t *= tangential;
         finish(system, r);
+    }
+
+    /// Newton's method after a few alternating directions, while these come nearer to a solution.
+    /// Where factors have few entries only at first: an iteration is not much cheaper there than
+    /// one with new factors.
+    void near() {
+        constexpr int iterations = 15, few = 8, most = 10;
+        constexpr double close_at_once = 1.5e-2, close = 1e-3, far = 0.3, faster = 0.7,
+                         filled = 0.1;
+        constexpr double rho = 0.03; // small ones are quickest where all goes well
+        System<T> system = scaling_.make();
+        Splitting<T> splitting(system, rho);
+        double limit = far;
+        for (int k = 0; k < most && (k == 0 || splitting.fill() > filled); ++k, limit *= faster) {
+            splitting.run(0.0, iterations, budget_);
+            VectorXd r = splitting.reactions();
+            State<T> state;
+            state.evaluate(system, r, system.displacement(r));
+            const double left = std::sqrt(2.0 * state.merit) / r.norm();
+            if (left < (k == 0 ? close_at_once : close))
+                return finish(system, r, few);
+            if (!(left < limit))
+                return;
+        }
     }
 
     /// Newton's method from the end of the interior point method, which is returned.

@@ -44,7 +44,7 @@ template <int T> class BlockSolver {
     }
 
     /// With the last factors. Those by rank lose digits; where refinement does not give back as
-    /// many as a step needs, the dense ones are made.
+    /// many as a step needs, others are made.
     VectorXd solve(const VectorXd &rhs) {
         constexpr double accuracy = 1e-10, needed = 1e-6;
         constexpr int refinements = 3;
@@ -57,10 +57,14 @@ template <int T> class BlockSolver {
             if (rest.norm() <= needed * rhs.norm())
                 return x;
             by_rank_ = false;
-            factor_dense();
+            if (system_.pattern == nullptr || !factor_sparse())
+                factor_dense();
         }
         return linear_.again(rhs);
     }
+
+    /// The entries of the last factors over those of dense ones; of sparse W.
+    double fill() const { return linear_.fill(); }
 
   private:
     const Product *product() const {
@@ -105,13 +109,13 @@ template <int T> class BlockSolver {
 
     bool factor_sparse() {
         Eigen::SparseMatrix<double> J(system_.size(), system_.size());
-        J.reserve(entries());
+        J.reserve(D * D * system_.pattern->blocks());
         Blocks column;
         for (Index j = 0; j < system_.nodes; ++j) {
-            const std::vector<Index> &contacts = (*system_.pattern)[of(j)];
+            const std::vector<Index> &contacts = system_.pattern->moved_by(j);
             column.clear();
-            for (const Index i : contacts)
-                column.push_back(block(i, j));
+            for (std::size_t a = 0; a < contacts.size(); ++a)
+                column.push_back(block(contacts[a], j, static_cast<Index>(a)));
             for (int k = 0; k < D; ++k) {
                 J.startVec(D * j + k);
                 for (std::size_t a = 0; a < contacts.size(); ++a)
@@ -122,19 +126,11 @@ template <int T> class BlockSolver {
         J.finalize();
         return linear_.factor(J);
     }
-    Index entries() const {
-        std::size_t blocks = 0;
-        for (const auto &contacts : *system_.pattern)
-            blocks += contacts.size();
-        return D * D * static_cast<Index>(blocks);
-    }
-    /// Of the matrix, at contacts i and j.
-    Block block(Index i, Index j) const {
-        Block found;
-        for (int k = 0; k < D; ++k)
-            for (int l = 0; l < D; ++l)
-                found(k, l) = system_.left[D * i + k] * (*system_.W)(D * i + k, D * j + l) *
-                              system_.right[D * j + l];
+    /// Of the matrix, at contact j and its a-th one, i.
+    Block block(Index i, Index j, Index a) const {
+        Block found = system_.left.template segment<D>(D * i).asDiagonal() *
+                      system_.pattern->template block<D>(j, a) *
+                      system_.right.template segment<D>(D * j).asDiagonal();
         if (!B_.empty())
             found *= B_[of(j)];
         if (i == j)

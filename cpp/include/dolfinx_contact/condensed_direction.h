@@ -61,7 +61,7 @@ template <int T> class Direction {
         return same_factors_;
     }
     /// Whether another step with the last factors costs far less than one with factors of its own.
-    bool worth_keeping() const { return linear_.in_single(); }
+    bool worth_keeping() const { return linear_.of_many(); }
 
   private:
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
@@ -136,11 +136,16 @@ template <int T> class Direction {
                 const Index j = active_[b];
                 rows.clear();
                 column.clear();
-                for (const Index i : in(*system_.pattern, j))
-                    if (const Index a = in(position, i); a >= 0) {
+                const std::vector<Index> &contacts = system_.pattern->moved_by(j);
+                for (std::size_t c = 0; c < contacts.size(); ++c)
+                    if (const Index i = contacts[c], a = in(position, i); a >= 0) {
+                        auto block = system_.pattern->template block<D>(j, static_cast<Index>(c));
+                        if (i == j)
+                            block.diagonal().array() += system_.shift + shift;
                         rows.push_back(i);
-                        column.push_back(coupled(i, j, in(to_, a), from_[b],
-                                                 i == j ? system_.shift + shift : 0.0));
+                        column.emplace_back(in(to_, a) * block * from_[b]);
+                        if (i == j)
+                            column.back() += in(steps_, i).G;
                     }
                 for (int k = 0; k < in(steps_, j).m; ++k) {
                     J.startVec(offset(j) + k);
@@ -155,25 +160,7 @@ template <int T> class Direction {
         }
         return VectorXd::Zero(unknowns);
     }
-    /// Of a sparse J, at contacts i and j.
-    Eigen::Matrix<double, D, D> coupled(Index i, Index j, const Eigen::Matrix<double, D, D> &to,
-                                        const Eigen::Matrix<double, D, D> &from,
-                                        double shift) const {
-        Eigen::Matrix<double, D, D> block;
-        for (int k = 0; k < D; ++k)
-            for (int l = 0; l < D; ++l)
-                block(l, k) = (*system_.W)(D * i + l, D * j + k) + (k == l ? shift : 0.0);
-        Eigen::Matrix<double, D, D> found = to * block * from;
-        if (i == j)
-            found += in(steps_, i).G;
-        return found;
-    }
-    double mean_normal() const {
-        double mean = 0.0;
-        for (Index i = 0; i < system_.nodes; ++i)
-            mean += std::abs((*system_.W)(D * i + T, D * i + T));
-        return mean / static_cast<double>(system_.nodes);
-    }
+    double mean_normal() const { return system_.W->mean_magnitude(T, system_.nodes, D); }
 
     /// Rows and columns of J of tied rows, which are the last ones.
     void tie(const Square &matrix, const VectorXd &left, const VectorXd &right) {

@@ -26,7 +26,7 @@ inline VectorXd closing_forces(const Operator &op, const VectorXd &q_n, Budget &
     system.tied = 0;
     system.W = &op.normal();
     system.inverse = nullptr;
-    system.pattern = op.pattern().empty() ? nullptr : &op.pattern();
+    system.pattern = op.pattern();
     system.left = VectorXd::Constant(q_n.size(), 1.0 / length);
     system.right = VectorXd::Constant(q_n.size(), length / compliance);
     system.smooth.assign(static_cast<std::size_t>(q_n.size()), true);

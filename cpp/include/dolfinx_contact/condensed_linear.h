@@ -63,8 +63,10 @@ class LinearSolver {
         return static_cast<double>(sparse_.nnzL() + sparse_.nnzU()) / (n * n);
     }
 
-    /// Whether there are factors in single precision, which many unknowns have.
-    bool in_single() const { return kind_ == Kind::in_single && single_.rows() > 0; }
+    /// Whether there are factors of many unknowns: in single precision, or sparse ones.
+    bool of_many() const {
+        return (kind_ == Kind::in_single && single_.rows() > 0) || kind_ == Kind::sparse;
+    }
 
     /// With the factors of the last matrix; those in single precision are not refined.
     VectorXd again(const VectorXd &rhs) const {

@@ -36,20 +36,26 @@ class AccurateSums {
     VectorXd high_, low_;
 };
 
-/// A square matrix of which all or, if it is symmetric, one triangle is stored; a view.
+using Sparse = Eigen::SparseMatrix<double>;
+
+/// A square matrix of which all or, if it is symmetric, one triangle is stored, or all entries but
+/// the zeros; a view.
 class Square {
   public:
     enum class Part { all, lower, upper };
 
     Square(const double *values, Index size, Index stride, Part part)
         : values_(values, size, size, Eigen::OuterStride<>(stride)), part_(part) {}
+    Square(const Sparse &sparse, bool symmetric)
+        : values_(nullptr, sparse.rows(), sparse.cols(), Eigen::OuterStride<>(sparse.rows())),
+          part_(symmetric ? Part::upper : Part::all), sparse_(&sparse) {}
 
     Index size() const { return values_.rows(); }
     bool symmetric() const { return part_ != Part::all; }
-    auto diagonal() const { return values_.diagonal(); }
-
-    /// The same entries without the zeros, for products; null for none. Not owned.
-    void set_sparse(const Eigen::SparseMatrix<double> *sparse) { sparse_ = sparse; }
+    const Sparse *sparse() const { return sparse_; } ///< null if it is stored as a dense one
+    VectorXd diagonal() const {
+        return sparse_ != nullptr ? VectorXd(sparse_->diagonal()) : VectorXd(values_.diagonal());
+    }
 
     VectorXd operator*(const VectorXd &x) const {
         VectorXd y = VectorXd::Zero(size());
@@ -90,7 +96,7 @@ class Square {
         AccurateSums y(b);
         if (sparse_ != nullptr) {
             for (Index j = 0; j < size(); ++j)
-                for (Eigen::SparseMatrix<double>::InnerIterator at(*sparse_, j); at; ++at)
+                for (Sparse::InnerIterator at(*sparse_, j); at; ++at)
                     y.add(at.row(), at.value(), x[j]);
             return y.sums();
         }
@@ -106,12 +112,16 @@ class Square {
     }
 
     double operator()(Index i, Index j) const {
+        if (sparse_ != nullptr)
+            return sparse_->coeff(i, j);
         const bool transposed = part_ == Part::lower ? i < j : part_ == Part::upper && i > j;
         return transposed ? values_(j, i) : values_(i, j);
     }
 
     /// All entries.
     MatrixXd dense() const {
+        if (sparse_ != nullptr)
+            return *sparse_;
         if (part_ == Part::lower)
             return values_.selfadjointView<Eigen::Lower>();
         if (part_ == Part::upper)
@@ -119,13 +129,16 @@ class Square {
         return values_;
     }
 
-    /// First and last + 1 of the rows of column j that are stored; works for blocks, too.
+    /// First and last + 1 of the rows of column j that are stored; works for blocks, too. Not of a
+    /// sparse one.
     std::pair<Index, Index> stored(Index j, Index rows) const {
         return {part_ == Part::lower ? j : 0, part_ == Part::upper ? j + 1 : rows};
     }
 
     /// The entries that couple node i to node j; of a symmetric matrix only where they are stored.
     template <int D> Eigen::Matrix<double, D, D> block(Index i, Index j) const {
+        if (sparse_ != nullptr)
+            return sparse_->block(D * i, D * j, D, D).toDense();
         Eigen::Matrix<double, D, D> found = values_.block<D, D>(D * i, D * j);
         if (i == j && part_ == Part::lower)
             found = Eigen::Matrix<double, D, D>(found.template selfadjointView<Eigen::Lower>());
@@ -134,10 +147,18 @@ class Square {
         return found;
     }
 
+    /// Of so many entries of the diagonal, from the first one on, every `step`-th.
+    double mean_magnitude(Index first, Index count, Index step) const {
+        const VectorXd entries = diagonal().cwiseAbs();
+        return count > 0 ? entries(Eigen::seqN(first, count, step)).mean() : 0.0;
+    }
+
     /// Largest sum of magnitudes in a column.
     double norm() const {
         VectorXd sums = VectorXd::Zero(size());
-        for (Index j = 0; j < size(); ++j) {
+        if (sparse_ != nullptr)
+            sums = sparse_->cwiseAbs().transpose() * VectorXd::Ones(size());
+        for (Index j = 0; j < size() && sparse_ == nullptr; ++j) {
             const auto [first, last] = stored(j, size());
             const auto column = values_.col(j).segment(first, last - first).cwiseAbs();
             if (symmetric()) {
@@ -152,11 +173,8 @@ class Square {
   private:
     Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> values_;
     Part part_;
-    const Eigen::SparseMatrix<double> *sparse_ = nullptr;
+    const Sparse *sparse_ = nullptr;
 };
-
-/// For every contact those that its reaction moves; empty where that is more than a few of them.
-using Pattern = std::vector<std::vector<Index>>;
 
 /// Inverts a symmetric positive definite matrix in place, lower triangle, by halves: n^3
 /// operations, where factors and solves for the columns of the identity take 7/3 n^3. False, and

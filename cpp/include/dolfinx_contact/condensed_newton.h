@@ -106,18 +106,19 @@ template <int T> class Newton {
         }
     }
 
-    /// By how much the next step from r would move what the law returns there. After convergence
-    /// with the factors of the last step where they still fit, which then costs no more than
-    /// products with W.
-    VectorXd next_change(const VectorXd &r) {
+    /// Where the next step from r leads. After convergence with the factors of the last step where
+    /// they still fit, which then costs no more than products with W.
+    VectorXd next(const VectorXd &r) {
         if (at_.size() == 0 || at_ != r) {
             w_ = system_.displacement(r);
             state_.evaluate(system_, r, w_);
         }
         VectorXd dr, dw;
         direction_.find(state_, r, w_, dr, dw, Direction<T>::Factors::last_for_change);
-        return r + dr - state_.mapped();
+        return r + dr;
     }
+    /// The reactions that the law returns there, before the step.
+    VectorXd mapped() const { return state_.mapped(); }
 
   private:
     /// A step with the last factors, if they are those of a state nearby and leave a tenth of the

@@ -10,9 +10,9 @@
 
 namespace dolfinx_contact::condensed {
 /// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse when
-/// that begins to pay. If W is symmetric to the last bit, one triangle of it is kept, and its
-/// inverse by Cholesky in the other triangle of the same array, which has one column more; else
-/// both are whole.
+/// that begins to pay. A sparse one is kept without its zeros. Of one that is not, if it is
+/// symmetric to the last bit, one triangle is kept, and its inverse by Cholesky in the other
+/// triangle of the same array, which has one column more; else both are whole.
 ///
 /// The last `tied` rows are bilateral: w_c = 0, r_c of any sign. Of them W may be indefinite or
 /// zero.
@@ -25,58 +25,68 @@ class Operator {
     template <class Derived>
     Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0)
         : size_(W.rows()), tied_(tied), dim_(dim),
-          symmetric_((W.array() == W.transpose().array()).all()),
-          values_(size_, size_ + (symmetric_ ? 1 : 0)),
-          W_(view(values_.data() + (symmetric_ ? size_ : 0), Square::Part::upper)) {
-        if (symmetric_)
-            values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
-        else
-            values_ = W;
-        find_pattern();
+          symmetric_((W.array() == W.transpose().array()).all()) {
+        if (!zeros_pay() || !take_sparse(W))
+            take_dense(W);
+    }
+    Operator(Sparse W, int dim, Index tied = 0)
+        : size_(W.rows()), tied_(tied), dim_(dim), symmetric_(is_symmetric(W)),
+          sparse_(std::move(W)) {
+        if (!zeros_pay() || !is_sparse(sparse_.nonZeros())) {
+            take_dense(MatrixXd(sparse_));
+            sparse_ = {};
+        } else {
+            set_sparse();
+        }
     }
     Operator(const Operator &) = delete; // views look into it
 
-    const Square &W() const { return W_; }
+    const Square &W() const { return *W_; }
     int dim() const { return dim_; }
     Index nodes() const { return (size_ - tied_) / dim_; }
     Index tied() const { return tied_; }
 
     /// Rows and columns of the normal components and of tied rows.
     const Square &normal() const {
-        if (!normal_) {
-            std::vector<Index> rows;
-            for (Index i = 0; i < nodes(); ++i)
-                rows.push_back(dim_ * i + dim_ - 1);
-            for (Index c = 0; c < tied_; ++c)
-                rows.push_back(dim_ * nodes() + c);
-            normal_values_ = W_.dense()(rows, rows);
-            const Index size = normal_values_.rows();
-            normal_.emplace(normal_values_.data(), size, size,
-                            symmetric_ ? Square::Part::lower : Square::Part::all);
+        if (normal_)
+            return *normal_;
+        std::vector<Index> rows;
+        for (Index i = 0; i < nodes(); ++i)
+            rows.push_back(dim_ * i + dim_ - 1);
+        for (Index c = 0; c < tied_; ++c)
+            rows.push_back(dim_ * nodes() + c);
+        const auto size = static_cast<Index>(rows.size());
+        if (pattern_) {
+            normal_sparse_.resize(size, size);
+            for (Index j = 0; j < size; ++j) {
+                normal_sparse_.startVec(j);
+                const auto &contacts = pattern_->moved_by(j);
+                for (std::size_t a = 0; a < contacts.size(); ++a)
+                    normal_sparse_.insertBack(contacts[a], j) =
+                        pattern_->block<1>(j, static_cast<Index>(a)).value();
+            }
+            normal_sparse_.finalize();
+            return normal_.emplace(normal_sparse_, symmetric_);
         }
-        return *normal_;
+        normal_values_ = W_->dense()(rows, rows);
+        return normal_.emplace(normal_values_.data(), size, size,
+                               symmetric_ ? Square::Part::lower : Square::Part::all);
     }
 
     /// W as a product, if its rank is low.
-    const LazyProduct &product() const { return product_; }
+    const LazyProduct &product() const { return *product_; }
 
-    /// Empty if W is not sparse.
-    const Pattern &pattern() const { return pattern_; }
+    /// Null if W is not sparse.
+    const Pattern *pattern() const { return pattern_ ? &*pattern_ : nullptr; }
 
     /// Mean magnitude of the normal compliance of a contact.
-    double mean_normal() const {
-        double mean = 0.0;
-        for (Index i = 0; i < nodes(); ++i)
-            mean += std::abs(W_(dim_ * i + dim_ - 1, dim_ * i + dim_ - 1)) /
-                    static_cast<double>(nodes());
-        return mean;
-    }
+    double mean_normal() const { return W_->mean_magnitude(dim_ - 1, nodes(), dim_); }
 
     /// Largest magnitude in a tied row; one if it is zero.
     double largest_in_tied_row(Index c) const {
         double largest = 0.0;
         for (Index j = 0; j < size_; ++j)
-            largest = std::max(largest, std::abs(W_(dim_ * nodes() + c, j)));
+            largest = std::max(largest, std::abs((*W_)(dim_ * nodes() + c, j)));
         return largest > 0.0 ? largest : 1.0;
     }
 
@@ -89,53 +99,56 @@ class Operator {
         constexpr double smallest_rcond = 1e-12;
         if (inverse_ || size_ == 0)
             return true;
-        if (symmetric_) {
+        if (symmetric_ && !pattern_) {
             auto lower = values_.leftCols(size_);
             lower.triangularView<Eigen::Lower>() = values_.rightCols(size_).transpose();
             if (!invert(lower, tied_))
                 return false;
             inverse_.emplace(view(values_.data(), Square::Part::lower));
         } else {
-            inverse_values_ = values_.partialPivLu().inverse();
-            inverse_.emplace(view(inverse_values_.data(), Square::Part::all));
+            inverse_values_ = W_->dense().partialPivLu().inverse();
+            inverse_.emplace(inverse_values_.data(), size_, size_, Square::Part::all);
         }
-        if (!(inverse_->norm() * W_.norm() < 1.0 / smallest_rcond))
+        if (!(inverse_->norm() * W_->norm() < 1.0 / smallest_rcond))
             inverse_.reset();
         return inverse_.has_value();
     }
 
   private:
-    /// W is sparse if it is of many contacts and at most a tenth of its entries are not zero.
-    void find_pattern() {
-        constexpr Index densest = 10;
-        const Index n = nodes();
-        if (n < many || tied_ > 0)
-            return;
-        const auto stored = values_.rightCols(size_);
-        Eigen::SparseMatrix<double> found(size_, size_);
-        for (Index j = 0; j < size_; ++j) {
-            found.startVec(j);
-            for (Index i = 0; i < (symmetric_ ? j + 1 : size_); ++i)
-                if (stored(i, j) != 0.0)
-                    found.insertBack(i, j) = stored(i, j);
-            if (found.data().size() * (symmetric_ ? 2 : 1) * densest > size_ * size_)
-                return;
-        }
-        found.finalize();
+    /// Whether W may be stored as a sparse one: of many contacts.
+    bool zeros_pay() const { return nodes() >= many && tied_ == 0; }
+    /// Whether so few entries are not zero.
+    bool is_sparse(Index entries) const {
+        constexpr Index densest = 5;
+        return entries * densest <= size_ * size_;
+    }
+    static bool is_symmetric(const Sparse &W) {
+        const Sparse transposed = W.transpose();
+        return (W - transposed).eval().coeffs().isZero(0.0);
+    }
+    template <class Derived> void take_dense(const Eigen::MatrixBase<Derived> &W) {
+        values_.resize(size_, size_ + (symmetric_ ? 1 : 0));
         if (symmetric_)
-            sparse_ = found.selfadjointView<Eigen::Upper>();
+            values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
         else
-            sparse_.swap(found);
-        W_.set_sparse(&sparse_);
-        for (Index j = 0; j < n; ++j) {
-            std::vector<Index> contacts{j};
-            for (Index k = 0; k < dim_; ++k)
-                for (Eigen::SparseMatrix<double>::InnerIterator at(sparse_, dim_ * j + k); at; ++at)
-                    contacts.push_back(at.row() / dim_);
-            std::sort(contacts.begin(), contacts.end());
-            contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-            pattern_.push_back(std::move(contacts));
-        }
+            values_ = W;
+        set(view(values_.data() + (symmetric_ ? size_ : 0), Square::Part::upper));
+    }
+    /// The entries that are not zero, if they are few.
+    template <class Derived> bool take_sparse(const Eigen::MatrixBase<Derived> &W) {
+        if (!is_sparse((W.array() != 0.0).count()))
+            return false;
+        sparse_ = W.sparseView(0.0, 0.0);
+        set_sparse();
+        return true;
+    }
+    void set_sparse() {
+        pattern_.emplace(sparse_, dim_);
+        set(Square(sparse_, symmetric_));
+    }
+    void set(const Square &W) {
+        W_.emplace(W);
+        product_.emplace(*W_);
     }
 
     Square view(const double *values, Square::Part triangle) const {
@@ -146,12 +159,13 @@ class Operator {
     int dim_;
     bool symmetric_;
     MatrixXd values_, inverse_values_;
-    Square W_;
-    LazyProduct product_{W_};
-    Pattern pattern_;
-    Eigen::SparseMatrix<double> sparse_;
+    Sparse sparse_;
+    std::optional<Square> W_;
+    std::optional<LazyProduct> product_;
+    std::optional<Pattern> pattern_;
     std::optional<Square> inverse_;
     mutable MatrixXd normal_values_;
+    mutable Sparse normal_sparse_;
     mutable std::optional<Square> normal_;
 };
 

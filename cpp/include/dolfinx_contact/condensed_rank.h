@@ -20,8 +20,15 @@ struct Product {
 /// of matrices that are symmetric and positive semidefinite but for a little.
 class Elimination {
   public:
-    explicit Elimination(const Square &W)
-        : A_(W.dense()), symmetric_(W.symmetric()), left_(A_.diagonal()) {}
+    explicit Elimination(const Square &W) : symmetric_(W.symmetric()), left_(W.diagonal()) {
+        if (W.sparse() != nullptr) {
+            columns_ = *W.sparse();
+            if (!symmetric_)
+                rows_ = columns_.transpose();
+        } else {
+            A_ = W.dense();
+        }
+    }
 
     /// Until a part `smallest` of the largest diagonal entry is left; false if that takes more than
     /// `most` columns. Panels of columns are brought up to date at once, for the speed of matrix
@@ -29,14 +36,12 @@ class Elimination {
     bool run(double smallest, Index most) {
         constexpr double large = 0.1; // of the largest of all
         const double end = smallest * (left_.size() > 0 ? left_.maxCoeff() : 0.0);
-        const auto every = Eigen::seqN(Index{0}, A_.rows());
-        L_.resize(A_.rows(), most);
-        U_.resize(A_.rows(), most);
+        L_.resize(left_.size(), most);
+        U_.resize(left_.size(), most);
         while (left_.size() > 0 && left_.maxCoeff() > end) {
             const std::vector<Index> panel = largest_left();
-            const MatrixXd columns = brought(A_(every, panel), L_, U_, panel);
-            const MatrixXd rows =
-                symmetric_ ? columns : brought(A_(panel, every).transpose(), U_, L_, panel);
+            const MatrixXd columns = brought(columns_at(panel), L_, U_, panel);
+            const MatrixXd rows = symmetric_ ? columns : brought(rows_at(panel), U_, L_, panel);
             const Index first = rank();
             for (Index a = 0; left_[panel[of(a)]] > std::max(end, large * left_.maxCoeff());) {
                 if (rank() == most)
@@ -52,13 +57,32 @@ class Elimination {
     /// W = C X.
     Product product() const {
         const auto U = U_.leftCols(rank());
-        const MatrixXd corner = U(pivots_, Eigen::seqN(0, rank())).transpose(),
-                       C = A_(Eigen::seqN(0, A_.rows()), pivots_);
-        return {C.sparseView(), corner.triangularView<Eigen::Upper>().solve(U.transpose())};
+        const MatrixXd corner = U(pivots_, Eigen::seqN(0, rank())).transpose();
+        return {columns_at(pivots_).sparseView(),
+                corner.triangularView<Eigen::Upper>().solve(U.transpose())};
     }
 
   private:
     static std::size_t of(Index i) { return static_cast<std::size_t>(i); }
+
+    MatrixXd columns_at(const std::vector<Index> &at) const {
+        if (A_.size() == 0)
+            return gathered(columns_, at);
+        return A_(Eigen::seqN(Index{0}, A_.rows()), at);
+    }
+    /// Transposed.
+    MatrixXd rows_at(const std::vector<Index> &at) const {
+        if (A_.size() == 0)
+            return gathered(rows_, at);
+        return A_(at, Eigen::seqN(Index{0}, A_.rows())).transpose();
+    }
+    static MatrixXd gathered(const Sparse &A, const std::vector<Index> &at) {
+        MatrixXd found = MatrixXd::Zero(A.rows(), static_cast<Index>(at.size()));
+        for (std::size_t k = 0; k < at.size(); ++k)
+            for (Sparse::InnerIterator it(A, at[k]); it; ++it)
+                found(it.row(), static_cast<Index>(k)) = it.value();
+        return found;
+    }
 
     /// Rows of the largest entries of what is left, the largest first.
     std::vector<Index> largest_left() const {
@@ -93,7 +117,8 @@ class Elimination {
         pivots_.push_back(p);
     }
 
-    MatrixXd A_;
+    MatrixXd A_;            // of W that is not sparse
+    Sparse columns_, rows_; // of W that is; the rows if they are not the columns
     bool symmetric_;
     MatrixXd L_, U_;
     VectorXd left_; // of the diagonal

@@ -59,7 +59,7 @@ template <int T, int P> class Scaling {
         system.tied = op_.tied();
         system.W = T == P ? &op_.W() : &op_.normal();
         system.inverse = T == P ? op_.inverse() : nullptr;
-        system.pattern = op_.pattern().empty() ? nullptr : &op_.pattern();
+        system.pattern = op_.pattern();
         system.product = T == P && system.inverse == nullptr ? &op_.product() : nullptr;
         const Index size = system.size();
         system.left.resize(size);

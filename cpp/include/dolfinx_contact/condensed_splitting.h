@@ -18,9 +18,9 @@ template <int T> class Splitting {
   public:
     static constexpr int D = T + 1;
 
-    explicit Splitting(const System<T> &system)
+    Splitting(const System<T> &system, double rho)
         : system_(system), blocks_(system), q_(system.left.cwiseProduct(system.q)),
-          z_(VectorXd::Zero(system.size())), u_(z_) {}
+          z_(VectorXd::Zero(system.size())), u_(z_), rho_(rho) {}
 
     /// More iterations from where the last ones ended, until x and z differ by less than `target`
     /// of them and do not change.
@@ -46,6 +46,7 @@ template <int T> class Splitting {
         budget.tell(system_, z_);
     }
     const VectorXd &reactions() const { return z_; }
+    double fill() const { return blocks_.fill(); }
 
   private:
     VectorXd right_hand_side() const {
@@ -93,7 +94,7 @@ template <int T> class Splitting {
     const System<T> &system_;
     BlockSolver<T> blocks_;
     VectorXd q_, z_, u_;
-    double rho_ = 0.3;
+    double rho_;
     int count_ = 0;
     bool stale_ = true; // the factors are of another rho
 };

@@ -24,30 +24,33 @@ template <int T> struct Couplings {
     std::vector<std::vector<Coupling>> rows;
 
     explicit Couplings(const System<T> &system) : rows(static_cast<std::size_t>(system.nodes)) {
-        for (Index i = 0; i < system.nodes; ++i)
-            for (const Index j : neighbours(system, i)) {
+        for (Index j = 0; j < system.nodes; ++j) {
+            if (system.pattern != nullptr) {
+                const auto &contacts = system.pattern->moved_by(j);
+                for (std::size_t a = 0; a < contacts.size(); ++a)
+                    add(system, contacts[a], j,
+                        system.pattern->template block<D>(j, static_cast<Index>(a)));
+                continue;
+            }
+            for (Index i = 0; i < system.nodes; ++i) {
                 Matrix block;
                 for (int k = 0; k < D; ++k)
                     for (int l = 0; l < D; ++l)
                         block(k, l) = (*system.W)(D * i + k, D * j + l);
-                if (block.isZero(0.0) && i != j)
-                    continue;
-                if (i == j)
-                    block.diagonal().array() += system.shift;
-                block = system.left.template segment<D>(D * i).asDiagonal() * block *
-                        system.right.template segment<D>(D * j).asDiagonal();
-                rows[static_cast<std::size_t>(i)].push_back({j, block});
+                add(system, i, j, block);
             }
+        }
     }
 
   private:
-    /// Contacts that may move i: the pattern is by columns, but that of a symmetric matrix.
-    static std::vector<Index> neighbours(const System<T> &system, Index i) {
-        if (system.pattern != nullptr)
-            return (*system.pattern)[static_cast<std::size_t>(i)];
-        std::vector<Index> all(static_cast<std::size_t>(system.nodes));
-        std::iota(all.begin(), all.end(), Index{0});
-        return all;
+    void add(const System<T> &system, Index i, Index j, Matrix block) {
+        if (block.isZero(0.0) && i != j)
+            return;
+        if (i == j)
+            block.diagonal().array() += system.shift;
+        block = system.left.template segment<D>(D * i).asDiagonal() * block *
+                system.right.template segment<D>(D * j).asDiagonal();
+        rows[static_cast<std::size_t>(i)].push_back({j, block});
     }
 };
 

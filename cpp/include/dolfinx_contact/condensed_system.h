@@ -6,6 +6,7 @@
 /// Curnier.
 #pragma once
 
+#include "condensed_pattern.h"
 #include "condensed_rank.h"
 #include "law.h"
 
