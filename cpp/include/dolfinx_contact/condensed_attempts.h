@@ -186,8 +186,12 @@ template <int T, int P> class Attempts {
                    (error <= behind * other || at.rounds % seldom == 0);
         };
         const auto finish_from = [&](const VectorXd &r, double &least) {
+            const double before = worst(best_);
             newton(r);
             least = std::min(least, last_error_);
+            for (const double tangential : {3.0, 0.3}) // from a better state than ever before
+                if (!best_.converged && worst(best_) < before)
+                    newton(scaling_.scaled(best_.reaction), tangential);
         };
         for (int k = 0; k < rounds; ++k, ++at.rounds) {
             if (turn(at.least_swept, at.least_split)) {
