@@ -176,6 +176,10 @@ void bind_condensed(py::module_ &m) {
             "rounding", [](const Solution &s) { return std::max(s.rounding, s.slip_rounding); })
         .def_readonly("change", &Solution::change)
         .def_readonly("unsolvable", &Solution::unsolvable)
+        .def_property_readonly("closing",
+                               [](const Solution &s) {
+                                   return py::array_t<double>(s.closing.size(), s.closing.data());
+                               })
         .def_readonly("iterations", &Solution::iterations)
         .def_readonly("seconds", &Solution::seconds)
         .def_readonly("converged", &Solution::converged)

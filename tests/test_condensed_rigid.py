@@ -294,11 +294,17 @@ def chain(bodies, close):
 @pytest.mark.parametrize("bodies", [1, 3, 10, 40])
 def test_contacts_that_close_are_refused_with_a_proof(bodies):
     """Spheres in a row between walls that come together, which no reactions keep from overlapping:
-    refused as unsolvable, in a few iterations; solved where the walls part."""
+    refused as unsolvable, in a few iterations, by normal forces along the row that move nothing and do negative
+    work on q; solved where the walls part."""
     W, q = chain(bodies, 0.01)
-    with pytest.raises(CondensedNotConverged, match="no solution: contacts close") as caught:
+    with pytest.raises(CondensedNotConverged, match="no solution: contacts 0, 1") as caught:
         solve_condensed(W, q, Friction(0.5))
-    assert caught.value.best.unsolvable and caught.value.best.iterations < 300
+    best = caught.value.best
+    assert best.unsolvable and best.iterations < 300
+    assert np.flatnonzero(best.closing > 1e-3).tolist() == list(range(bodies + 1))  # not the ground
+    forces = np.zeros_like(q)
+    forces[:, 2] = best.closing
+    assert np.abs(W @ forces.ravel()).max() < 1e-9 * np.abs(W).max() and (q * forces).sum() < 0
     W, q = chain(bodies, -0.01)
     check(W, q, Friction(0.5), 0.5)
 

@@ -64,6 +64,9 @@ TEST(CondensedFeasibility, ClosingContactsAreProved) {
                         solve<2>(Operator(W, 3), isotropic(), length * q, {}, Options{});
                     EXPECT_FALSE(found.converged);
                     EXPECT_TRUE(found.unsolvable);
+                    EXPECT_EQ(found.closing.size(), nodes);
+                    EXPECT_EQ(found.closing.maxCoeff(), 1.0);
+                    EXPECT_GE(found.closing.minCoeff(), 0.0);
                     ++cases;
                 }
     EXPECT_GT(cases, 100);

@@ -105,7 +105,7 @@ class CondensedNewton:
         result = CondensedResult(
             found.reaction, found.displacement, found.status, found.error, found.slip_error,
             found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
-            found.tied, found.unsolvable,
+            found.tied, found.unsolvable, found.closing,
         )  # fmt: skip
         if not found.converged:
             raise CondensedNotConverged(result)

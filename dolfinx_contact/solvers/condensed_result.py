@@ -42,6 +42,7 @@ class CondensedResult:
         tied: Forces of the tied rows of a kernel operator, if it has any.
         unsolvable: Of a failure: it is proved that there is no solution, by normal forces that move nothing while
             contacts close against them, or by trying every state of a few contacts in two dimensions.
+        closing: Those normal forces, ``shape=(n,)``, the largest one; empty if there is no such proof.
 
     Example:
         >>> found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
@@ -62,6 +63,7 @@ class CondensedResult:
     tried: tuple[Attempt, ...] = field(repr=False)
     tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
     unsolvable: bool = False
+    closing: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 class CondensedNotConverged(RuntimeError):
@@ -81,12 +83,10 @@ class CondensedNotConverged(RuntimeError):
     def __init__(self, best: CondensedResult) -> None:
         self.best, self.tried = best, best.tried
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
-        closing = best.tried and best.tried[-1].branch == "feasibility"
-        proof = (
-            "contacts close whatever the reactions are, as those of a body between planes that come together"
-            if closing
-            else "none of the states of the contacts is one"
-        )
+        proof = "none of the states of the contacts is one"
+        if closing := [str(i) for i in np.flatnonzero(best.closing > 1e-3)]:
+            which = ", ".join(closing[:6]) + (", ..." if len(closing) > 6 else "")
+            proof = f"contacts {which} close whatever the reactions are, as those of a body between planes that come together"
         advice = (
             f"There is no solution: {proof}."
             if best.unsolvable

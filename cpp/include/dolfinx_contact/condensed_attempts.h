@@ -229,8 +229,11 @@ template <int T, int P> class Attempts {
         if (op_.tied() > 0 || op_.inverse() != nullptr)
             return;
         const VectorXd q_n = q_(Eigen::seqN(Index{P}, op_.nodes(), Index{P + 1}));
-        best_.unsolvable = judge_.excludes(closing_forces(op_, q_n, budget_),
-                                           std::max(options_.tol, options_.slip_tol));
+        const VectorXd forces = closing_forces(op_, q_n, budget_);
+        if (judge_.excludes(forces, std::max(options_.tol, options_.slip_tol))) {
+            best_.unsolvable = true;
+            best_.closing = forces / forces.maxCoeff();
+        }
     }
 
     /// Contacts in the plane: complementary pivots; of a few contacts every state.

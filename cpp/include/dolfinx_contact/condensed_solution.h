@@ -30,7 +30,8 @@ struct Solution {
     double acting = 0.0;  ///< the force that errors are relative to
     bool near_rounding = false;
     bool unsolvable = false; ///< proved: no state of the contacts is a solution
-    Index tied = 0;          ///< how many of the reactions
+    VectorXd closing; ///< normal forces that prove it, of each contact, the largest one; or none
+    Index tied = 0;   ///< how many of the reactions
     int iterations = 0;
     double seconds = 0.0;
     bool converged = false;
