@@ -29,9 +29,8 @@ class Operator {
         if (!zeros_pay() || !take_sparse(W))
             take_dense(W);
     }
-    Operator(Sparse W, int dim, Index tied = 0)
-        : size_(W.rows()), tied_(tied), dim_(dim), symmetric_(is_symmetric(W)),
-          sparse_(std::move(W)) {
+    Operator(const Sparse &W, int dim, Index tied = 0)
+        : size_(W.rows()), tied_(tied), dim_(dim), symmetric_(is_symmetric(W)), sparse_(W) {
         if (!zeros_pay() || !is_sparse(sparse_.nonZeros())) {
             take_dense(MatrixXd(sparse_));
             sparse_ = {};
