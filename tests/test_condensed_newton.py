@@ -189,6 +189,29 @@ def test_coefficients_per_contact():
                 assert abs(across) <= 1e-7 * size * np.linalg.norm(r) and x[:2] @ along < 0
 
 
+def test_coefficients_far_apart_in_a_contact():
+    """Contacts that slip easily along one direction and hardly along the other, up to a millionfold, are solved."""
+    n = 40
+    for seed in range(25, 31):
+        rng = np.random.default_rng(seed)
+        A = rng.normal(size=(3 * n, 3 * n))
+        W = A @ A.T / (3 * n) + 1e-3 * np.eye(3 * n)
+        mu, q = 10 ** rng.uniform(-3, 3, size=(n, 2)), rng.normal(size=(n, 3))
+        r = solve_condensed(W, q, Friction(mu)).reaction
+        w = q + (W @ r.ravel()).reshape(n, 3)
+        small, force = 1e-6 * np.abs(q).max(), 1e-6 * np.abs(r).max()
+        assert (w[:, 2] >= -small).all() and (r[:, 2] >= 0).all()
+        assert (np.minimum(w[:, 2] / small, r[:, 2] / force) <= 1).all()
+        ratio = np.linalg.norm(r[:, :2] / mu, axis=1)
+        assert (ratio <= r[:, 2] * (1 + 1e-12)).all()
+        for pushed, slip, along in zip(r[:, 2] > force, w[:, :2], r[:, :2] / mu**2):
+            if pushed and np.linalg.norm(slip) > small:  # against the cone's normal
+                assert abs(slip[0] * along[1] - slip[1] * along[0]) <= small * np.linalg.norm(along)
+                assert slip @ along < 0
+        slips = (r[:, 2] > force) & (np.linalg.norm(w[:, :2], axis=1) > small)
+        assert ratio[slips] == pytest.approx(r[slips, 2], rel=1e-6)
+
+
 def test_nothing_presses():
     """Gaps everywhere: no reactions, exactly, and no iteration."""
     scene = random_problem(0, contacts=4)

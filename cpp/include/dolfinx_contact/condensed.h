@@ -82,7 +82,9 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (proximal(Base::patience))
             return;
         const auto path = [&](bool now) {
-            return T > 0 && smooth && now && attempt("path", [this] { this->path(); });
+            return T > 0 && smooth && now &&
+                   (attempt("path", [this] { this->path(scaling_); }) ||
+                    attempt("path, even", [this] { this->path(scaling_.evened_out()); }));
         };
         if (path(sparse) || (sparse && by_turns(150)))
             return;

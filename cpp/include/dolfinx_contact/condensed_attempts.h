@@ -148,20 +148,21 @@ template <int T, int P> class Attempts {
     }
 
     /// Newton's method from the end of a path that starts at the best state, and the proximal point
-    /// method from there.
-    void path() {
+    /// method from there. The path in units of `scaling`.
+    void path(const Scaling<T, P> &scaling) {
         if constexpr (T > 0) {
-            const System<T> system = scaling_.make();
-            const VectorXd r = scaling_.scaled(best_.reaction);
+            const System<T> system = scaling.make();
+            const VectorXd r = scaling.scaled(best_.reaction);
             std::minstd_rand random(1);
             if (r.isZero(0.0) || system.q.isZero(0.0))
                 return;
             Path<T> path(system, r, random, budget_);
             if (!path.run())
                 return;
-            newton(path.reactions());
+            const VectorXd end = scaling_.scaled(scaling.physical(system, path.reactions()));
+            newton(end);
             if (!best_.converged)
-                proximal_from(path.reactions());
+                proximal_from(end);
         }
     }
 

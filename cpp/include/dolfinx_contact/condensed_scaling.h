@@ -32,6 +32,15 @@ template <int T, int P> class Scaling {
         return r / largest;
     }
 
+    /// The same with units of force and length of each contact, which the law leaves free: no
+    /// scaled compliance is larger than the mean normal one. Coefficients far above one make large
+    /// ones.
+    Scaling evened_out() const {
+        Scaling even = *this;
+        even.even_ = true;
+        return even;
+    }
+
     /// Physical reactions of P + 1 components in scaled variables.
     VectorXd scaled(const VectorXd &reaction) const {
         VectorXd r(D * op_.nodes() + op_.tied());
@@ -86,6 +95,8 @@ template <int T, int P> class Scaling {
             system.left[D * op_.nodes() + c] = tied_scale(c) / length_;
             system.q[D * op_.nodes() + c] = q_[(P + 1) * op_.nodes() + c];
         }
+        if (even_)
+            even_out(system);
         system.set_metric();
         return system;
     }
@@ -98,6 +109,18 @@ template <int T, int P> class Scaling {
             return mu;
         const double mean = std::exp(coefficients_.mu.row(i).log().mean());
         return mean * std::pow(mu / mean, power);
+    }
+    void even_out(System<T> &system) const {
+        const VectorXd scale = system.left.cwiseProduct(system.right),
+                       compliance = scale.cwiseProduct(system.W->diagonal());
+        const double mean = scale[T] * op_.mean_normal();
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            const double largest = compliance.template segment<D>(D * i).maxCoeff();
+            if (!(largest > mean))
+                continue;
+            for (VectorXd *units : {&system.left, &system.right})
+                units->template segment<D>(D * i) *= std::sqrt(mean / largest);
+        }
     }
     void set_length(double length) {
         const double compliance = op_.mean_normal();
@@ -126,5 +149,6 @@ template <int T, int P> class Scaling {
     const VectorXd &q_;
     Coefficients<P> coefficients_;
     double length_ = 1.0, force_ = 1.0;
+    bool even_ = false;
 };
 } // namespace dolfinx_contact::condensed

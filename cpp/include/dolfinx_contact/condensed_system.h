@@ -75,9 +75,10 @@ template <int T> struct System {
     }
 
     /// Metric of the residual: rho_n = 10 / W_nn and rho_t = 1 / max(W_xx, W_yy). The normal and
-    /// the tangential step want their own.
+    /// the tangential step want their own. A contact whose coefficients are far apart slips in the
+    /// direction of the small one, which that metric would not see: 1 / sqrt(W_xx W_yy).
     void set_metric() {
-        constexpr double normal = 10.0, tangential = 1.0;
+        constexpr double normal = 10.0, tangential = 1.0, negligible = 1e-12, far = 1e2;
         const VectorXd diagonal = left.array() * W->diagonal().array().abs() * right.array().abs();
         double mean = 0.0;
         for (Index i = 0; i < nodes; ++i)
@@ -86,17 +87,19 @@ template <int T> struct System {
         rho_t.setOnes(nodes);
         for (Index i = 0; i < nodes; ++i) {
             // a node that its own reaction does not move takes part in the others' scale
-            const double floor = 1e-12 * (mean > 0.0 ? mean : 1.0);
+            const double floor = negligible * (mean > 0.0 ? mean : 1.0);
             rho_n[i] = normal / std::max(diagonal[D * i + T], floor);
             if constexpr (T > 0) {
-                double scale = 0.0, largest = 0.0;
-                for (int c = 0; c < T; ++c) {
-                    scale = std::max(scale, left[D * i + c] * right[D * i + c]);
-                    largest = std::max(largest, diagonal[D * i + c]);
-                }
+                const auto of = [i](const VectorXd &v) {
+                    return v.template segment<T>(D * i).array();
+                };
                 const double per_scale = mean / (left[D * i + T] * right[D * i + T]);
-                const double floor_t = 1e-12 * (per_scale > 0.0 ? per_scale : 1.0) * scale;
-                rho_t[i] = tangential / std::max(largest, floor_t);
+                const double floor_t = negligible * (per_scale > 0.0 ? per_scale : 1.0) *
+                                       (of(left) * of(right)).maxCoeff();
+                const double smallest = of(diagonal).minCoeff(),
+                             largest = std::max(of(diagonal).maxCoeff(), floor_t);
+                const bool far_apart = largest > far * smallest && smallest > negligible * largest;
+                rho_t[i] = tangential / (far_apart ? std::sqrt(largest * smallest) : largest);
             }
         }
     }
