@@ -204,12 +204,12 @@ def test_coefficients_far_apart_in_a_contact():
         assert (np.minimum(w[:, 2] / small, r[:, 2] / force) <= 1).all()
         ratio = np.linalg.norm(r[:, :2] / mu, axis=1)
         assert (ratio <= r[:, 2] * (1 + 1e-12)).all()
-        for pushed, slip, along in zip(r[:, 2] > force, w[:, :2], r[:, :2] / mu**2):
-            if pushed and np.linalg.norm(slip) > small:  # against the cone's normal
-                assert abs(slip[0] * along[1] - slip[1] * along[0]) <= small * np.linalg.norm(along)
-                assert slip @ along < 0
         slips = (r[:, 2] > force) & (np.linalg.norm(w[:, :2], axis=1) > small)
         assert ratio[slips] == pytest.approx(r[slips, 2], rel=1e-6)
+        normal = r[:, :2] / mu**2  # of the cone
+        for slip, along in zip(w[slips, :2], normal[slips]):
+            assert abs(slip[0] * along[1] - slip[1] * along[0]) <= small * np.linalg.norm(along)
+            assert slip @ along < 0
 
 
 def test_nothing_presses():

@@ -81,12 +81,10 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         if (proximal(Base::patience))
             return;
-        const auto path = [&](bool now) {
-            return T > 0 && smooth && now &&
-                   (attempt("path", [this] { this->path(scaling_); }) ||
-                    attempt("path, even", [this] { this->path(scaling_.evened_out()); }));
+        const auto path = [&](const char *name, const Scaling<T, P> &scaling) {
+            return T > 0 && smooth && attempt(name, [&] { this->path(scaling); });
         };
-        if (path(sparse) || (sparse && by_turns(150)))
+        if (sparse && (path("path", scaling_) || by_turns(150)))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
@@ -96,7 +94,9 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         constexpr int few = 5;
         if (attempt("continuation", [&] { paths(few); }) ||
             attempt("proximal point", [&] { this->swept(given, 300); }) ||
-            attempt("sweeps", [&] { this->swept(zero, 2000); }) || path(!sparse))
+            attempt("sweeps", [&] { this->swept(zero, 2000); }))
+            return;
+        if (!sparse && (path("path", scaling_) || path("path, even", scaling_.evened_out())))
             return;
         const auto size = static_cast<double>(scaling_.size());
         attempt("continuation, many starts",
