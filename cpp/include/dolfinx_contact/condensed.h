@@ -81,23 +81,34 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             return;
         if (proximal(Base::patience))
             return;
-        const auto path = [&](const char *name, const Scaling<T, P> &scaling) {
-            return T > 0 && smooth && attempt(name, [&] { this->path(scaling); });
+        const auto path = [&] {
+            return T > 0 && smooth && attempt("path", [this] { this->path(); });
         };
-        if (sparse && (path("path", scaling_) || by_turns(150)))
+        if (sparse && (path() || by_turns(150)))
             return;
         std::minstd_rand random(1);
         const auto paths = [&](int count) {
             for (int k = 0; k < count && !best_.converged && !budget_.spent(); ++k)
                 this->follow(random);
         };
-        constexpr int few = 5;
-        if (attempt("continuation", [&] { paths(few); }) ||
-            attempt("proximal point", [&] { this->swept(given, 300); }) ||
+        const auto few_paths = [&] {
+            constexpr int few = 5;
+            return attempt("continuation", [&] { paths(few); });
+        };
+        if (few_paths() || attempt("proximal point", [&] { this->swept(given, 300); }) ||
             attempt("sweeps", [&] { this->swept(zero, 2000); }))
             return;
-        if (!sparse && (path("path", scaling_) || path("path, even", scaling_.evened_out())))
+        if (!sparse && path())
             return;
+        for (const Form form : {Form::metric_between, Form::units_of_contacts}) {
+            if (sparse || !scaling_.far_apart())
+                break;
+            scaling_.take(form);
+            end.resize(0);
+            if (attempt("newton", [&] { this->newton(zero); }) || other_parameters(zero) ||
+                interior() || proximal(Base::patience) || few_paths() || path())
+                return;
+        }
         const auto size = static_cast<double>(scaling_.size());
         attempt("continuation, many starts",
                 [&] { paths(static_cast<int>(std::min(1000.0, 3e6 / (size * size)))); });

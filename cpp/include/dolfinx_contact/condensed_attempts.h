@@ -148,21 +148,20 @@ template <int T, int P> class Attempts {
     }
 
     /// Newton's method from the end of a path that starts at the best state, and the proximal point
-    /// method from there. The path in units of `scaling`.
-    void path(const Scaling<T, P> &scaling) {
+    /// method from there.
+    void path() {
         if constexpr (T > 0) {
-            const System<T> system = scaling.make();
-            const VectorXd r = scaling.scaled(best_.reaction);
+            const System<T> system = scaling_.make();
+            const VectorXd r = scaling_.scaled(best_.reaction);
             std::minstd_rand random(1);
             if (r.isZero(0.0) || system.q.isZero(0.0))
                 return;
             Path<T> path(system, r, random, budget_);
             if (!path.run())
                 return;
-            const VectorXd end = scaling_.scaled(scaling.physical(system, path.reactions()));
-            newton(end);
+            newton(path.reactions());
             if (!best_.converged)
-                proximal_from(end);
+                proximal_from(path.reactions());
         }
     }
 
@@ -313,10 +312,13 @@ template <int T, int P> class Attempts {
         const int iterations = budget_.iterations;
         const double seconds = budget_.seconds();
         action();
-        best_.tried.push_back({name, best_.converged, budget_.iterations - iterations,
+        constexpr std::array forms{"", ", metric between", ", units of contacts"};
+        const std::string branch =
+            std::string(name) + forms[static_cast<std::size_t>(scaling_.form())];
+        best_.tried.push_back({branch, best_.converged, budget_.iterations - iterations,
                                budget_.seconds() - seconds, best_.error, best_.slip_error});
         if (best_.converged)
-            best_.branch = name;
+            best_.branch = branch;
         return best_.converged;
     }
 

@@ -7,6 +7,10 @@
 #include "condensed_operator.h"
 
 namespace dolfinx_contact::condensed {
+/// How the problem is put. Where coefficients of friction are far apart, another metric of the
+/// residual, between the two of a contact; and besides units of force and length of each contact.
+enum class Form { usual, metric_between, units_of_contacts };
+
 /// P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Scaling {
   public:
@@ -32,13 +36,21 @@ template <int T, int P> class Scaling {
         return r / largest;
     }
 
-    /// The same with units of force and length of each contact, which the law leaves free: no
-    /// scaled compliance is larger than the mean normal one. Coefficients far above one make large
-    /// ones.
-    Scaling evened_out() const {
-        Scaling even = *this;
-        even.even_ = true;
-        return even;
+    /// From now on this form. None changes the law or an error.
+    void take(Form form) { form_ = form; }
+    Form form() const { return form_; }
+    /// Whether compliances that friction scales differ a hundredfold.
+    bool far_apart() const {
+        constexpr double far = 1e2;
+        const System<T> system = make();
+        const VectorXd scale = system.left.cwiseProduct(system.right);
+        double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
+        for (Index i = 0; i < op_.nodes() && T > 0; ++i)
+            if (!system.smooth[static_cast<std::size_t>(i)]) {
+                smallest = std::min(smallest, scale.template segment<T>(D * i).minCoeff());
+                largest = std::max(largest, scale.template segment<T>(D * i).maxCoeff());
+            }
+        return largest > far * smallest;
     }
 
     /// Physical reactions of P + 1 components in scaled variables.
@@ -95,9 +107,9 @@ template <int T, int P> class Scaling {
             system.left[D * op_.nodes() + c] = tied_scale(c) / length_;
             system.q[D * op_.nodes() + c] = q_[(P + 1) * op_.nodes() + c];
         }
-        if (even_)
-            even_out(system);
-        system.set_metric();
+        if (form_ == Form::units_of_contacts)
+            set_units_of_contacts(system);
+        system.set_metric(form_ != Form::usual);
         return system;
     }
 
@@ -110,7 +122,8 @@ template <int T, int P> class Scaling {
         const double mean = std::exp(coefficients_.mu.row(i).log().mean());
         return mean * std::pow(mu / mean, power);
     }
-    void even_out(System<T> &system) const {
+    /// No scaled compliance larger than the mean normal one: coefficients far above one make such.
+    void set_units_of_contacts(System<T> &system) const {
         const VectorXd scale = system.left.cwiseProduct(system.right),
                        compliance = scale.cwiseProduct(system.W->diagonal());
         const double mean = scale[T] * op_.mean_normal();
@@ -149,6 +162,6 @@ template <int T, int P> class Scaling {
     const VectorXd &q_;
     Coefficients<P> coefficients_;
     double length_ = 1.0, force_ = 1.0;
-    bool even_ = false;
+    Form form_ = Form::usual;
 };
 } // namespace dolfinx_contact::condensed

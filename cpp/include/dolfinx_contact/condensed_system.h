@@ -76,9 +76,11 @@ template <int T> struct System {
 
     /// Metric of the residual: rho_n = 10 / W_nn and rho_t = 1 / max(W_xx, W_yy). The normal and
     /// the tangential step want their own. A contact whose coefficients are far apart slips in the
-    /// direction of the small one, which that metric would not see: 1 / sqrt(W_xx W_yy).
-    void set_metric() {
-        constexpr double normal = 10.0, tangential = 1.0, negligible = 1e-12, far = 1e2;
+    /// direction of the small one, which that metric hardly sees: `between` the two,
+    /// 1 / sqrt(W_xx W_yy), Newton's method converges more seldom, but where the other one does
+    /// not.
+    void set_metric(bool between = false) {
+        constexpr double normal = 10.0, tangential = 1.0, negligible = 1e-12;
         const VectorXd diagonal = left.array() * W->diagonal().array().abs() * right.array().abs();
         double mean = 0.0;
         for (Index i = 0; i < nodes; ++i)
@@ -98,8 +100,9 @@ template <int T> struct System {
                                        (of(left) * of(right)).maxCoeff();
                 const double smallest = of(diagonal).minCoeff(),
                              largest = std::max(of(diagonal).maxCoeff(), floor_t);
-                const bool far_apart = largest > far * smallest && smallest > negligible * largest;
-                rho_t[i] = tangential / (far_apart ? std::sqrt(largest * smallest) : largest);
+                rho_t[i] = tangential / (between && smallest > negligible * largest
+                                             ? std::sqrt(largest * smallest)
+                                             : largest);
             }
         }
     }
