@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
-from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
 
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 CASES = {
@@ -286,6 +286,38 @@ def test_symmetric_stiffness_is_factorised_as_such():
         assert entries < fewer * of_all
         for each in (ours, plain):
             each.destroy()
+
+
+def test_a_factorisation_short_of_workspace_is_done_with_more():
+    """MUMPS with a tenth of its estimate gives up; the answer is the one of ample workspace, of K and of an indefinite matrix."""
+    _, scene = run()
+    K = scene.problem.body.K
+    b = np.random.default_rng(7 + K.comm.rank).normal(size=scene.problem.body.size)
+    for shift in (0.0, 0.3 * K.getDiagonal().max()[1]):
+        A = K.copy()
+        A.shift(-shift)
+        ample, short = (
+            LinearSolver(A, SYMMETRIC | {"mat_mumps_icntl_14": percent}, "workspace_", None)
+            for percent in (900, -90)
+        )
+        x, expected = short.solve(b), ample.solve(b)
+        assert np.abs(x - expected).max(initial=0.0) <= 1e-10 * np.abs(expected).max(initial=1.0)
+        for each in (ample, short):
+            each.destroy()
+
+
+def test_a_singular_matrix_is_no_matter_of_workspace():
+    """A zero row makes MUMPS fail for good: solving raises, with PETSc's reason and that of MUMPS."""
+    A = PETSc.Mat().createAIJ(((None, 12), (None, 12)), comm=MPI.COMM_WORLD)
+    A.setUp()
+    first, last = A.getOwnershipRange()
+    for row in range(first, last):
+        A.setValue(row, row, float(row > 0))
+    A.assemble()
+    solver = LinearSolver(A, DIRECT, "singular_", None)
+    with pytest.raises(dc.LinearSolverError, match=r"-11.* INFOG\(1\) = -10"):
+        solver.solve(np.ones(last - first))
+    solver.destroy()
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -29,6 +29,12 @@ MULTIGRID = {
     "mg_levels_pc_type": "jacobi",
 }
 
+# Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), by itself 20), once that was too little, and what it answers
+# then (INFOG(1)) [MUMPS users' guide, error codes].  On several ranks the estimate does not know which of them is busy, of
+# matrices that are not definite it does not know the pivots.
+_WORKSPACES = (50, 100, 200, 400, 800)
+_SHORT_OF_WORKSPACE = (-8, -9, -17, -20)
+
 # Of a rough solve: enough to see that a body is pressed on a plane, and how hard.
 ROUGH = 1e-3
 
@@ -119,12 +125,23 @@ class LinearSolverError(RuntimeError):
     """
 
 
+def _mumps_answer(ksp) -> int | None:
+    """INFOG(1) of a factorisation by MUMPS, negative if it failed; None of any other solver."""
+    pc = ksp.getPC()
+    if pc.getType() not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
+        return None
+    return pc.getFactorMatrix().getMumpsInfog(1)
+
+
 def check_solved(ksp, options=None) -> None:
     """Raise ``LinearSolverError`` if the last solve of a ``PETSc.KSP`` did not converge."""
     if ksp.getConvergedReason() >= 0:
         return
     given = "" if options is None else f"; options {options}"
     direct = ksp.getType() == "preonly"
+    answer = _mumps_answer(ksp)
+    if answer is not None:
+        given = f", MUMPS with INFOG(1) = {answer}{given}"
     raise LinearSolverError(
         f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) after {ksp.getIterationNumber()} "
         f"iterations{given}."
@@ -159,13 +176,23 @@ class LinearSolver:
                 vectors.append(A.createVecRight())
                 vectors[-1].array_w[:] = mode
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
-        self.ksp.setOperators(A)
-        with options_given(prefix, options) as self.unread:
-            self.ksp.setFromOptions()
-            self.ksp.setUp()  # reads the options of the levels, which must still be there
+        self.unread = self._set_up(A, prefix, options)
+        for workspace in _WORKSPACES:
+            if _mumps_answer(self.ksp) not in _SHORT_OF_WORKSPACE:
+                break
+            self.ksp.reset()  # what MUMPS has analysed cannot be factorised after a failure
+            self._set_up(A, prefix, options | {"mat_mumps_icntl_14": workspace})
         if not self.exact:
             self.ksp.setMonitor(_heed_signals)
         self._right, self._left = A.createVecs()
+
+    def _set_up(self, A, prefix: str, options: dict) -> list[str]:
+        """Factorise, or set up the levels; the options that PETSc did not ask for."""
+        self.ksp.setOperators(A)
+        with options_given(prefix, options) as unread:
+            self.ksp.setFromOptions()
+            self.ksp.setUp()  # reads the options of the levels, which must still be there
+        return unread
 
     def destroy(self) -> None:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
