@@ -125,26 +125,31 @@ class LinearSolverError(RuntimeError):
     """
 
 
-def _mumps_answer(ksp) -> int | None:
-    """INFOG(1) of a factorisation by MUMPS, negative if it failed; None of any other solver."""
+def mumps_factors(ksp):
+    """The factors of a solver set up with MUMPS, a PETSc matrix that tells of them; None of any other solver."""
     pc = ksp.getPC()
     if pc.getType() not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
         return None
-    return pc.getFactorMatrix().getMumpsInfog(1)
+    return pc.getFactorMatrix()
+
+
+def _mumps_answer(ksp) -> int | None:
+    """INFOG(1) of a factorisation by MUMPS, negative if it failed; None of any other solver."""
+    factors = mumps_factors(ksp)
+    return None if factors is None else factors.getMumpsInfog(1)
 
 
 def check_solved(ksp, options=None) -> None:
     """Raise ``LinearSolverError`` if the last solve of a ``PETSc.KSP`` did not converge."""
     if ksp.getConvergedReason() >= 0:
         return
+    answer = _mumps_answer(ksp)
+    mumps = "" if answer is None else f", MUMPS with INFOG(1) = {answer}"
     given = "" if options is None else f"; options {options}"
     direct = ksp.getType() == "preonly"
-    answer = _mumps_answer(ksp)
-    if answer is not None:
-        given = f", MUMPS with INFOG(1) = {answer}{given}"
     raise LinearSolverError(
         f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) after {ksp.getIterationNumber()} "
-        f"iterations{given}."
+        f"iterations{mumps}{given}."
         + ("" if direct else f" A factorisation needs no iteration: petsc_options={DIRECT}.")
     )
 

@@ -9,7 +9,7 @@ import os
 import numpy as np
 from petsc4py import PETSc
 
-from dolfinx_contact.petsc.linear_solver import check_solved
+from dolfinx_contact.petsc.linear_solver import check_solved, mumps_factors
 
 UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
@@ -141,8 +141,7 @@ def block_solver(ksp):
     A = ksp.getOperators()[0]
     comm, (owned, size) = A.comm, A.getSizes()[0]
     ksp.setUp()
-    mumps = ksp.getType() == "preonly" and ksp.getPC().getType() in ("lu", "cholesky")
-    mumps = mumps and ksp.getPC().getFactorSolverType() == "mumps"
+    factors = mumps_factors(ksp) if ksp.getType() == "preonly" else None
 
     def by_block(columns, values):
         count = len(columns)
@@ -161,7 +160,6 @@ def block_solver(ksp):
         result = np.empty((owned, count), order="F")
         answer = PETSc.Mat().createDense(((owned, size), (None, count)), array=result, comm=comm)
         answer.assemble()
-        factors = ksp.getPC().getFactorMatrix()
         if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen how many at once
             factors.setMumpsIcntl(*_MUMPS_BLOCK)
         factors.matSolve(rhs, answer)
@@ -182,4 +180,4 @@ def block_solver(ksp):
             result[:, k] = right.array_r
         return result
 
-    return by_block if mumps else by_column
+    return by_column if factors is None else by_block
