@@ -66,13 +66,14 @@ def test_as_good_as_a_hierarchy_of_its_own():
 def test_smoothers_are_those_of_the_body():
     """What the user says of the smoothers of the stiffness holds with springs, too.
 
-    Jacobi's, in a block of each rank: where a rank has a node that no other is strongly coupled to, GAMG gives it six
+    Jacobi's, within a domain of each rank: where a rank has a node that no other is strongly coupled to, GAMG gives it six
     coarse unknowns with three rows of zeros, which smoothers that invert blocks (pbjacobi, sor) refuse.
     """
     _, pc = stiffened(
-        mg_levels_pc_type="bjacobi", mg_levels_sub_pc_type="jacobi", mg_levels_ksp_max_it=3
+        mg_levels_pc_type="asm", mg_levels_sub_pc_type="jacobi", mg_levels_ksp_max_it=3
     )
     for level in range(1, pc.getMGLevels()):
         smoother = pc.getMGSmoother(level)
         assert smoother.getType() == "chebyshev" and smoother.getTolerances()[3] == 3
-        assert smoother.getPC().getType() == "bjacobi"
+        assert smoother.getPC().getType() == "asm"
+        assert [ksp.getPC().getType() for ksp in smoother.getPC().getASMSubKSP()] == ["jacobi"]

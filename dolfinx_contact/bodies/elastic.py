@@ -17,7 +17,7 @@ from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.bodies.unknowns import Unknowns
 from dolfinx_contact.collective import OverRanks, raised_together
 from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, preconditioner
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 
 _instances = count()
@@ -287,7 +287,9 @@ class ElasticBody(Unknowns, OverRanks):
         Collective.
         """
         if preconditioner(A, self.options, self.prefix) == "gamg":
-            return StiffenedMultigrid(self.ksp.getPC(), A, S)
+            levels = self.ksp.getPC()
+            with options_given(self.prefix, self.options or {}):  # smoothers read them once more
+                return StiffenedMultigrid(levels, A, S)
         return self.solver(A)
 
     def rigid_modes(self) -> np.ndarray:
