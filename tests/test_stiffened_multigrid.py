@@ -67,7 +67,7 @@ def test_smoothers_are_those_of_the_body():
     """What the user says of the smoothers of the stiffness holds with springs, too.
 
     Jacobi's, within a domain of each rank: where a rank has a node that no other is strongly coupled to, GAMG gives it six
-    coarse unknowns with three rows of zeros, which smoothers that invert blocks (pbjacobi, sor) refuse.
+    coarse unknowns with three rows of zeros, which pbjacobi, as it inverts blocks, refuses.
     """
     _, pc = stiffened(
         mg_levels_pc_type="asm", mg_levels_sub_pc_type="jacobi", mg_levels_ksp_max_it=3
