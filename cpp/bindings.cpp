@@ -140,6 +140,6 @@ PYBIND11_MODULE(_kernel, m) {
 #endif
             return sets;
         },
-        "What this processor can run beyond what every one can, the widest first: _kernel_avx512, "
-        "_kernel_avx2.");
+        "What this processor can run beyond what every one can, the widest first: _algebra_avx512, "
+        "_algebra_avx2.");
 }

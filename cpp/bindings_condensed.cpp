@@ -29,10 +29,6 @@ VectorXd vector(const Array &array, Index size, const char *name) {
 }
 
 void check_size(Index rows, Index columns, int dim, Index tied) {
-#ifdef THREE_COMPONENTS_ONLY
-    if (dim != 3)
-        throw py::value_error("this module has systems of three components alone");
-#endif
     if (dim < 1 || dim > 3)
         throw py::value_error("dim must be 1, 2 or 3, not " + std::to_string(dim));
     if (rows != columns || tied < 0 || rows < tied || (rows - tied) % dim != 0)
@@ -40,24 +36,36 @@ void check_size(Index rows, Index columns, int dim, Index tied) {
                               " rows per contact and one per tied row");
 }
 
+/// Of an extension compiled for more instructions, else of this one.
+using Algebra = std::optional<py::capsule>;
+
 template <class Matrix>
-std::unique_ptr<Operator> checked_operator(const Matrix &W, int dim, Index tied) {
+std::unique_ptr<Operator> checked_operator(const Matrix &W, int dim, Index tied,
+                                           const Algebra &algebra) {
     for (Index i = dim - 1; i < W.rows() - tied; i += dim)
         if (W.coeff(i, i) < 0.0)
             throw py::value_error("W has a negative normal diagonal entry: a contact must give way "
                                   "to its reaction");
-    return std::make_unique<Operator>(W, dim, tied);
+    const LinearAlgebra *chosen = &linear_algebra();
+    if (algebra)
+        chosen = static_cast<const LinearAlgebra *>(
+            PyCapsule_GetPointer(algebra->ptr(), "dolfinx_contact.LinearAlgebra"));
+    if (chosen == nullptr)
+        throw py::error_already_set(); // another capsule: ValueError
+    return std::make_unique<Operator>(W, dim, tied, *chosen);
 }
 
-std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied) {
+std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied,
+                                        const Algebra &algebra) {
     check_size(W.ndim() == 2 ? W.shape(0) : -1, W.ndim() == 2 ? W.shape(1) : 0, dim, tied);
-    return checked_operator(Eigen::Map<const RowMajor>(W.data(), W.shape(0), W.shape(1)), dim,
-                            tied);
+    return checked_operator(Eigen::Map<const RowMajor>(W.data(), W.shape(0), W.shape(1)), dim, tied,
+                            algebra);
 }
 
 /// Of W by columns, the rows of each in order, as SciPy's csc_array has them.
 std::unique_ptr<Operator> make_sparse_operator(const Array &data, const Places &rows,
-                                               const Places &columns, int dim) {
+                                               const Places &columns, int dim,
+                                               const Algebra &algebra) {
     const Index size = columns.size() - 1;
     check_size(size, size, dim, 0);
     bool good = rows.size() == data.size() && columns.at(0) == 0 && columns.at(size) == data.size();
@@ -72,7 +80,7 @@ std::unique_ptr<Operator> make_sparse_operator(const Array &data, const Places &
         throw py::value_error("W must be given by columns, with the rows of each in order");
     return checked_operator(Sparse(Eigen::Map<const Sparse>(size, size, data.size(), columns.data(),
                                                             rows.data(), data.data())),
-                            dim, 0);
+                            dim, 0, algebra);
 }
 
 VectorXd optional(const std::optional<Array> &array) {
@@ -114,7 +122,6 @@ Solution solve_any(const Operator &op, const Array &mu, const std::optional<Arra
     std::vector<VectorXd> from;
     for (const Array &start : starts)
         from.push_back(vector(start, size, "a start"));
-#ifndef THREE_COMPONENTS_ONLY // else other systems are refused when they are made
     if (op.dim() == 1) {
         const AnyLaw<0> any = Uniform<Frictionless>{};
         const py::gil_scoped_release release;
@@ -125,7 +132,6 @@ Solution solve_any(const Operator &op, const Array &mu, const std::optional<Arra
         const py::gil_scoped_release release;
         return solve<1>(op, any, free, from, options);
     }
-#endif
     const auto any = law<2>(mu, p, op.nodes());
     const py::gil_scoped_release release;
     return solve<2>(op, any, free, from, options);
@@ -141,16 +147,15 @@ py::array_t<double> per_contact(const Solution &s, const VectorXd &v) {
 }
 } // namespace
 
-/// The classes are local to the module: there are two modules that have them.
 void bind_condensed(py::module_ &m) {
-    py::class_<Attempt>(m, "CondensedAttempt", py::module_local())
+    py::class_<Attempt>(m, "CondensedAttempt")
         .def_readonly("branch", &Attempt::branch)
         .def_readonly("converged", &Attempt::converged)
         .def_readonly("iterations", &Attempt::iterations)
         .def_readonly("seconds", &Attempt::seconds)
         .def_readonly("error", &Attempt::error)
         .def_readonly("slip_error", &Attempt::slip_error);
-    py::class_<Solution>(m, "CondensedSolution", py::module_local())
+    py::class_<Solution>(m, "CondensedSolution")
         .def_property_readonly("reaction",
                                [](const Solution &s) { return per_contact(s, s.reaction); })
         .def_property_readonly("displacement",
@@ -185,10 +190,11 @@ void bind_condensed(py::module_ &m) {
         .def_readonly("converged", &Solution::converged)
         .def_readonly("branch", &Solution::branch)
         .def_readonly("tried", &Solution::tried);
-    py::class_<Operator>(m, "CondensedOperator", py::module_local())
-        .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0)
+    py::class_<Operator>(m, "CondensedOperator")
+        .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0,
+             py::arg("algebra") = py::none())
         .def_static("by_columns", &make_sparse_operator, py::arg("data"), py::arg("rows"),
-                    py::arg("columns"), py::arg("dim"))
+                    py::arg("columns"), py::arg("dim"), py::arg("algebra") = py::none())
         .def_property_readonly("dim", &Operator::dim)
         .def_property_readonly("nodes", &Operator::nodes)
         .def_property_readonly("tied", &Operator::tied)

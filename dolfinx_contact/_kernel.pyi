@@ -11,6 +11,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
+import typing_extensions
 
 __all__: list[str] = [
     "CondensedAttempt",
@@ -331,12 +332,14 @@ class CondensedOperator:
         rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
         columns: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
         dim: typing.SupportsInt | typing.SupportsIndex,
+        algebra: typing_extensions.CapsuleType | None = None,
     ) -> CondensedOperator: ...
     def __init__(
         self,
         W: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         dim: typing.SupportsInt | typing.SupportsIndex,
         tied: typing.SupportsInt | typing.SupportsIndex = 0,
+        algebra: typing_extensions.CapsuleType | None = None,
     ) -> None: ...
     def prepare(self) -> bool: ...
     def solve(
@@ -369,7 +372,7 @@ class CondensedOperator:
 
 def instruction_sets() -> list[str]:
     """
-    What this processor can run beyond what every one can, the widest first: _kernel_avx512, _kernel_avx2.
+    What this processor can run beyond what every one can, the widest first: _algebra_avx512, _algebra_avx2.
     """
 
 def make_law(

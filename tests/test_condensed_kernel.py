@@ -1,14 +1,17 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The condensed solver for processors with AVX2 or AVX-512, and factors that serve several iterations."""
+"""The condensed solver's algebra for processors with AVX2 or AVX-512, and factors that serve several iterations."""
 
+import datetime
 import importlib
 import warnings
 from fractions import Fraction
 from importlib.util import find_spec
+from itertools import product
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
 
 from dolfinx_contact import Friction, RoundingWarning, _kernel
 from dolfinx_contact.solvers import condensed_kernel
@@ -18,10 +21,13 @@ from mechanics import judge
 TOL = 1e-10
 
 
-def modules():
+def algebras():
     """What is compiled, and runs here."""
-    wide = [f"{_kernel.__name__}_{name}" for name in _kernel.instruction_sets()]
-    return [_kernel, *(importlib.import_module(name) for name in wide if find_spec(name))]
+    wide = [f"dolfinx_contact._algebra_{name}" for name in _kernel.instruction_sets()]
+    return [
+        None,
+        *(importlib.import_module(name).linear_algebra for name in wide if find_spec(name)),
+    ]
 
 
 def body(rng, nodes):
@@ -34,15 +40,28 @@ def body(rng, nodes):
     return (W + W.T) / 2, q
 
 
-def test_every_compiled_solver_gives_the_same_answer():
-    """Reactions of small and large problems agree to the tolerance, and the judge accepts each."""
+def test_every_compiled_algebra_gives_the_same_answer():
+    """Reactions of small and large, symmetric, unsymmetric and sparse problems agree, and the judge accepts each."""
     law = Friction(mu=(0.3, 0.15), p=(0.05, 0.2))
-    for nodes in (5, 40, 120):  # beyond 43 factors in single precision
-        W, q = body(np.random.default_rng(nodes), nodes)
+    for nodes, kind in product(
+        (5, 40, 120), ("symmetric", "unsymmetric", "sparse")
+    ):  # from 43 on in single precision
+        rng = np.random.default_rng(nodes)
+        W, q = body(rng, nodes)
+        if kind == "unsymmetric":
+            W *= 1 + 1e-6 * rng.normal(size=W.shape)
+        if kind == "sparse":
+            W = np.where(W > 0.4, W, 0.0) + 0.5 * np.eye(len(W))
         found = []
-        for module in modules():
-            operator = module.CondensedOperator(W, 3)
-            assert operator.prepare()
+        for algebra in algebras():
+            if kind == "sparse":
+                columns = csc_array(W)
+                operator = _kernel.CondensedOperator.by_columns(
+                    columns.data, columns.indices, columns.indptr, 3, algebra
+                )
+            else:
+                operator = _kernel.CondensedOperator(W, 3, algebra=algebra)
+                assert operator.prepare()
             found.append(CondensedNewton().solve_condensed(operator, law, q, TOL).reaction)
             assert judge.condensed(W, q, law.mu, law.p, found[-1], TOL).error <= judge.DEFECT * TOL
         for r in found:
@@ -50,11 +69,18 @@ def test_every_compiled_solver_gives_the_same_answer():
 
 
 def test_processor_decides(monkeypatch):
-    """The widest instructions; without any, and for other than three components, what every processor can run."""
-    assert condensed_kernel.fastest(1) is condensed_kernel.fastest(2) is _kernel
-    assert condensed_kernel.fastest(3) is modules()[min(1, len(modules()) - 1)]
+    """The widest instructions; what every processor can run where there are none, or they were not compiled."""
+    assert condensed_kernel.widest_algebra() is ([*algebras()[1:], None])[0]
     monkeypatch.setattr(_kernel, "instruction_sets", lambda: ["none", "such"])
-    assert condensed_kernel.fastest(3) is _kernel
+    assert condensed_kernel.widest_algebra() is None
+
+
+def test_an_algebra_is_one_of_ours():
+    """Another object, or another capsule, is refused before it is used."""
+    with pytest.raises(TypeError):
+        _kernel.CondensedOperator(np.eye(3), 3, algebra="avx2")
+    with pytest.raises(ValueError, match="incorrect name"):
+        _kernel.CondensedOperator(np.eye(3), 3, algebra=datetime.datetime_CAPI)
 
 
 def test_last_factors_solve_what_new_ones_solve():
@@ -80,10 +106,10 @@ def test_compensated_sums_stay_compensated(seed):
     W = B @ B.T
     W = (W + W.T) / 2
     q = -W @ (np.tile([0.1, 0.05, 1.0], 4) * rng.uniform(0.5, 1, size=12))
-    for module in modules():
+    for algebra in algebras():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RoundingWarning)
-            operator = module.CondensedOperator(W, 3)
+            operator = _kernel.CondensedOperator(W, 3, algebra=algebra)
             found = CondensedNewton().solve_condensed(operator, Friction(0.5), q, 1e-14)
         assert (found.status == 1).all()
         for row, given, w in zip(W, q, found.displacement.ravel()):

@@ -59,7 +59,7 @@ TEST(CondensedRank, AProductIsFoundWhereTheRankIsLow) {
         for (const double uneven : {0.0, 1e-3})
             for (const double units : {1e-12, 1.0, 1e12}) {
                 const MatrixXd W = units * low_rank(random, size, size / 3, uneven, size);
-                const auto part = uneven > 0.0 ? Square::Part::all : Square::Part::upper;
+                const auto part = uneven > 0.0 ? Part::all : Part::upper;
                 const Square view(W.data(), size, size, part);
                 const auto found = product(view, 0.6);
                 ASSERT_TRUE(found.has_value()) << size << " " << uneven;
@@ -72,11 +72,11 @@ TEST(CondensedRank, AProductIsFoundWhereTheRankIsLow) {
 TEST(CondensedRank, NoProductOfFullRankOrNone) {
     Random random(2);
     const MatrixXd regular = low_rank(random, 30, 30, 0.0, 30), zero = MatrixXd::Zero(3, 3);
-    EXPECT_FALSE(product({regular.data(), 30, 30, Square::Part::all}, 0.6).has_value());
-    EXPECT_FALSE(product({zero.data(), 3, 3, Square::Part::all}, 0.6).has_value());
+    EXPECT_FALSE(product({regular.data(), 30, 30, Part::all}, 0.6).has_value());
+    EXPECT_FALSE(product({zero.data(), 3, 3, Part::all}, 0.6).has_value());
     MatrixXd indefinite = zero; // has a product, but not by pivots on the diagonal
     indefinite(0, 1) = indefinite(1, 0) = indefinite(2, 2) = 1.0;
-    EXPECT_FALSE(product({indefinite.data(), 3, 3, Square::Part::all}, 0.6).has_value());
+    EXPECT_FALSE(product({indefinite.data(), 3, 3, Part::all}, 0.6).has_value());
 }
 
 TEST(CondensedRank, AllFactorsSolve) {
@@ -89,14 +89,14 @@ TEST(CondensedRank, AllFactorsSolve) {
 
 TEST(CondensedRank, SparseFactorsOfOneMatrixAfterTheOther) {
     Random random(3);
-    LinearSolver solver;
+    const auto solver = linear_algebra().solver();
     for (const Index reach : {2, 2, 5, 2, 5, 5}) { // the same places as before, and others
         constexpr Index size = 60;
         MatrixXd J = low_rank(random, size, size, 0.1, reach);
         J.diagonal().array() += 1.0;
         const VectorXd rhs = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
-        ASSERT_TRUE(solver.factor(Eigen::SparseMatrix<double>(J.sparseView())));
-        EXPECT_LT((J * solver.again(rhs) - rhs).norm(), 1e-9 * rhs.norm()) << reach;
+        ASSERT_TRUE(solver->factor(Eigen::SparseMatrix<double>(J.sparseView())));
+        EXPECT_LT((J * solver->again(rhs) - rhs).norm(), 1e-9 * rhs.norm()) << reach;
     }
 }
 

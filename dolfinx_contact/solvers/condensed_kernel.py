@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The compiled condensed solver for this processor: with AVX-512, with AVX2 and FMA, or what every processor has."""
+"""The compiled condensed solver with the linear algebra for this processor: AVX-512, AVX2 and FMA, or what all have."""
 
 from __future__ import annotations
 
@@ -10,14 +10,17 @@ from typing import Any
 from dolfinx_contact import _kernel
 
 
-def fastest(dim: int) -> Any:
-    """The module with ``CondensedOperator`` for so many components.  Answers of two modules differ by rounding."""
-    for instructions in _kernel.instruction_sets() if dim == 3 else ():
+def widest_algebra() -> Any:
+    """The last argument of ``CondensedOperator``, None for what every processor can run.
+
+    Answers with one and with another differ by rounding.
+    """
+    for instructions in _kernel.instruction_sets():
         try:
-            return importlib.import_module(f"dolfinx_contact._kernel_{instructions}")
+            return importlib.import_module(f"dolfinx_contact._algebra_{instructions}").linear_algebra
         except ImportError:  # not built on this platform
             pass
-    return _kernel
+    return None
 
 
 def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
@@ -25,7 +28,7 @@ def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
 
     A sparse ``W`` is by columns, sorted, and has no tied rows.
     """
-    kernel = fastest(dim).CondensedOperator
+    kernel, algebra = _kernel.CondensedOperator, widest_algebra()
     if hasattr(W, "indptr"):
-        return kernel.by_columns(W.data, W.indices, W.indptr, dim)
-    return kernel(W, dim, tied)
+        return kernel.by_columns(W.data, W.indices, W.indptr, dim, algebra)
+    return kernel(W, dim, tied, algebra)

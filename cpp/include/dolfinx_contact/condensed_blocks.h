@@ -5,7 +5,6 @@
 /// open.
 #pragma once
 
-#include "condensed_linear.h"
 #include "condensed_system.h"
 
 namespace dolfinx_contact::condensed {
@@ -18,7 +17,8 @@ template <int T> class BlockSolver {
     using Blocks = std::vector<Block>; // of the contacts
 
     explicit BlockSolver(const System<T> &system)
-        : system_(system), sparse_(system.pattern != nullptr) {}
+        : system_(system), linear_(system.W->algebra().solver()),
+          sparse_(system.pattern != nullptr) {}
 
     /// False if the matrix is singular. Without B it is I.
     bool factor(const Blocks &A, const Blocks *B = nullptr) {
@@ -31,7 +31,7 @@ template <int T> class BlockSolver {
             add_shift();
         if (sparse_) {
             const bool regular = factor_sparse();
-            sparse_ = !(linear_.fill() > filled);
+            sparse_ = !(linear_->fill() > filled);
             by_rank_ = false;
             return regular;
         }
@@ -60,11 +60,11 @@ template <int T> class BlockSolver {
             if (system_.pattern == nullptr || !factor_sparse())
                 factor_dense();
         }
-        return linear_.again(rhs);
+        return linear_->again(rhs);
     }
 
     /// The entries of the last factors over those of dense ones; of sparse W.
-    double fill() const { return linear_.fill(); }
+    double fill() const { return linear_->fill(); }
 
   private:
     const Product *product() const {
@@ -104,7 +104,7 @@ template <int T> class BlockSolver {
                 J.middleCols<D>(D * j) = (J.middleCols<D>(D * j) * B_[of(j)]).eval();
             J.block<D, D>(D * j, D * j) += A_[of(j)];
         }
-        linear_.factor(J);
+        linear_->factor(J);
     }
 
     bool factor_sparse() {
@@ -124,7 +124,7 @@ template <int T> class BlockSolver {
             }
         }
         J.finalize();
-        return linear_.factor(J);
+        return linear_->factor(J);
     }
     /// Of the matrix, at contact j and its a-th one, i.
     Block block(Index i, Index j, Index a) const {
@@ -166,19 +166,21 @@ template <int T> class BlockSolver {
                 S.col(k) += W.X.template middleCols<D>(D * i) * v;
             }
         }
-        few_.compute(S);
+        linear_->factor(S);
     }
     VectorXd solve_by_rank(const VectorXd &rhs) const {
         const Product &W = *product();
         const VectorXd y = times(inverse_, rhs);
-        const VectorXd t = few_.solve(W.X * VectorXd(system_.right.cwiseProduct(times(B_, y))));
+        const VectorXd forces = system_.right.cwiseProduct(times(B_, y));
+        VectorXd motion(W.X.rows());
+        system_.W->algebra().multiply(view(W.X), view(forces), result(motion));
+        const VectorXd t = linear_->again(motion);
         return y - times(inverse_, system_.left.cwiseProduct(W.C * t));
     }
 
     const System<T> &system_;
-    LinearSolver linear_;
+    std::unique_ptr<LinearSolver> linear_; // of few unknowns, by rank
     Blocks A_, B_, inverse_;
-    Eigen::PartialPivLU<MatrixXd> few_; // unknowns, of factors by rank
     bool sparse_, by_rank_ = false;
 };
 } // namespace dolfinx_contact::condensed

@@ -4,7 +4,6 @@
 /// Newton's direction: the nodes' linearised problems put together and solved.
 #pragma once
 
-#include "condensed_linear.h"
 #include "condensed_step.h"
 
 namespace dolfinx_contact::condensed {
@@ -13,7 +12,8 @@ template <int T> class Direction {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    explicit Direction(const System<T> &system) : system_(system) {}
+    explicit Direction(const System<T> &system)
+        : system_(system), linear_(system.W->algebra().solver()) {}
 
     /// Which factors: of the present Jacobian; of the last one, if its nodes had the same states
     /// and elimination; the same for a step that is not taken, which leaves out dw.
@@ -61,7 +61,7 @@ template <int T> class Direction {
         return same_factors_;
     }
     /// Whether another step with the last factors costs far less than one with factors of its own.
-    bool worth_keeping() const { return linear_.of_many(); }
+    bool worth_keeping() const { return linear_->of_many(); }
 
   private:
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
@@ -96,7 +96,7 @@ template <int T> class Direction {
         }
         rhs.tail(tied_) = in_tied_rows.head(tied_) - known.tail(tied_);
         const VectorXd y =
-            same_factors_ ? linear_.again(rhs) : factored(matrix, left, right, unknowns, rhs);
+            same_factors_ ? linear_->again(rhs) : factored(matrix, left, right, unknowns, rhs);
         for (const Index i : active_) {
             const auto &step = steps_[static_cast<std::size_t>(i)];
             found.template segment<D>(D * i) +=
@@ -118,7 +118,7 @@ template <int T> class Direction {
             const double shift = singular_ ? small_shift * mean_normal() : 0.0;
             assemble(matrix, unknowns, system_.shift + shift);
             tie(matrix, left, right);
-            if (linear_.solve(J_, rhs, y, singular_) || singular_)
+            if (linear_->solve(J_, rhs, y, singular_) || singular_)
                 return y;
         }
     }
@@ -155,7 +155,7 @@ template <int T> class Direction {
                 }
             }
             J.finalize();
-            if (linear_.solve(J, rhs, y))
+            if (linear_->solve(J, rhs, y))
                 return y;
         }
         return VectorXd::Zero(unknowns);
@@ -230,7 +230,7 @@ template <int T> class Direction {
     std::vector<Index> offsets_, active_;
     std::vector<Eigen::Matrix<double, D, D>> to_, from_;
     MatrixXd J_;
-    LinearSolver linear_;
+    std::unique_ptr<LinearSolver> linear_;
     std::vector<Branch> branches_; // with which J was made
     bool stiff_ = false, same_factors_ = false, singular_ = false;
     Index tied_ = 0; // tied rows that J has

@@ -116,7 +116,7 @@ template <int P> class Judge {
         if (op_.W().symmetric())
             return static_cast<double>(op_.W().accurate(zero, forces).norm());
         const MatrixXd transposed = op_.W().dense().transpose();
-        const Square W(transposed.data(), zero.size(), zero.size(), Square::Part::all);
+        const Square W(transposed.data(), zero.size(), zero.size(), Part::all, op_.W().algebra());
         return static_cast<double>(W.accurate(zero, forces).norm());
     }
 

@@ -91,7 +91,7 @@ template <int T, class Scalar = double> class Nodal {
             const Eigen::FullPivLU<Matrix> lu(A_);
             regular_ = lu.isInvertible();
             if (regular_)
-                inverse_ = lu.inverse();
+                inverse_ = lu.solve(Matrix::Identity());
         }
     }
 
@@ -142,13 +142,12 @@ template <int T, class Scalar = double> class Nodal {
     }
 
   private:
-    /// The smallest sticking reaction of a singular A. In dynamic size and double precision, as
-    /// elsewhere in the kernel: one more kind of decomposition takes half a minute to compile.
+    /// The smallest sticking reaction of a singular A, in double precision.
     Vector least_stick(const Vector &q) const {
         const MatrixXd A = A_.template cast<double>();
         const VectorXd right = q.template cast<double>();
-        const Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal(A);
-        const VectorXd stick = orthogonal.solve(right);
+        VectorXd stick(right.size());
+        linear_algebra().least_squares(view(A), view(right), result(stick));
         return -stick.template cast<Scalar>();
     }
 

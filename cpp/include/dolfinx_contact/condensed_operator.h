@@ -20,17 +20,21 @@ class Operator {
   public:
     static constexpr Index many = 64; ///< contacts from which zeros and a low rank of W pay
 
-    /// W is copied; D = `dim` rows of a contact, tangential components first. D = 1 is contact
-    /// without friction, of which the normal rows alone are needed.
+    /// W is copied; `algebra` outlives the operator; D = `dim` rows of a contact, tangential
+    /// components first. D = 1 is contact without friction, of which the normal rows alone are
+    /// needed.
     template <class Derived>
-    Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0)
-        : size_(W.rows()), tied_(tied), dim_(dim),
+    Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0,
+             const LinearAlgebra &algebra = linear_algebra())
+        : size_(W.rows()), tied_(tied), dim_(dim), algebra_(algebra),
           symmetric_((W.array() == W.transpose().array()).all()) {
         if (!zeros_pay() || !take_sparse(W))
             take_dense(W);
     }
-    Operator(const Sparse &W, int dim, Index tied = 0)
-        : size_(W.rows()), tied_(tied), dim_(dim), symmetric_(is_symmetric(W)), sparse_(W) {
+    Operator(const Sparse &W, int dim, Index tied = 0,
+             const LinearAlgebra &algebra = linear_algebra())
+        : size_(W.rows()), tied_(tied), dim_(dim), algebra_(algebra), symmetric_(is_symmetric(W)),
+          sparse_(W) {
         if (!zeros_pay() || !is_sparse(sparse_.nonZeros())) {
             take_dense(MatrixXd(sparse_));
             sparse_ = {};
@@ -65,11 +69,11 @@ class Operator {
                         pattern_->block<1>(j, static_cast<Index>(a)).value();
             }
             normal_sparse_.finalize();
-            return normal_.emplace(normal_sparse_, symmetric_);
+            return normal_.emplace(normal_sparse_, symmetric_, algebra_);
         }
         normal_values_ = W_->dense()(rows, rows);
         return normal_.emplace(normal_values_.data(), size, size,
-                               symmetric_ ? Square::Part::lower : Square::Part::all);
+                               symmetric_ ? Part::lower : Part::all, algebra_);
     }
 
     /// W as a product, if its rank is low.
@@ -101,12 +105,13 @@ class Operator {
         if (symmetric_ && !pattern_) {
             auto lower = values_.leftCols(size_);
             lower.triangularView<Eigen::Lower>() = values_.rightCols(size_).transpose();
-            if (!invert(lower, tied_))
+            if (!algebra_.invert(result(lower), Part::lower, tied_))
                 return false;
-            inverse_.emplace(view(values_.data(), Square::Part::lower));
+            inverse_.emplace(square(values_.data(), Part::lower));
         } else {
-            inverse_values_ = W_->dense().partialPivLu().inverse();
-            inverse_.emplace(inverse_values_.data(), size_, size_, Square::Part::all);
+            inverse_values_ = W_->dense();
+            algebra_.invert(result(inverse_values_), Part::all, tied_);
+            inverse_.emplace(inverse_values_.data(), size_, size_, Part::all, algebra_);
         }
         if (!(inverse_->norm() * W_->norm() < 1.0 / smallest_rcond))
             inverse_.reset();
@@ -131,7 +136,7 @@ class Operator {
             values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
         else
             values_ = W;
-        set(view(values_.data() + (symmetric_ ? size_ : 0), Square::Part::upper));
+        set(square(values_.data() + (symmetric_ ? size_ : 0), Part::upper));
     }
     /// The entries that are not zero, if they are few.
     template <class Derived> bool take_sparse(const Eigen::MatrixBase<Derived> &W) {
@@ -143,19 +148,20 @@ class Operator {
     }
     void set_sparse() {
         pattern_.emplace(sparse_, dim_);
-        set(Square(sparse_, symmetric_));
+        set(Square(sparse_, symmetric_, algebra_));
     }
     void set(const Square &W) {
         W_.emplace(W);
         product_.emplace(*W_);
     }
 
-    Square view(const double *values, Square::Part triangle) const {
-        return {values, size_, size_, symmetric_ ? triangle : Square::Part::all};
+    Square square(const double *values, Part triangle) const {
+        return {values, size_, size_, symmetric_ ? triangle : Part::all, algebra_};
     }
 
     Index size_, tied_;
     int dim_;
+    const LinearAlgebra &algebra_;
     bool symmetric_;
     MatrixXd values_, inverse_values_;
     Sparse sparse_;

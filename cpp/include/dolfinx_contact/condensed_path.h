@@ -112,7 +112,8 @@ template <int T> class Smoothed {
         }
         const auto spectral = [&](const double *f) {
             Node v;
-            v << 0.5 * (f[1] - f[0]) * d, 0.5 * (f[0] + f[1]);
+            v.template head<T>() = 0.5 * (f[1] - f[0]) * d;
+            v[T] = 0.5 * (f[0] + f[1]);
             return v;
         };
         r = spectral(value);

@@ -20,7 +20,8 @@ struct Product {
 /// of matrices that are symmetric and positive semidefinite but for a little.
 class Elimination {
   public:
-    explicit Elimination(const Square &W) : symmetric_(W.symmetric()), left_(W.diagonal()) {
+    explicit Elimination(const Square &W)
+        : algebra_(W.algebra()), symmetric_(W.symmetric()), left_(W.diagonal()) {
         if (W.sparse() != nullptr) {
             columns_ = *W.sparse();
             if (!symmetric_)
@@ -58,8 +59,9 @@ class Elimination {
     Product product() const {
         const auto U = U_.leftCols(rank());
         const MatrixXd corner = U(pivots_, Eigen::seqN(0, rank())).transpose();
-        return {columns_at(pivots_).sparseView(),
-                corner.triangularView<Eigen::Upper>().solve(U.transpose())};
+        MatrixXd X = U.transpose();
+        algebra_.solve_triangular(view(corner), result(X));
+        return {columns_at(pivots_).sparseView(), X};
     }
 
   private:
@@ -98,7 +100,7 @@ class Elimination {
     MatrixXd brought(MatrixXd columns, const MatrixXd &L, const MatrixXd &U,
                      const std::vector<Index> &at) const {
         const MatrixXd of_columns = U(at, Eigen::seqN(0, rank())).transpose();
-        columns.noalias() -= L.leftCols(rank()) * of_columns;
+        algebra_.subtract_product(result(columns), view(L.leftCols(rank())), view(of_columns));
         return columns;
     }
     /// With p as pivot, its column and row up to date but for those since `first`.
@@ -117,6 +119,7 @@ class Elimination {
         pivots_.push_back(p);
     }
 
+    const LinearAlgebra &algebra_;
     MatrixXd A_;            // of W that is not sparse
     Sparse columns_, rows_; // of W that is; the rows if they are not the columns
     bool symmetric_;

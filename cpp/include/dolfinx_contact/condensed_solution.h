@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 /// @file condensed_solution.h
 /// What goes into the solution of a condensed problem, and what comes out. The definition of
-/// `solve`, whose compilation takes a minute, is in condensed.h.
+/// `solve`, whose compilation takes a minute, is in condensed_cascade.h.
 #pragma once
 
 #include "condensed_operator.h"

@@ -1,0 +1,249 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file condensed_algebra_eigen.h
+/// The linear algebra of the condensed solver by Eigen.
+#pragma once
+
+#include "condensed_algebra.h"
+#include <cmath>
+#include <vector>
+
+namespace dolfinx_contact::condensed {
+/// Sums of products of doubles, each as if in twice the precision
+/// [T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005), Algorithm 5.3, Dot2].
+struct AccurateSums {
+    VectorResult high, low;
+
+    void add(Index i, double a, double b) {
+        const double product = a * b, before = high[i], sum = before + product;
+        const double added = sum - before;
+        high[i] = sum;
+        low[i] += (before - (sum - added)) + (product - added) + std::fma(a, b, -product);
+    }
+};
+
+class EigenSolver final : public LinearSolver {
+  public:
+    EigenSolver() {
+        constexpr double enough = 1e-2; // of the largest entry of a column: pivots that fill less
+        sparse_.setPivotThreshold(enough);
+    }
+    double fill() const override {
+        const auto n = static_cast<double>(sparse_.rows());
+        return static_cast<double>(sparse_.nnzL() + sparse_.nnzU()) / (n * n);
+    }
+    bool of_many() const override {
+        return (kind_ == Kind::in_single && single_.rows() > 0) || kind_ == Kind::sparse;
+    }
+
+  protected:
+    void take(const MatrixView &J) override {
+        kind_ = Kind::in_double;
+        double_.compute(J);
+    }
+    bool take(const SparseView &J) override {
+        kind_ = Kind::sparse;
+        const Sparse matrix = J;
+        if (!ordered_for(matrix))
+            sparse_.analyzePattern(matrix);
+        sparse_.factorize(matrix);
+        return sparse_.info() == Eigen::Success;
+    }
+
+    bool solve(const MatrixView &J, const VectorView &rhs, VectorResult y,
+               bool regularised) override {
+        constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
+        constexpr Index worth_it = 128; // below, double precision costs nothing
+        kind_ = Kind::in_single;
+        if (J.rows() >= worth_it && !regularised && solve_in_single(J, rhs, y))
+            return true;
+        take(J);
+        if (regularised || double_.rcond() > smallest_rcond) {
+            y = double_.solve(rhs);
+            return true;
+        }
+        if (J.rows() >= worth_it)
+            return false;
+        kind_ = Kind::orthogonal;
+        orthogonal_.setThreshold(threshold);
+        y = orthogonal_.compute(J).solve(rhs);
+        return true;
+    }
+
+    void again(const VectorView &rhs, VectorResult y) const override {
+        if (kind_ == Kind::in_double)
+            y = double_.solve(rhs);
+        else if (kind_ == Kind::sparse)
+            y = sparse_.solve(rhs);
+        else if (kind_ == Kind::orthogonal)
+            y = orthogonal_.solve(rhs);
+        else if (const double scale = rhs.lpNorm<Eigen::Infinity>(); scale > 0.0)
+            y = scale * single_.solve((rhs / scale).cast<float>()).cast<double>();
+        else
+            y.setZero();
+    }
+
+  private:
+    /// Whether the last sparse matrix had entries in the same places; keeps those of J.
+    bool ordered_for(const Sparse &J) {
+        const int *outer = J.outerIndexPtr(), *inner = J.innerIndexPtr();
+        std::vector<int> places(outer, outer + J.outerSize() + 1);
+        places.insert(places.end(), inner, inner + J.nonZeros());
+        const bool same = places == places_;
+        places_ = std::move(places);
+        return same;
+    }
+
+    /// By iterative refinement; false if that does not converge, because J is too badly
+    /// conditioned for it.
+    bool solve_in_single(const MatrixView &J, const VectorView &rhs, VectorResult &y) {
+        constexpr double accuracy = 1e-12, contraction = 0.1;
+        const double scale = rhs.lpNorm<Eigen::Infinity>();
+        single_.compute(J.cast<float>());
+        y.setZero();
+        VectorXd rest = rhs;
+        for (double size = scale; size > accuracy * scale;) {
+            const Eigen::VectorXf unit = (rest / size).cast<float>();
+            y += size * single_.solve(unit).cast<double>();
+            rest = rhs;
+            rest.noalias() -= J * y;
+            const double after = rest.lpNorm<Eigen::Infinity>();
+            if (!(after <= contraction * size))
+                return after <= 1e2 * accuracy * scale;
+            size = after;
+        }
+        return true;
+    }
+
+    enum class Kind { in_single, in_double, orthogonal, sparse };
+
+    Kind kind_ = Kind::in_double;
+    Eigen::PartialPivLU<Eigen::MatrixXf> single_;
+    Eigen::PartialPivLU<MatrixXd> double_;
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
+    Eigen::SparseLU<Sparse> sparse_;
+    std::vector<int> places_; // of the entries of the last sparse matrix
+};
+
+class EigenAlgebra final : public LinearAlgebra {
+  public:
+    std::unique_ptr<LinearSolver> solver() const override {
+        return std::make_unique<EigenSolver>();
+    }
+
+    void multiply(const MatrixView &A, const VectorView &x, VectorResult y) const override {
+        y.noalias() = A * x;
+    }
+    void multiply(const MatrixView &A, Part part, const VectorView &x,
+                  VectorResult y) const override {
+        if (part == Part::all)
+            return multiply(A, x, y);
+        y.setZero();
+        if (part == Part::lower)
+            y.noalias() += A.selfadjointView<Eigen::Lower>() * x;
+        else
+            y.noalias() += A.selfadjointView<Eigen::Upper>() * x;
+    }
+    void multiply_accurately(const MatrixView &A, Part part, const VectorView &x, VectorResult high,
+                             VectorResult low) const override {
+        AccurateSums sums{high, low};
+        for (Index j = 0; j < A.cols(); ++j) {
+            const auto [first, last] = stored(part, j, A.rows());
+            for (Index i = first; i < last; ++i) {
+                sums.add(i, A(i, j), x[j]);
+                if (part != Part::all && i != j)
+                    sums.add(j, A(i, j), x[i]);
+            }
+        }
+    }
+    void multiply_accurately(const SparseView &A, const VectorView &x, VectorResult high,
+                             VectorResult low) const override {
+        AccurateSums sums{high, low};
+        for (Index j = 0; j < A.cols(); ++j)
+            for (SparseView::InnerIterator at(A, j); at; ++at)
+                sums.add(at.row(), at.value(), x[j]);
+    }
+    void magnitudes(const MatrixView &A, Part part, const VectorView &x,
+                    VectorResult y) const override {
+        const VectorXd size_of_x = x.cwiseAbs();
+        y.setZero();
+        for (Index j = 0; j < A.cols(); ++j) {
+            const auto [first, last] = stored(part, j, A.rows());
+            const auto column = A.col(j).segment(first, last - first).cwiseAbs();
+            const double diagonal = std::abs(A(j, j)) * size_of_x[j];
+            y.segment(first, last - first) += size_of_x[j] * column;
+            if (part != Part::all)
+                y[j] += column.dot(size_of_x.segment(first, last - first)) - diagonal;
+        }
+    }
+    void subtract_product(MatrixResult C, const MatrixView &A, const MatrixView &B) const override {
+        C.noalias() -= A * B;
+    }
+    void solve_triangular(const MatrixView &U, MatrixResult X) const override {
+        U.triangularView<Eigen::Upper>().solveInPlace(X);
+    }
+    void least_squares(const MatrixView &A, const VectorView &b, VectorResult y) const override {
+        y = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
+    }
+    bool invert(MatrixResult A, Part part, Index tied) const override {
+        if (part != Part::all)
+            return invert(A, tied);
+        A = Eigen::PartialPivLU<MatrixXd>(A).inverse();
+        return true;
+    }
+
+  private:
+    /// Inverts a symmetric positive definite matrix in place, lower triangle, by halves: n^3
+    /// operations, where factors and solves for the columns of the identity take 7/3 n^3.
+    // NOLINTNEXTLINE(misc-no-recursion): as deep as the logarithm of n
+    static bool invert(Eigen::Ref<MatrixXd> A) {
+        const Index n = A.rows(), half = n / 2;
+        if (n <= 64) { // smaller halves save nothing
+            const Eigen::LLT<MatrixXd> factors(A);
+            if (factors.info() != Eigen::Success)
+                return false;
+            A.triangularView<Eigen::Lower>() = factors.solve(MatrixXd::Identity(n, n));
+            return true;
+        }
+        auto first = A.topLeftCorner(half, half), last = A.bottomRightCorner(n - half, n - half);
+        auto coupling = A.bottomLeftCorner(n - half, half);
+        if (!invert(first))
+            return false;
+        const MatrixXd X = coupling * first.selfadjointView<Eigen::Lower>();
+        last.triangularView<Eigen::Lower>() -= X * coupling.transpose();
+        if (!invert(last))
+            return false;
+        coupling.noalias() = last.selfadjointView<Eigen::Lower>() * X;
+        first.triangularView<Eigen::Lower>() += X.transpose() * coupling;
+        coupling = -coupling;
+        return true;
+    }
+    /// The same, of the last `tied` rows, which may make the matrix indefinite, by their Schur
+    /// complement. False if that is singular.
+    static bool invert(Eigen::Ref<MatrixXd> A, Index tied) {
+        const Index n = A.rows() - tied;
+        auto first = A.topLeftCorner(n, n), last = A.bottomRightCorner(tied, tied);
+        auto coupling = A.bottomLeftCorner(tied, n);
+        if (!invert(first))
+            return false;
+        if (tied == 0)
+            return true;
+        const MatrixXd X = coupling * first.selfadjointView<Eigen::Lower>();
+        last.triangularView<Eigen::Lower>() -= X * coupling.transpose();
+        const Eigen::FullPivLU<MatrixXd> complement(MatrixXd(last.selfadjointView<Eigen::Lower>()));
+        if (!complement.isInvertible())
+            return false;
+        const MatrixXd inverse = complement.inverse();
+        last.triangularView<Eigen::Lower>() = (inverse + inverse.transpose()) / 2.0;
+        coupling.noalias() = last.selfadjointView<Eigen::Lower>() * X;
+        first.triangularView<Eigen::Lower>() += X.transpose() * coupling;
+        coupling = -coupling;
+        return true;
+    }
+};
+
+template <class> const LinearAlgebra &linear_algebra() {
+    static const EigenAlgebra algebra;
+    return algebra;
+}
+} // namespace dolfinx_contact::condensed
