@@ -12,10 +12,10 @@ namespace dolfinx_contact::condensed {
 /// A contact's reaction r and motion w (T tangential components, then the normal one), and what the
 /// law finds wrong with them.
 template <int T> struct ExactState {
+    Eigen::Matrix<Real, T, 1> slip; ///< what of w_t the slip rule does not explain; length
     Eigen::Matrix<Real, T + 1, 1> r, w;
     Eigen::Matrix<Real, T + 1, 1>
-        defect;                     ///< r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|)); force
-    Eigen::Matrix<Real, T, 1> slip; ///< what of w_t the slip rule does not explain; length
+        defect; ///< r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|)); force
     Branch branch;
 };
 
