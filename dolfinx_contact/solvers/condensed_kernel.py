@@ -17,7 +17,9 @@ def widest_algebra() -> Any:
     """
     for instructions in _kernel.instruction_sets():
         try:
-            return importlib.import_module(f"dolfinx_contact._algebra_{instructions}").linear_algebra
+            return importlib.import_module(
+                f"dolfinx_contact._algebra_{instructions}"
+            ).linear_algebra
         except ImportError:  # not built on this platform
             pass
     return None
