@@ -4,9 +4,7 @@
 /// The linear algebra of the condensed solver by Eigen.
 #pragma once
 
-#include "condensed_algebra.h"
-#include <cmath>
-#include <vector>
+#include "condensed_sparse.h"
 
 namespace dolfinx_contact::condensed {
 /// Sums of products of doubles, each as if in twice the precision
@@ -24,14 +22,7 @@ struct AccurateSums {
 
 class EigenSolver final : public LinearSolver {
   public:
-    EigenSolver() {
-        constexpr double enough = 1e-2; // of the largest entry of a column: pivots that fill less
-        sparse_.setPivotThreshold(enough);
-    }
-    double fill() const override {
-        const auto n = static_cast<double>(sparse_.rows());
-        return static_cast<double>(sparse_.nnzL() + sparse_.nnzU()) / (n * n);
-    }
+    double fill() const override { return sparse_.fill(); }
     bool of_many() const override {
         return (kind_ == Kind::in_single && single_.rows() > 0) || kind_ == Kind::sparse;
     }
@@ -43,11 +34,7 @@ class EigenSolver final : public LinearSolver {
     }
     bool take(const SparseView &J) override {
         kind_ = Kind::sparse;
-        const Sparse matrix = J;
-        if (!ordered_for(matrix))
-            sparse_.analyzePattern(matrix);
-        sparse_.factorize(matrix);
-        return sparse_.info() == Eigen::Success;
+        return sparse_.factor(J);
     }
 
     bool solve(const MatrixView &J, const VectorView &rhs, VectorResult y,
@@ -74,7 +61,7 @@ class EigenSolver final : public LinearSolver {
         if (kind_ == Kind::in_double)
             y = double_.solve(rhs);
         else if (kind_ == Kind::sparse)
-            y = sparse_.solve(rhs);
+            sparse_.solve(rhs, y);
         else if (kind_ == Kind::orthogonal)
             y = orthogonal_.solve(rhs);
         else if (const double scale = rhs.lpNorm<Eigen::Infinity>(); scale > 0.0)
@@ -84,16 +71,6 @@ class EigenSolver final : public LinearSolver {
     }
 
   private:
-    /// Whether the last sparse matrix had entries in the same places; keeps those of J.
-    bool ordered_for(const Sparse &J) {
-        const int *outer = J.outerIndexPtr(), *inner = J.innerIndexPtr();
-        std::vector<int> places(outer, outer + J.outerSize() + 1);
-        places.insert(places.end(), inner, inner + J.nonZeros());
-        const bool same = places == places_;
-        places_ = std::move(places);
-        return same;
-    }
-
     /// By iterative refinement; false if that does not converge, because J is too badly
     /// conditioned for it.
     bool solve_in_single(const MatrixView &J, const VectorView &rhs, VectorResult &y) {
@@ -121,8 +98,7 @@ class EigenSolver final : public LinearSolver {
     Eigen::PartialPivLU<Eigen::MatrixXf> single_;
     Eigen::PartialPivLU<MatrixXd> double_;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
-    Eigen::SparseLU<Sparse> sparse_;
-    std::vector<int> places_; // of the entries of the last sparse matrix
+    SparseSolver sparse_;
 };
 
 class EigenAlgebra final : public LinearAlgebra {

@@ -22,7 +22,7 @@ template <int T> class BlockSolver {
 
     /// False if the matrix is singular. Without B it is I.
     bool factor(const Blocks &A, const Blocks *B = nullptr) {
-        constexpr double filled = 0.2; // entries of factors over those of dense ones
+        constexpr double filled = 0.6; // entries of factors over those of dense ones
         B_.clear();
         if (B != nullptr)
             B_ = *B;
