@@ -98,7 +98,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         if (few_paths() || attempt("proximal point", [&] { this->swept(given, 300); }) ||
             attempt("sweeps", [&] { this->swept(zero, 2000); }))
             return;
-        if (!sparse && path())
+        if (sparse ? by_turns(150) : path())
             return;
         for (const Form form : {Form::metric_between, Form::units_of_contacts}) {
             if (sparse || !scaling_.far_apart())
