@@ -18,6 +18,12 @@ class Random {
         return std::uniform_real_distribution<double>(low, high)(engine);
     }
     double normal() { return std::normal_distribution<double>()(engine); }
+    Eigen::VectorXd vector(Eigen::Index size) {
+        return Eigen::VectorXd::NullaryExpr(size, [this] { return normal(); });
+    }
+    Eigen::MatrixXd matrix(Eigen::Index rows, Eigen::Index columns) {
+        return Eigen::MatrixXd::NullaryExpr(rows, columns, [this] { return normal(); });
+    }
     double power(double low, double high) { return std::pow(10.0, uniform(low, high)); }
     int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(engine); }
 

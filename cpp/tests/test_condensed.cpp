@@ -41,7 +41,7 @@ Problem<T> random_problem(Random &random, int contacts, int rank, const Tangent<
     Problem<T> problem;
     problem.mu = mu;
     problem.p = p;
-    const MatrixXd B = MatrixXd::NullaryExpr(D * contacts, rank, [&] { return random.normal(); });
+    const MatrixXd B = random.matrix(D * contacts, rank);
     problem.W = B * B.transpose();
     const double length = problem.W.diagonal().mean();
     problem.r = problem.w = VectorXd::Zero(D * contacts);
@@ -189,7 +189,7 @@ TEST(Condensed, symmetric_and_unsymmetric_storage) {
     problem.q = problem.w - problem.W * problem.r;
     auto changed = problem;
     changed.W(0, 1) *= 1 + 1e-14;
-    const VectorXd x = VectorXd::NullaryExpr(150, [&] { return random.normal(); });
+    const VectorXd x = random.vector(150);
     for (const auto &of : {problem, changed}) {
         Operator op = of.op();
         ASSERT_TRUE(op.prepare());

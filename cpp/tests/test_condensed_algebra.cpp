@@ -21,14 +21,8 @@ MatrixXd short_numbers(const MatrixXd &A) {
     constexpr double unit = 1 << 24;
     return (A * unit).array().round() / unit;
 }
-VectorXd vector(Random &random, Index size) {
-    return VectorXd::NullaryExpr(size, [&] { return random.normal(); });
-}
-MatrixXd matrix(Random &random, Index rows, Index columns) {
-    return MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
-}
 MatrixXd symmetric(Random &random, Index size, double shift) {
-    const MatrixXd half = matrix(random, size, size);
+    const MatrixXd half = random.matrix(size, size);
     return half * half.transpose() + shift * MatrixXd::Identity(size, size);
 }
 
@@ -53,12 +47,12 @@ TEST(CondensedAlgebra, Products) {
     const LinearAlgebra &algebra = linear_algebra();
     for (const Index size : sizes)
         for (const Part part : {Part::all, Part::lower, Part::upper}) {
-            const MatrixXd A = short_numbers(part == Part::all ? matrix(random, size, size)
+            const MatrixXd A = short_numbers(part == Part::all ? random.matrix(size, size)
                                                                : symmetric(random, size, 0.0) /
                                                                      static_cast<double>(size + 1));
             const MatrixXd given = only(A, part);
-            const VectorXd x = short_numbers(vector(random, size)),
-                           b = short_numbers(vector(random, size));
+            const VectorXd x = short_numbers(random.vector(size)),
+                           b = short_numbers(random.vector(size));
             VectorXd y = VectorXd::Constant(size, not_stored), low = VectorXd::Zero(size), high = b;
             algebra.multiply(view(given), part, view(x), result(y));
             const VectorXl exact = A.cast<Real>() * x.cast<Real>();
@@ -77,9 +71,9 @@ TEST(CondensedAlgebra, RectangularProductsAndTriangularSolves) {
     Random random(2);
     const LinearAlgebra &algebra = linear_algebra();
     for (const Index size : sizes) {
-        const MatrixXd A = matrix(random, size + 3, size), B = matrix(random, size, 4),
-                       C = matrix(random, size + 3, 4);
-        const VectorXd x = vector(random, size);
+        const MatrixXd A = random.matrix(size + 3, size), B = random.matrix(size, 4),
+                       C = random.matrix(size + 3, 4);
+        const VectorXd x = random.vector(size);
         VectorXd y(size + 3);
         algebra.multiply(view(A), view(x), result(y));
         EXPECT_LE(difference(y.cast<Real>(), A.cast<Real>() * x.cast<Real>()), 1e-13);
@@ -87,7 +81,7 @@ TEST(CondensedAlgebra, RectangularProductsAndTriangularSolves) {
         algebra.subtract_product(result(found), view(A), view(B));
         EXPECT_LE((found - (C - A * B)).norm(), 1e-12 * (1.0 + C.norm()));
         const MatrixXd U = MatrixXd::Identity(size, size) * static_cast<double>(size + 1) +
-                           matrix(random, size, size);
+                           random.matrix(size, size);
         found = B;
         algebra.solve_triangular(view(only(U, Part::upper)), result(found));
         EXPECT_LE((MatrixXd(U.triangularView<Eigen::Upper>()) * found - B).norm(),
@@ -99,7 +93,7 @@ TEST(CondensedAlgebra, Inverses) {
     Random random(3);
     const LinearAlgebra &algebra = linear_algebra();
     for (const Index size : sizes) {
-        const MatrixXd one = MatrixXd::Identity(size, size), general = matrix(random, size, size);
+        const MatrixXd one = MatrixXd::Identity(size, size), general = random.matrix(size, size);
         MatrixXd found = general;
         EXPECT_TRUE(algebra.invert(result(found), Part::all, 0));
         EXPECT_LE((found * general - one).norm(), 1e-10 * (1.0 + found.norm()));
@@ -122,8 +116,8 @@ TEST(CondensedAlgebra, SolutionsOfRegularAndSingularSystems) {
     Random random(4);
     for (const Index size : {1, 3, 40, 127, 128, 200}) { // in single precision from 128 on
         const auto solver = linear_algebra().solver();
-        MatrixXd J = matrix(random, size, size) + 10.0 * MatrixXd::Identity(size, size);
-        const VectorXd rhs = vector(random, size);
+        MatrixXd J = random.matrix(size, size) + 10.0 * MatrixXd::Identity(size, size);
+        const VectorXd rhs = random.vector(size);
         VectorXd y;
         for (const bool regularised : {false, true}) {
             ASSERT_TRUE(solver->solve(J, rhs, y, regularised));

@@ -34,7 +34,7 @@ struct Closed {
     MatrixXd H;
     VectorXd y;
     Closed(Random &random, Index nodes, Index motions, Index closed) {
-        H = MatrixXd::NullaryExpr(3 * nodes, motions, [&] { return random.normal(); });
+        H = random.matrix(3 * nodes, motions);
         y = VectorXd::Zero(3 * nodes);
         for (Index i = 0; i < closed; ++i)
             y[3 * i + 2] = random.uniform(0.5, 1.5);
@@ -53,9 +53,8 @@ TEST(CondensedFeasibility, ClosingContactsAreProved) {
             for (const double length : {1e-9, 1.0, 1e9})
                 for (const double compliance : {1e-9, 1.0, 1e9}) {
                     const Closed bodies(random, nodes, motions, 2 + random.below(int(nodes) - 1));
-                    VectorXd v = VectorXd::NullaryExpr(motions, [&] { return random.normal(); }),
-                             q = bodies.H * v;
-                    q += VectorXd::NullaryExpr(q.size(), [&] { return 0.1 * random.normal(); });
+                    VectorXd v = random.vector(motions), q = bodies.H * v;
+                    q += 0.1 * random.vector(q.size());
                     const double work = q.dot(bodies.y), wanted = random.power(-2, 0);
                     q -= (work + wanted * bodies.y.sum()) / bodies.y.squaredNorm() * bodies.y;
                     const MatrixXd W = compliance * bodies.H * bodies.H.transpose();
@@ -98,7 +97,7 @@ TEST(CondensedFeasibility, WhatHasASolutionIsNeverExcluded) {
 
 TEST(CondensedFeasibility, NothingIsClaimedOfBodiesThatGiveWay) {
     Random random(3);
-    const MatrixXd B = MatrixXd::NullaryExpr(90, 90, [&] { return random.normal(); });
+    const MatrixXd B = random.matrix(90, 90);
     const VectorXd q = VectorXd::Constant(90, -1.0);
     EXPECT_FALSE(excluded(B * B.transpose(), q));
     EXPECT_FALSE(excluded(MatrixXd::Zero(3, 3), VectorXd::Ones(3)));

@@ -20,13 +20,13 @@ using dolfinx_contact::condensed::VectorXd;
 // nothing that a plain sum would keep, single entries.
 TEST(CondensedJudge, products) {
     Random random(23);
-    MatrixXd W = MatrixXd::NullaryExpr(40, 40, [&] { return random.normal(); });
+    MatrixXd W = random.matrix(40, 40);
     W = MatrixXd(W + W.transpose());
     MatrixXd unsymmetric = W;
     unsymmetric(2, 5) *= 1 + 1e-14;
     for (const auto &of : {W, unsymmetric}) {
         const Operator op(of, 1);
-        const VectorXd x = VectorXd::NullaryExpr(40, [&] { return random.normal(); });
+        const VectorXd x = random.vector(40);
         const VectorXd size = of.cwiseAbs() * x.cwiseAbs();
         EXPECT_LE((op.W().magnitudes(x) - size).norm(), 1e-14 * size.norm());
         const auto exact = [&](const VectorXd &start) {
@@ -46,7 +46,7 @@ TEST(CondensedJudge, products) {
 // The inverse of a matrix whose last rows make it indefinite, one of them with a zero diagonal.
 TEST(CondensedJudge, inverse_with_tied_rows) {
     Random random(29);
-    const MatrixXd B = MatrixXd::NullaryExpr(152, 152, [&] { return random.normal(); });
+    const MatrixXd B = random.matrix(152, 152);
     MatrixXd W = B * B.transpose() / 152 + MatrixXd::Identity(152, 152);
     W = MatrixXd(W + W.transpose()) / 2;
     W(150, 150) = 0.0;

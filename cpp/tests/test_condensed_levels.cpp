@@ -64,9 +64,6 @@ Sparse matrix(Random &random, const Graph &graph, bool symmetric) {
     found.makeCompressed();
     return found;
 }
-VectorXd vector(Random &random, Index size) {
-    return VectorXd::NullaryExpr(size, [&] { return random.normal(); });
-}
 } // namespace
 
 TEST(CondensedLevels, CoupleToTheNextAlone) {
@@ -108,7 +105,7 @@ TEST(CondensedLevels, FactorsSolve) {
         for (const bool symmetric : {true, false})
             for (const double scale : {1.0, 1e150, 1e-150}) {
                 const Sparse A = scale * matrix(random, graph, symmetric);
-                const VectorXd b = vector(random, graph.unknowns);
+                const VectorXd b = random.vector(graph.unknowns);
                 const Levels levels(A);
                 LevelFactors factors;
                 for (int again = 0; again < 2; ++again) { // nothing is left of the last ones
@@ -142,7 +139,7 @@ TEST(CondensedLevels, SolverOfSparseMatrices) {
     for (const Graph &graph : graphs())
         for (const bool symmetric : {true, false, true}) {
             const Sparse A = matrix(random, graph, symmetric);
-            const VectorXd b = vector(random, graph.unknowns);
+            const VectorXd b = random.vector(graph.unknowns);
             VectorXd x;
             ASSERT_TRUE(solver->solve(A, b, x)) << graph.name;
             EXPECT_LE((A * x - b).norm(), 1e-13 * (A.norm() * x.norm() + b.norm())) << graph.name;
@@ -157,7 +154,7 @@ TEST(CondensedLevels, SolverOfSparseMatrices) {
         swap.diagonal().setConstant(diagonal);
         Sparse A = swap.sparseView(0.0, 0.0);
         A.makeCompressed();
-        const VectorXd b = vector(random, 8);
+        const VectorXd b = random.vector(8);
         VectorXd x;
         ASSERT_TRUE(solver->solve(A, b, x));
         EXPECT_LE((A * x - b).norm(), 1e-13 * (A.norm() * x.norm() + b.norm()));

@@ -15,12 +15,12 @@ namespace {
 template <int T> void check(int seed, bool sparse) {
     constexpr Index D = T + 1, nodes = 12, size = D * nodes;
     Random random(static_cast<std::uint64_t>(seed));
-    MatrixXd B = MatrixXd::NullaryExpr(size, size / 2, [&] { return random.normal(); });
+    MatrixXd B = random.matrix(size, size / 2);
     if (sparse) // chains of two contacts
         for (Index i = 0; i < size; ++i)
             for (Index j = 0; j < size / 2; ++j)
                 B(i, j) *= i / (2 * D) == j / D;
-    const VectorXd q = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+    const VectorXd q = random.vector(size);
     const Operator op(B * B.transpose(), T + 1);
     const AnyLaw<T> law = make_law<T>({0.7 * Tangent<T>::Ones()}, {0.7 * Tangent<T>::Ones()}, true);
     const System<T> system = Scaling<T, T>(op, law, q).make();

@@ -29,7 +29,7 @@ void check_factors(int seed, Index reach, double units) {
     constexpr Index nodes = 80, size = 3 * nodes;
     Random random(static_cast<std::uint64_t>(seed));
     const MatrixXd W = units * low_rank(random, size, 60, seed % 2 * 1e-3, reach);
-    const VectorXd q = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+    const VectorXd q = random.vector(size);
     const Operator op(W, 3);
     const AnyLaw<2> law = make_law<2>({0.7 * Tangent<2>::Ones()}, {0.7 * Tangent<2>::Ones()}, true);
     const System<2> system = Scaling<2, 2>(op, law, q).make();
@@ -47,7 +47,7 @@ void check_factors(int seed, Index reach, double units) {
     BlockSolver<2> solver(system);
     for (int time = 0; time < 3; ++time) { // of few entries first, where W is sparse
         ASSERT_TRUE(solver.factor(A, &B));
-        const VectorXd rhs = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+        const VectorXd rhs = random.vector(size);
         EXPECT_LT((J * solver.solve(rhs) - rhs).norm(), 1e-8 * rhs.norm()) << seed << " " << time;
     }
 }
@@ -94,7 +94,7 @@ TEST(CondensedRank, SparseFactorsOfOneMatrixAfterTheOther) {
         constexpr Index size = 60;
         MatrixXd J = low_rank(random, size, size, 0.1, reach);
         J.diagonal().array() += 1.0;
-        const VectorXd rhs = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+        const VectorXd rhs = random.vector(size);
         ASSERT_TRUE(solver->factor(Eigen::SparseMatrix<double>(J.sparseView())));
         EXPECT_LT((J * solver->again(rhs) - rhs).norm(), 1e-9 * rhs.norm()) << reach;
     }
@@ -129,7 +129,7 @@ void check_sparse(const Operator &op, const MatrixXd &W, Random &random) {
     const auto normal = Eigen::seqN(Index{2}, nodes, Index{3});
     EXPECT_EQ(op.normal().dense(), W(normal, normal));
     EXPECT_NEAR(op.mean_normal(), W.diagonal()(normal).cwiseAbs().mean(), 1e-14 * W.norm());
-    const VectorXd x = VectorXd::NullaryExpr(size, [&] { return random.normal(); }), b = -W * x;
+    const VectorXd x = random.vector(size), b = -W * x;
     const double rounding = 1e-15 * (W.cwiseAbs() * x.cwiseAbs()).norm();
     EXPECT_LT((op.W() * x - W * x).norm(), 10.0 * rounding);
     EXPECT_LT((op.W().magnitudes(x) - W.cwiseAbs() * x.cwiseAbs()).norm(), 10.0 * rounding);

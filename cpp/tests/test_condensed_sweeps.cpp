@@ -23,7 +23,7 @@ void check(int seed, Index nodes, Index reach) {
         for (Index j = 0; j < i; ++j)
             if (i / 3 - j / 3 <= reach)
                 W(i, j) = W(j, i) = 0.1 / static_cast<double>(3 * reach) * random.normal();
-    const VectorXd q = VectorXd::NullaryExpr(size, [&] { return random.normal(); });
+    const VectorXd q = random.vector(size);
     const Operator op(W, 3);
     const auto smooth = [&](Index i) { return seed % 2 == 1 && i % 4 == 0; };
     std::vector<Tangent<2>> mu;
