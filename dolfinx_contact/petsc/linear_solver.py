@@ -15,6 +15,9 @@ DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "
 # (notes/2026-11-22-condensed-speed.md).
 SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 
+# Of full matrices all orderings are as good, and PORD, which finds no separator in them, ends the process. AMD does not.
+FULL = SYMMETRIC | {"mat_mumps_icntl_7": 0}
+
 # Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
 # from zero, so that a run continued from a checkpoint has the same bits.
 MULTIGRID = {
@@ -81,7 +84,10 @@ def _to_factorise(A):
     A = PETSc.Mat().createAIJ(
         A.getSizes(), csr=(rows, columns[stored], values[stored]), comm=A.comm
     )
-    return A, SYMMETRIC if symmetric else DIRECT
+    if not symmetric:
+        return A, DIRECT
+    full = A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] == A.getSize()[0] ** 2
+    return A, FULL if full else SYMMETRIC
 
 
 @contextmanager
