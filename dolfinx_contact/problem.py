@@ -44,6 +44,7 @@ from dolfinx_contact.settle import found_for, refusal, with_friction
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
+from dolfinx_contact.unseen import Unseen
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -133,6 +134,7 @@ class ContactProblem(ProblemStates):
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
         self._points = [contact.points for contact in self.contacts]
+        self._unseen = Unseen(self.contacts)
         self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
@@ -207,6 +209,7 @@ class ContactProblem(ProblemStates):
         self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
+        self._unseen.check(self.u.x.array, dict(zip(self.contacts, self._stiffness)))
         warn_of_rounding(done, self.tol)
         return done
 

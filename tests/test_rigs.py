@@ -39,7 +39,7 @@ def test_a_curved_surface_is_in_balance_with_its_force(kind, solver):
     """Weight and shear force, up and down: the force of the contact is the given one along what is free, every step."""
     surface = CURVED[kind]()
     d = surface.point.size
-    scene = block(surface, 0.3, solver=SOLVERS[solver], cells=[3] * d)
+    scene = block(surface, 0.3, solver=SOLVERS[solver], cells=[4] * d)
     surface.free = names(surface, "t", "n")
     for shear, weight in ((0, 10), (1, 12), (2.5, 12), (-2, 8), (0, 20)):
         surface.force = np.array([shear, *np.zeros(d - 2), weight])
@@ -54,7 +54,7 @@ def test_its_place_is_that_of_the_run_with_displacements(kind):
     """Repeated under the same force a surface comes to where prescribing its place gives this force, to all digits."""
     surface, other = CURVED[kind](), CURVED[kind]()
     d = surface.point.size
-    scene, given = block(surface, cells=[3] * d), block(other, cells=[3] * d)
+    scene, given = block(surface, cells=[4] * d), block(other, cells=[4] * d)
     surface.free = names(surface, "n")
     for weight in (10.0, 30.0):
         surface.force = np.append(np.zeros(d - 1), weight)
@@ -72,7 +72,7 @@ def test_a_ball_comes_to_the_body(far):
     found = []
     for start in (0.0, far):
         ball = CURVED["sphere"]()
-        scene = block(ball, cells=[3, 3, 2])
+        scene = block(ball, cells=[5, 5, 2])
         ball.displacement = (0, 0, start)
         ball.free, ball.force = ("z",), (0, 0, 10.0)
         scene.step(0, 0, 0)
@@ -298,7 +298,7 @@ def test_units_do_not_matter(kind, length, modulus):
                 else dc.RigidCylinder(point, (1, 0, 0), 2 * size)
             )
             surface.free = ("x", "z", "rx")
-        scene, counts = block(surface, (0.3, 0.2), edge=size, modulus=stiff, cells=[3, 3, 2]), []
+        scene, counts = block(surface, (0.3, 0.2), edge=size, modulus=stiff, cells=[4, 4, 2]), []
         for shear, moment in ((0, 0), (1.0, 0.3), (-1.5, 0.5)):
             surface.force = force * np.array([shear, 0, 10.0])
             surface.moment = force * size * moment * np.array([1.0, 0.4, 0.1])

@@ -46,6 +46,7 @@ class Displacements:
         size: Owned degrees of freedom of all unknowns.
         count: Owned nodes of the displacements.
         dim: Their components.
+        degree: Of their shape functions.
     """
 
     def __init__(self, V):
@@ -55,6 +56,7 @@ class Displacements:
         if self.mixed:
             self.V, parent = part.collapse()
             self._dofs = np.array(parent, dtype=np.int32).reshape(-1, self.V.dofmap.index_map_bs)
+        self.degree = compat.lagrange_degree(self.V)
         self.dim, self.count = self.V.dofmap.index_map_bs, self.V.dofmap.index_map.size_local
 
     @property

@@ -92,6 +92,14 @@ class ContactResults(ContactLaws):
         """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
         return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
 
+    def everywhere(self, values: ArrayLike) -> np.ndarray:
+        """Values at the contact nodes at those of all nodes that this rank knows, ghosts included, zero elsewhere.  Collective."""
+        function = fem.Function(self.displacements.V)
+        rows = function.x.array.reshape(-1, self.displacements.dim)
+        rows[self.nodes, 0] = values
+        function.x.scatter_forward()
+        return rows[:, 0].copy()
+
     def reaction_function(self) -> fem.Function:
         """Nodal reactions in global components as a Function on the space of displacements, zero elsewhere."""
         function = fem.Function(self.displacements.V, name="reaction")

@@ -1,0 +1,174 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Contact facets between their nodes: positions there, and where a body would stand that is as smooth as its normals say.
+
+Contact is asked for at nodes alone.  Between them a facet is what the shape functions of the displacements make of its
+nodes, and a rigid surface may be nearer or farther than its gaps at the nodes tell.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact import compat
+
+# Points per direction of a facet: those of Gauss's rule, which no wave has at the same phase.
+POINTS = 5
+
+# Cosine of an angle between normals of a facet and of the body at its vertices above which an edge is a sharp one.
+SHARP = np.cos(np.deg2rad(20.0))
+
+
+class Facets(NamedTuple):
+    """Facets of one shape that this rank owns."""
+
+    nodes: np.ndarray  # local nodes of each, (m, k)
+    vertices: np.ndarray  # which of these are vertices, (v,)
+    dim: int  # of a facet
+    degree: int  # of the shape functions
+    inverse: np.ndarray  # of the matrix of monomials at the nodes, (k, k)
+    at_nodes: np.ndarray  # linear shape functions of the vertices at the nodes, (k, v)
+    bend: np.ndarray  # (n_b - n_a) . (x_b - x_a) of normals and positions of vertices, (m, v, v)
+    sharp: np.ndarray  # whether a vertex is on a sharp edge, (m,)
+    size: np.ndarray  # diameters, (m,)
+
+    def shapes(self, at: np.ndarray) -> np.ndarray:
+        """Shape functions at points of the unit square or interval, ``shape=(..., dim)``: ``(..., k)``."""
+        return _monomials(self._local(at), len(self.vertices), self.degree) @ self.inverse
+
+    def hats(self, at: np.ndarray) -> np.ndarray:
+        """Linear shape functions of the vertices, ``shape=(..., v)``, at the same points."""
+        corners = _corners(self.dim, len(self.vertices))
+        inverse = np.linalg.inv(_monomials(corners, len(corners), 1))
+        return _monomials(self._local(at), len(corners), 1) @ inverse
+
+    def sag_at_nodes(self) -> np.ndarray:
+        """The same at the nodes, ``shape=(m, k)``; none beside sharp edges."""
+        return self.sag(self.at_nodes) * ~self.sharp[:, None]
+
+    def some(self, which: np.ndarray) -> Facets:
+        """Those of them that a mask, ``shape=(m,)``, names."""
+        rows = ("nodes", "bend", "sharp", "size")
+        return self._replace(**{name: getattr(self, name)[which] for name in rows})
+
+    def _local(self, at: np.ndarray) -> np.ndarray:
+        """The unit square as a triangle, if facets are triangles."""
+        if self.dim == 1 or len(self.vertices) == 4:
+            return at
+        return np.stack((at[..., 0], at[..., 1] * (1.0 - at[..., 0])), axis=-1)
+
+    def sag(self, hats: np.ndarray) -> np.ndarray:
+        """How far a smooth body with these normals at the vertices stands out of the facets, length, ``shape=(m, q)``.
+
+        ``sum_{a<b} w_a w_b (n_b - n_a) . (x_b - x_a) / 2``, on an arc of radius R and chord h at its middle h^2 / 8R.
+
+        Args:
+            hats: Linear shape functions ``w`` of the vertices, ``shape=(q, v)``, or ``(m, q, v)``.
+        """
+        return 0.25 * ((hats @ self.bend) * hats).sum(axis=-1)
+
+
+def facets_of(contact) -> list[Facets]:
+    """The facets of a contact, those of each shape together.  Collective."""
+    V, topology = contact.displacements.V, contact.V.mesh.topology
+    fdim = topology.dim - 1
+    for dims in ((fdim, fdim + 1), (fdim + 1, fdim), (fdim + 1, 0)):
+        topology.create_connectivity(*dims)
+    mine = np.unique(contact.facets[contact.facets < topology.index_map(fdim).size_local])
+    cell_of, within = topology.connectivity(fdim, fdim + 1), topology.connectivity(fdim + 1, fdim)
+    cells = np.array([cell_of.links(facet)[0] for facet in mine], dtype=int)
+    places = [list(within.links(cell)).index(facet) for cell, facet in zip(cells, mine)]
+    layout, nodes, points = (
+        V.dofmap.dof_layout,
+        compat.cell_nodes(V),
+        compat.interpolation_points(V),
+    )
+    x, shapes = V.tabulate_dof_coordinates()[:, : fdim + 1], {}
+    count = topology.connectivity(fdim + 1, 0).links(0).size if mine.size else 0
+    tips = np.array([layout.entity_dofs(0, vertex)[0] for vertex in range(count)])
+    for place in sorted(set(places)):
+        closure = np.array(layout.entity_closure_dofs(fdim, place))
+        of = cells[np.array(places) == place]
+        corners = np.flatnonzero(np.isin(closure, tips))
+        local = _along(points[closure], points[closure[corners]])
+        key = (len(corners), len(closure), corners.tobytes(), np.round(local, 9).tobytes())
+        shapes.setdefault(key, (corners, local, [], []))
+        shapes[key][2].append(nodes[of][:, closure])
+        shapes[key][3].append(x[nodes[of]].mean(axis=1))
+    groups = [(c, at, np.concatenate(n), np.concatenate(m)) for c, at, n, m in shapes.values()]
+    return _with_normals(V, x, groups, fdim)
+
+
+def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
+    normals, total = [], fem.Function(V)
+    sums = total.x.array.reshape(-1, fdim + 1)
+    for corners, _, nodes, middle in groups:
+        outwards = _outwards(x[nodes[:, corners]], middle)
+        normals.append(outwards)
+        for corner in corners:
+            np.add.at(sums, nodes[:, corner], outwards)
+    compat.add_to_owners(total.x)
+    total.x.scatter_forward()
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    smooth = np.divide(sums, length, np.zeros_like(sums), where=length > 0)
+    found, degree = [], compat.lagrange_degree(V)
+    for (corners, local, nodes, _), own in zip(groups, normals):
+        at, n = x[nodes[:, corners]], smooth[nodes[:, corners]]
+        own = own / np.linalg.norm(own, axis=1, keepdims=True)
+        apart = at[:, None] - at[:, :, None]
+        flat = _monomials(_corners(fdim, len(corners)), len(corners), 1)
+        found.append(
+            Facets(
+                nodes, corners, fdim, degree,
+                np.linalg.inv(_monomials(local, len(corners), degree)),
+                _monomials(local, len(corners), 1) @ np.linalg.inv(flat),
+                ((n[:, None] - n[:, :, None]) * apart).sum(axis=-1),
+                (np.einsum("mi,mvi->mv", own, n) < SHARP).any(axis=1),
+                np.linalg.norm(apart, axis=-1).max(axis=(1, 2)),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _outwards(corners: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Normals of facets, away from the middles of their cells, as long as the facets are large."""
+    first = corners[:, 1] - corners[:, 0]
+    if corners.shape[2] == 2:
+        normal = np.column_stack((first[:, 1], -first[:, 0]))
+    elif corners.shape[1] == 3:
+        normal = np.cross(first, corners[:, 2] - corners[:, 0])
+    else:
+        normal = np.cross(corners[:, 3] - corners[:, 0], corners[:, 2] - corners[:, 1])
+    side = ((corners.mean(axis=1) - middle) * normal).sum(axis=1)
+    return normal * np.where(side < 0.0, -1.0, 1.0)[:, None]
+
+
+def gauss(dim: int) -> np.ndarray:
+    """Points of the unit square or interval, ``shape=(q, dim)``."""
+    along = 0.5 + 0.5 * np.polynomial.legendre.leggauss(POINTS)[0]
+    return np.stack(np.meshgrid(*[along] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+
+
+def _corners(dim: int, count: int) -> np.ndarray:
+    if dim == 1:
+        return np.array([[0.0], [1.0]])
+    return np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])[:count]
+
+
+def _along(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Coordinates on a facet of the reference cell, of which its corners have those of ``_corners``."""
+    dim = points.shape[1] - 1
+    axes = corners[1 : dim + 1] - corners[0]
+    return np.linalg.lstsq(axes.T, (points - corners[0]).T, rcond=None)[0].T
+
+
+def _monomials(at: np.ndarray, corners: int, degree: int) -> np.ndarray:
+    """Monomials that span the shape functions of intervals, triangles or quadrilaterals, ``shape=(..., k)``."""
+    powers = np.arange(degree + 1)
+    if at.shape[-1] == 1:
+        return at**powers
+    terms = [(i, j) for i in powers for j in powers if corners == 4 or i + j <= degree]
+    return np.stack([at[..., 0] ** i * at[..., 1] ** j for i, j in terms], axis=-1)

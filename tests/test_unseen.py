@@ -1,0 +1,150 @@
+"""What contact at nodes cannot see is told, once, and where it does not matter nothing is said."""
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from ring_scenes import INNER, bend, clamp
+from scenes import COMM, elasticity
+from test_surfaces import block
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace, second_order
+
+E, NU = 1000.0, 0.3
+
+
+@pytest.fixture(autouse=True)
+def all_others_are_errors():
+    """What a test does not expect fails it, whatever pytest was started with."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        yield
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("radius", [0.003, 0.1])
+def test_a_ball_smaller_than_a_facet_is_told_with_its_depth(d, radius):
+    """Pressed into the middle of a facet a ball meets no node: 0 N, and the depth that is told is the approach."""
+    middle = np.append(np.full(d - 1, 0.25), -radius)
+    scene = block(dc.RigidSphere(middle, radius), cells=[2] * d)
+    scene.step(*np.zeros(d))
+    with pytest.warns(UserWarning, match=r"goes 0\.0011 into the body between its nodes, near \(0\.25,.* no node feels it"):  # fmt: skip
+        scene.step(*np.zeros(d - 1), -0.0011)
+    assert scene.contact.force() == pytest.approx(np.zeros(d), abs=1e-12)
+    scene.step(*np.zeros(d - 1), -0.0012)  # told once
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_ball_that_nodes_feel_is_not_spoken_of(d):
+    """On a node, and with some facets across the contact; a ball from inside, which touches at nodes alone, too."""
+    for surface in (
+        dc.RigidSphere(np.append(np.zeros(d - 1), -0.1), 0.1),
+        dc.RigidSphere(np.append(np.full(d - 1, 0.125), -8.0), 8.0),
+        dc.RigidSphere(np.append(np.zeros(d - 1), 8.0), 8.0, inside=True),
+    ):
+        scene = block(surface, cells=[4] * d)
+        scene.step(*np.zeros(d - 1), -0.02)
+        assert np.linalg.norm(scene.contact.force()) > 0.0
+
+
+def on_waves(cells, crests, part=0.25):
+    """A block of width 1 on two waves, pressed by a part of the pressure that flattens them; crests at nodes or troughs.
+
+    Flat all over at ``p = pi E A / length`` [H. M. Westergaard, J. Appl. Mech. 6 (1939) A49].
+    """
+    height, length, sign = 1e-3, 0.5, 1.0 if crests else -1.0
+    plane = dc.RigidPlane((0, 0), (0, 1), height=lambda y: height * (sign * np.cos(2 * np.pi * y[0] / length) - 1))  # fmt: skip
+    corners = [np.array([-0.5, 0.0]), np.array([0.5, 1.0])]
+    domain = mesh.create_rectangle(COMM, corners, [cells, cells // 2 or 1], mesh.CellType.quadrilateral)  # fmt: skip
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    foot, top = (
+        mesh.locate_entities_boundary(domain, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1)
+    )
+    bcs = [fem.dirichletbc(np.zeros(2), fem.locate_dofs_topological(V, 1, top), V)]
+    bcs += [clamp(V, 0, lambda x, s=s: np.isclose(x[0], s)) for s in (-0.5, 0.5)]
+    contact = dc.Contact(V, foot, plane, dc.Friction(0.0))
+    problem = dc.ContactProblem(elasticity(u, v, E, 0.0), u, contact, bcs)
+    plane.free, plane.force = ("n",), (0, part * np.pi * E * height / length)
+    return SimpleNamespace(problem=problem, contact=contact)
+
+
+def test_waves_of_many_facets_touch_where_westergaard_says():
+    """Under a quarter of the pressure that flattens them a third of a sine's length touches; nothing is said."""
+    scene = on_waves(32, crests=True)
+    step = scene.problem.solve()
+    touching = step.counts.stick + step.counts.slip
+    assert touching / 32 == pytest.approx(1 / 3, abs=2 / 32)
+
+
+@pytest.mark.parametrize("crests, said", [(False, "goes 0.002 into the body"), (True, "recedes by 0.002 between nodes that touch")])  # fmt: skip
+def test_waves_shorter_than_a_facet_are_told(crests, said):
+    """All nodes in troughs, or all on crests: the whole height of the waves is missed."""
+    scene = on_waves(2, crests)
+    with pytest.warns(UserWarning, match=said):
+        scene.problem.solve()
+
+
+def test_a_height_that_only_nodes_have_is_taken_as_it_is():
+    """A table of heights at the nodes, NaN between them, says nothing about what is between."""
+
+    def table(y):
+        return np.where(np.isclose(np.round(4 * y[0]), 4 * y[0], atol=1e-3), 1e-4 * y[0], np.nan)
+
+    scene = block(dc.RigidPlane((0, 0), (0, 1), height=table), cells=[4, 2])
+    scene.step(0, -1e-3)
+    assert scene.contact.force()[1] > 0.0
+
+
+def ring(order, curved, interference, cells=(2, 12)):
+    """Half a ring held outside, on a shaft that is too large; its problem and the pressure of Lamé."""
+    domain = mesh.create_rectangle(COMM, [np.zeros(2), np.ones(2)], cells, mesh.CellType.quadrilateral)  # fmt: skip
+    domain = second_order(domain) if curved else domain
+    V = functionspace(domain, ("Lagrange", order, (2,)))
+    inside = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
+    bcs = [clamp(V, 0, lambda x: np.isclose(np.abs(x[1] - 0.5), 0.5))]
+    bcs += [clamp(V, axis, lambda x: np.isclose(x[0], 1.0)) for axis in (0, 1)]
+    bend(domain)
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    shaft = dc.RigidSphere((0, 0), INNER + interference)
+    contact = dc.Contact(V, inside, shaft, dc.Friction(0.0))
+    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+    A, B = np.linalg.solve([[1.0, 1.0], [INNER, 1 / INNER]], [0.0, interference])
+    G = E / (2 * (1 + NU))
+    pressure = -2 * G * (A / (1 - 2 * NU) - B / INNER**2)
+    return SimpleNamespace(problem=problem, contact=contact, pressure=pressure)
+
+
+def mean_pressure(contact):
+    force, area = COMM.allreduce(np.array([contact.reaction[:, -1].sum(), contact.area.sum()]))
+    return force / area
+
+
+def test_a_round_body_of_second_order_on_straight_cells_is_told():
+    """Nodes amid the edges stand h^2 / 8R inside a bore, more than the interference: its pressure is far from Lamé's."""
+    scene, chord = ring(2, False, 1e-3), np.pi / 12 * INNER
+    with pytest.warns(UserWarning, match=rf"stand {chord**2 / (8 * INNER):.2g} off the round"):
+        scene.problem.solve()
+    assert mean_pressure(scene.contact) > 2 * scene.pressure
+    scene.problem.solve()  # told once
+
+
+@pytest.mark.parametrize("order, curved", [(1, False), (2, True)])
+def test_a_round_body_that_is_round_at_its_nodes_has_the_pressure_of_lame(order, curved):
+    """Of first order, or with curved edges: within 3 % of the closed form, and nothing is said."""
+    scene = ring(order, curved, 1e-3, (4, 12))
+    scene.problem.solve()
+    assert mean_pressure(scene.contact) == pytest.approx(scene.pressure, rel=0.03)
+
+
+def test_straight_cells_are_good_enough_where_much_is_pressed_in():
+    """The same nodes under an interference of many times what they stand off are no matter, nor is a flat foot."""
+    scene = ring(2, False, 0.15)
+    scene.problem.solve()
+    assert mean_pressure(scene.contact) == pytest.approx(scene.pressure, rel=0.1)
+    flat = block(dc.RigidPlane((0, 0), (0, 1)), order=2, cells=[2, 2])
+    flat.step(0, -1e-9)
