@@ -210,6 +210,7 @@ class ContactProblem(ProblemStates):
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
         self._unseen.check(self.u.x.array, dict(zip(self.contacts, self._stiffness)))
+        self._unseen.check_wear(self.contacts, self._stiffness)
         warn_of_rounding(done, self.tol)
         return done
 

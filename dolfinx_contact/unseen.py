@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What contact at nodes cannot see, told once a problem: surfaces between nodes, round bodies made of straight cells.
+"""What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps.
 
 Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
 nodes miss is an error of their forces of about ``kappa`` times that length.
@@ -70,6 +70,7 @@ class Unseen:
         }
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.plane.varies]
+        self._leaps = True
 
     def check(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
         """Warn, of each kind once, of what the nodes do not see in the present state.  Collective.
@@ -91,6 +92,26 @@ class Unseen:
                     warnings.warn(said(contact, missed, pushed), stacklevel=3)
                     looked_at.clear()
                     break
+
+    def check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
+        """Warn once of a step that wears off so much that the next one is unloaded by more than it carries.  Collective.
+
+        Args:
+            contacts: All contacts.
+            stiffness: Of their nodes.
+        """
+        for contact, of in zip(contacts, stiffness):
+            if not self._leaps or contact.wear is None:
+                continue
+            times, depth, where = contact.worn_in_a_leap(of)
+            if times > 1.0:
+                self._leaps = False
+                warnings.warn(
+                    f"the depth of {depth:.2g} that this step wears off at the node at {_said(where)} takes {times:.2g} times its "
+                    "reaction from it: wear opens gaps only after a step, and so runs ahead of the pressure that makes it. Divide "
+                    f"steps like this one into {int(np.ceil(times))} or more.",
+                    stacklevel=3,
+                )
 
     def _is_straight(self, contact) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
@@ -185,7 +206,8 @@ def _of_straight(contact, missed: Missed, pushed: float) -> str:
     )
 
 
-def _said(where: tuple) -> str:
+def _said(where) -> str:
+    where = np.where(np.abs(where) < CLEAR * np.abs(where).max(), 0.0, where)
     return f"({', '.join(f'{x:.3g}' for x in where)})"
 
 

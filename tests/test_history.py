@@ -85,7 +85,7 @@ def test_nodal_areas_fill_the_surface():
             assert function.x.array[node] == pressure
 
 
-@pytest.mark.parametrize("coefficient", [1e-4, (2e-4, 1e-5)])
+@pytest.mark.parametrize("coefficient", [1e-6, (2e-6, 1e-7)])
 def test_worn_depth_opens_the_gap_and_conserves_volume(coefficient):
     """Volume worn is coefficient times work, in each direction; the gap of the next step has it."""
     scene = scenes.block(mu=0.3, p=None, wear=dc.Wear(coefficient))

@@ -148,3 +148,24 @@ def test_straight_cells_are_good_enough_where_much_is_pressed_in():
     assert mean_pressure(scene.contact) == pytest.approx(scene.pressure, rel=0.1)
     flat = block(dc.RigidPlane((0, 0), (0, 1)), order=2, cells=[2, 2])
     flat.step(0, -1e-9)
+
+
+def worn(parts, d):
+    """A column pressed by 0.01 and rubbed by half its height in some steps: depths worn, over the approach."""
+    plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
+    scene = block(plane, 0.1, cells=[1] * d)
+    scene.contact.wear = dc.Wear(2 / (1000 * 0.1 * 0.5))  # E k mu s / height = 2
+    scene.step(*np.zeros(d - 1), -0.01)
+    for k in range(parts):
+        plane.displacement = (k + 1) / parts * 0.5 * np.eye(d)[0]
+        scene.step(*np.zeros(d - 1), -0.01)
+    total, count = COMM.allreduce(np.array([scene.contact.wear_depth.sum(), scene.contact.nodes.size]))  # fmt: skip
+    return total / count / 0.01
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_wear_in_leaps_is_told_with_the_number_of_steps(d):
+    """Rubbed in one step more is worn off than was pressed in; in many steps it is 1 - exp(-2) of it, Archard's law."""
+    with pytest.warns(UserWarning, match="times its reaction.*Divide steps like this one into 2 or more"):  # fmt: skip
+        assert worn(1, d) > 1.9
+    assert worn(16, d) == pytest.approx(1 - np.exp(-2), rel=0.05)

@@ -253,5 +253,21 @@ class Contact(ContactKinematics):
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(self.slip_increment, axis=1)
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
+        self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
         self.settle(work.sum(axis=1), path, depth)
         self._settled_by = self.friction
+
+    def worn_in_a_leap(self, stiffness: NodalStiffness) -> tuple[float, float, list]:
+        """Of the node whose depth worn in the last step unloads it most: by how many times its reaction, depth and position.
+
+        Wear is explicit: the depth opens the gap of the next step.  With the node's own stiffness ``kappa`` it takes
+        ``kappa`` times the depth from the reaction.
+
+        Args:
+            stiffness: Of the nodes.  Collective.
+        """
+        depth, carried = self._unloads
+        taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)  # fmt: skip
+        k = int(taken.argmax()) if taken.size else None
+        mine = (0.0, 0.0, []) if k is None else (float(taken[k]), float(depth[k]), self.x[k].tolist())  # fmt: skip
+        return max(self.comm.allgather(mine))

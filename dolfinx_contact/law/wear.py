@@ -17,6 +17,9 @@ class Wear(Guarded):
     ``sum k_i w_i`` exactly.  With one coefficient and isotropic friction ``k = K / (mu H)`` is Archard's
     law, K his coefficient and H the hardness [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 
+    Wear is explicit: the depth of a step opens the gap of the next one.  A depth that takes more than its reaction from a node
+    (depth times the node's stiffness) makes depth run ahead of pressure: a warning then says into how many steps to divide.
+
     Args:
         coefficient: k, a number, or a pair for the two friction directions; volume per work, which
             is one over stress, >= 0.
