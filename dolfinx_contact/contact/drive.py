@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +79,7 @@ class Drive(Guarded):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Motions that forces drive, see docs/force.md: names among ``directions`` and ``turnings``; none at first."""
+        """Motions that forces drive, see docs/force.md: names among ``directions`` and ``turnings``, in the order given; none at first."""
         return self._free
 
     @free.setter
@@ -89,7 +89,7 @@ class Drive(Guarded):
             raise ValueError(
                 f"plane.free must be a tuple of names among {known}, such as ({self.directions[-1]!r},), got {names!r}."
             )
-        self._free = tuple(name for name in known if name in names)
+        self._free = tuple(dict.fromkeys(names))
         self._ever_free = self._ever_free or bool(self._free)
 
     @property
@@ -115,20 +115,28 @@ class Drive(Guarded):
         self._moment = value
 
     @property
-    def stiffness(self) -> np.ndarray:
-        """Of springs that pull the surface: a number, or one for each free motion; zero, a dead load, at first."""
-        return self._stiffness
+    def stiffness(self) -> np.ndarray | dict[str, float]:
+        """Of springs that pull the surface, by the name of the free motion; or one number for all of them, or one for each in the
+        order of ``free``.  Zero, a dead load, at first and for what is not named."""
+        return dict(self._stiffness) if isinstance(self._stiffness, dict) else self._stiffness
 
     @stiffness.setter
-    def stiffness(self, value: ArrayLike) -> None:
-        array = np.atleast_1d(finite("plane.stiffness", value))
-        most = self.point.size + self._rotation.size
-        if array.ndim != 1 or array.size > most or not (array >= 0).all():
+    def stiffness(self, value: Mapping[str, float] | ArrayLike) -> None:
+        names, known = None, self.directions + self.turnings
+        if isinstance(value, Mapping):
+            names = tuple(value)
+            if any(name not in known for name in names):
+                raise ValueError(
+                    f"plane.stiffness must name springs by free motions, among {known}, got {value!r}."
+                )
+        array = finite("plane.stiffness", value if names is None else list(value.values()))
+        array = np.atleast_1d(array)
+        if array.ndim != 1 or array.size > len(known) or not (array >= 0).all():
             raise ValueError(
-                "plane.stiffness must be a number, or one for each free direction, zero or more, got "
-                f"{value!r}."
+                f"plane.stiffness must be numbers, zero or more, by name, such as {{{self.directions[0]!r}: 200.0}}, or "
+                f"one for all free motions, got {value!r}."
             )
-        self._stiffness = frozen(array)
+        self._stiffness = frozen(array) if names is None else dict(zip(names, array.tolist()))
 
     @property
     def drive(self) -> np.ndarray:
@@ -141,7 +149,9 @@ class Drive(Guarded):
 
     @property
     def springs(self) -> np.ndarray:
-        """Stiffness of the spring of each free motion, ``shape=(m,)``, force per length or moment per radian."""
+        """Stiffness of the spring of each free motion, in the order of ``free``, ``shape=(m,)``, force per length or moment per radian."""
+        if isinstance(self._stiffness, dict):
+            return np.array([self._stiffness.get(name, 0.0) for name in self._free])
         return np.broadcast_to(self._stiffness, len(self._free))
 
     @property
@@ -200,16 +210,7 @@ class Drive(Guarded):
 
     def check_drive(self) -> None:
         """Raise a ``ValueError`` if no force drives what is free, or a plane would leave the body."""
-        count, stiffness = len(self._free), self._stiffness
-        if stiffness.size not in (1, count):
-            raise ValueError(
-                f"plane.stiffness has {stiffness.size} numbers, plane.free {count} names."
-            )
-        if self.spins and stiffness.size == 1 < count and stiffness.any():
-            raise ValueError(
-                f"plane.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
-                "one for each."
-            )
+        self._check_springs()
         if not self._ever_free and not (self._force is None and self._moment is None):
             self._ever_free = True
             warnings.warn(
@@ -227,6 +228,22 @@ class Drive(Guarded):
                 "plane.force."
             )
         self._check_pressing(moving[-1])
+
+    def _check_springs(self) -> None:
+        """Raise a ``ValueError`` if numbers without names do not tell which spring is which."""
+        count, stiffness = len(self._free), self._stiffness
+        if isinstance(stiffness, dict):
+            return
+        if stiffness.size not in (1, count):
+            raise ValueError(
+                f"plane.stiffness has {stiffness.size} numbers, plane.free {count} names: name the springs, such as "
+                f"plane.stiffness = {{{self.directions[0]!r}: 200.0}}."
+            )
+        if self.spins and stiffness.size == 1 < count and stiffness.any():
+            raise ValueError(
+                f"plane.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
+                "one for each, by name."
+            )
 
     def _check_pressing(self, motion: Motion) -> None:
         """Raise a ``ValueError`` if the force pulls a surface off bodies, which that of a plane may say beforehand."""

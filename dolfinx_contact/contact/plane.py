@@ -45,8 +45,9 @@ class RigidPlane(Surface):
             directions that are not free do not count: a guide carries the rest.
         moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
             dimensions one number, global frame; None is zero.
-        stiffness: Of a spring that pulls the plane along the free directions, force per length: a number, or one for
-            each of them, of a rotation moment per radian; zero, a dead load, at first.
+        stiffness: Of springs that pull the plane along free directions, by name, ``{"t1": 200.0}``: force per length, of
+            rotations moment per radian.  Or one number for all free directions, or one for each in the order of ``free``.  Zero,
+            a dead load, at first and for directions without a name.
         drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
 
     Example:
