@@ -29,6 +29,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dolfinx_contact.contact.history import Status
+
 EPSILON = np.finfo(float).eps / 2  # of one operation
 
 # Rounding is an estimate: errors up to this many times as large may be no more than that.
@@ -46,13 +48,14 @@ class NodalStiffness(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors of a state, dimensionless; ``change`` is that of the reactions since the state before, over S."""
+    """Errors of a state, dimensionless; ``change`` is that of the reactions since the state before, over S, the ``scale``."""
 
     error: float
     slip_error: float
     rounding: float
     change: float = np.inf
     acts: bool = True  # forces above rounding do
+    scale: float = 0.0  # S, in the unit of force of the sums
 
     @property
     def largest(self) -> float:
@@ -88,6 +91,23 @@ def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...
     return contact.reaction - projected, penetration, slip
 
 
+def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
+    """Nodes called slipping whose slip is less than what is unknown of a state, ``shape=(n,)``, booleans.
+
+    On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
+
+    Args:
+        contact: Contact with its present state.
+        stiffness: Of its nodes.
+        unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
+    """
+    made = np.linalg.norm(
+        np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_increment), axis=1
+    )
+    rough = (np.broadcast_to(contact.friction.mu, (made.size, 2)) > 0.0).any(axis=1)
+    return rough & (contact.status == int(Status.SLIP)) & (made <= unknown)
+
+
 def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
     """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
 
@@ -121,4 +141,4 @@ def as_errors(sums: np.ndarray) -> Errors:
     error, slip_error, rounding, change = map(float, left)
     if np.isnan([equilibrium, law, penetration]).any():
         error = np.nan
-    return Errors(error, slip_error, rounding, change, acts)
+    return Errors(error, slip_error, rounding, change, acts, float(acting))

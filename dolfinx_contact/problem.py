@@ -179,6 +179,7 @@ class ContactProblem(ProblemStates):
             self._check_input()
             self._renew_laws(begin=True)
             step, found = self._search()
+            step.rest()
             done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
             if not converged(step.errors, done, self.tol):
                 raise NotConverged(

@@ -8,13 +8,16 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.driven import driven_planes
+from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.shared import shared_nodes
 from dolfinx_contact.contact.sliding import lost_far_away, nothing_holds
 from dolfinx_contact.error import (
     EPSILON,
+    ROUNDED,
     Errors,
     NodalStiffness,
     as_errors,
+    at_rest,
     contact_defects,
     contact_rounding,
 )
@@ -158,6 +161,15 @@ class LoadStep:
         return size
 
     # -- errors --------------------------------------------------------------------------------
+
+    def rest(self) -> None:
+        """Call sticking what slips by less than the tolerance leaves unknown of the state judged last."""
+        errors = self.errors
+        unknown = max(self.tol, ROUNDED * errors.rounding) * errors.scale * self.unit
+        for contact, stiffness in zip(self.contacts, self.stiffness):
+            still = at_rest(contact, stiffness, unknown)
+            if still.any():
+                contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
 
     def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state.

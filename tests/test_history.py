@@ -301,3 +301,24 @@ def test_killed_run_continues_to_the_same_bits(tmp_path):
             assert done.returncode == (0 if kill == -1 else -9), done.stderr.decode()
         results.append(np.load(folder / "result.npy"))
     assert np.array_equal(*results)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()], ids=["default", "fixed point"])
+@pytest.mark.parametrize("driven", [False, True], ids=["displacement", "force"])
+def test_nothing_slips_while_nothing_moves(driven, solver):
+    """A step without any change calls sticking what touches and works nothing; a millionth of the way slips again."""
+    scene = scenes.block(cells=(3, 3, 2), mu=(0.3, 0.3), p=None, solver=solver)
+    plane, contact = scene.plane, scene.contact
+    if driven:
+        plane.free, plane.force = ("n",), (0.0, 0.0, 100.0)
+    else:
+        scene.move_top(0.0, 0.0, -1e-3)
+    steps, work = [], []
+    for way in (5e-3, 6e-3, 6e-3, 6e-3, 6e-3 + 1e-8):
+        plane.displacement = (way, 0.0, plane.displacement[2])
+        steps.append(scene.problem.solve().counts)
+        work.append(COMM.allreduce(contact.dissipation.sum()))
+    assert steps[1].slip == steps[4].slip > 0 == steps[1].open
+    assert steps[2] == steps[3] == (0, sum(steps[1]), 0)
+    assert work[3] == pytest.approx(work[1], rel=1e-8)
+    assert work[4] > work[3]

@@ -14,7 +14,7 @@ from dolfinx_contact.attributes import Guarded, frozen
 
 
 class Status(IntEnum):
-    """What a contact node does, which is the branch that the projection took.
+    """What a contact node does, which is the branch that the projection took; after a step a slip below its ``tol`` is none.
 
     Example:
         >>> slipping = contact.x[contact.status == dc.Status.SLIP]  # where the nodes are that slip
