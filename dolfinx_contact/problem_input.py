@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
@@ -123,10 +122,6 @@ def hold(contacts, body) -> None:
         for contact in contacts:
             contact.points.hold(*_held_directions(contact, body.fixed))
             left_out.append(contact.x[contact.points.closed])
-    for contact in contacts:
-        guided = contact.points.guided
-        some = body.comm.allreduce(guided is not None, op=MPI.LOR)
-        contact.guide((guided or (np.zeros(0, dtype=int), np.zeros((0, 2)))) if some else None)
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     if len(where) == 0:
@@ -166,7 +161,7 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
         free = contact.points.tangents_free_of(fixed)[nodes]
         longest = free[np.arange(len(nodes)), np.diagonal(free, axis1=1, axis2=2).argmax(axis=1)]
         held[nodes], guided = False, (nodes, longest / np.linalg.norm(longest, axis=1)[:, None])
-    return held, closed, guided
+    return held, closed, guided, np.isin(contact.points.dofs, fixed)
 
 
 def follow(contacts, body, u: np.ndarray, known: list) -> bool:

@@ -60,9 +60,9 @@ class Statics:
             motion = points.motion(self._modes)
             points.without_held(motion[:, :-1])
             motion[points.closed] = 0.0
-            turns = principal_axes(contact.friction, points.count, self._dim)
+            turns = principal_axes(contact.free_friction, points.count, self._dim)
             parts.append(turns @ motion)
-            mu = contact.friction.mu[..., : self._dim - 1]
+            mu = contact.free_friction.mu[..., : self._dim - 1]
             coefficients.append(np.broadcast_to(mu, (points.count, self._dim - 1)))
         self._motion, self._mu = np.concatenate(parts), np.concatenate(coefficients)
         self._felt = body.total((self._motion**2).sum(axis=(0, 1)))

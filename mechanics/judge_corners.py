@@ -72,7 +72,6 @@ class CornerJudge:
             r = np.column_stack((force @ tangents.T, force @ normal))
             gap = (self.x[nodes] + u[nodes] - point - moved) @ normal
             way = u[nodes] - self.before[nodes] - moved + self.moved[k]
-            way[fixed.reshape(-1, d)[nodes]] = 0.0  # what supports hold neither slips nor rubs
             slip = way @ tangents.T
             self.moved[k] = moved
             mu = np.broadcast_to(scene.mu[k], d - 1).astype(float)

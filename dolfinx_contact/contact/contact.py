@@ -201,7 +201,7 @@ class Contact(ContactKinematics):
     def respond(self, u, map) -> None:
         """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
         self.move(u)
-        reaction, status = map(self.law, self.reaction, self.gap, self.slip_increment)
+        reaction, status = map(self.law_of(self.law), self.reaction, self.gap, self.slip_increment)
         self.take(reaction=reaction, status=status)
 
     def respond_with_derivatives(self, u, map) -> tuple[np.ndarray, np.ndarray]:
@@ -213,7 +213,7 @@ class Contact(ContactKinematics):
         """
         self.move(u)
         state = self.reaction, self.gap, self.slip_increment
-        reaction, status, *derivatives = map.linearised(self.law, *state)
+        reaction, status, *derivatives = map.linearised(self.law_of(self.law), *state)
         self.take(reaction=reaction, status=status)
         return tuple(derivatives)
 
@@ -248,7 +248,7 @@ class Contact(ContactKinematics):
             work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
         else:  # forces before the step with the law at its beginning
             none = np.zeros_like(before)
-            work = work_of_friction(self._begun[1], before, slipped, none, slip, law_before)
+            work = work_of_friction(self._begun, before, slipped, none, slip, law_before)
             work += work_of_friction(law, none, slipped, self.reaction, slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(self.slip_increment, axis=1)

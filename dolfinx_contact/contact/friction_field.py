@@ -15,6 +15,9 @@ from dolfinx_contact.law.friction import Friction, is_field
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
 
+# Part of a direction that is rounding beside a principal one.
+STRAIGHT = 1e-12
+
 # Arrays of a contact that coefficients may follow: arguments of callables.
 STATE = ("pressure", "slip_path", "dissipation", "wear_depth")
 
@@ -44,23 +47,24 @@ def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=Non
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
-    """The law of nodes some of which can slide along one direction alone.
+    """The law of nodes some of which can slide along one direction ``f`` alone, for their friction along it.
 
-    The cone is cut along that direction ``s``: ``|r_s| <= r_n / |M^-1 s|``.  What the support carries across it is no
-    reaction of the plane.  Slip is along ``s``, whatever the slip rule.
+    Slip is along ``f``, and the slip rule says with which friction: ``|r_f| <= r_n f.P^2 f / |M^-1 P^2 f|``.  Of nodes
+    guided along a principal direction nothing has to be changed.
 
     Args:
         friction: The law given, with coefficients or arrays of them.
         count: Number of this rank's nodes.
-        nodes, along: These nodes, and unit vectors in the tangential part of the local frame, ``shape=(k, 2)``.
+        nodes, along: Those held in any direction, and ``f`` of each, ``shape=(k, 2)``, local frame, zero where there is none.
     """
+    turned = friction.at(nodes).along_axes(along)
+    oblique = (np.abs(turned) > STRAIGHT).all(axis=1)
+    if not oblique.any():
+        return friction
+    nodes, along = nodes[oblique], along[oblique]
     mu, p = (np.broadcast_to(part, (count, 2)).copy() for part in (friction.mu, friction.p))
     axes = np.tile([1.0, 0.0], (count, 1)) if friction.axes is None else friction.axes.copy()
-    (cos, sin), (x, y) = axes[nodes].T, along.T
-    principal = np.column_stack((cos * x + sin * y, cos * y - sin * x))
-    with np.errstate(divide="ignore", invalid="ignore"):  # no friction at some nodes
-        cut = 1.0 / np.linalg.norm(principal / mu[nodes], axis=1)
-    mu[nodes] = p[nodes] = np.where((mu[nodes] > 0.0).all(axis=1), cut, 0.0)[:, None]
+    mu[nodes] = p[nodes] = (friction.at(nodes).drag(along) * along).sum(axis=1, keepdims=True)
     axes[nodes] = along
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
 

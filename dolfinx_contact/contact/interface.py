@@ -8,7 +8,10 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact.error import NodalStiffness
+from dolfinx_contact.error import EPSILON, NodalStiffness
+
+# Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
+FREE, STILL = 1e-12, 64 * EPSILON
 
 
 class ContactPoints:
@@ -21,11 +24,13 @@ class ContactPoints:
 
     Attributes:
         B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
-        held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  There is neither
-            slip nor friction in them: what the support carries is no reaction of the plane.
+        held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  Slip in them is known:
+            friction follows from it, and the support carries the rest, see ``law/supported.py``.
         guided: Points that can slide along one tangential direction alone, which is none of the frame's, and the
             tangential components of that unit vector, ``shape=(k,)`` and ``(k, 2)``; None if there are none.
         closed: Points whose motion along the normal is given, ``shape=(n,)``: they never touch.
+        supported: Other points with such a direction, indices, ``shape=(k,)``.
+        along: Their tangential direction that is left free, unit vectors, zero where none is, ``shape=(k, gdim - 1)``.
     """
 
     def __init__(self, dofs: np.ndarray, frames: np.ndarray, size: int):
@@ -40,9 +45,47 @@ class ContactPoints:
             np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
         )
 
-    def hold(self, held: np.ndarray, closed: np.ndarray, guided: tuple | None = None) -> None:
-        """Take note of what boundary conditions fix: directions ``held``, points ``closed``, others ``guided``."""
+    def hold(
+        self, held: np.ndarray, closed: np.ndarray, guided: tuple | None = None, fixed=None
+    ) -> None:
+        """Take note of what boundary conditions fix: directions ``held``, points ``closed``, others ``guided``.
+
+        Args:
+            fixed: Which degrees of freedom of the points they are, ``shape=(n, gdim)``; None is none.
+        """
         self.held, self.closed, self.guided = held, closed, guided
+        some = held.any(axis=1)
+        along = np.where(some[:, None] & ~held, 1.0, 0.0)
+        if guided is not None:
+            some[guided[0]], along[guided[0]] = True, guided[1]
+        self.supported = np.flatnonzero(some & ~closed)
+        self.along = along[self.supported]
+        frames = self.frames[self.supported]
+        if self.supported.size:
+            carried = (frames[:, :-1] * fixed[self.supported][:, None, :]) @ frames.transpose(
+                0, 2, 1
+            )
+            carried -= self.along[:, :, None] * (self.along[:, None, :] @ carried)
+            self._given = np.where(np.abs(carried) < FREE, 0.0, carried)
+
+    def known(self, motion: np.ndarray, terms) -> np.ndarray | None:
+        """Tangential part of a motion that boundary conditions prescribe, ``shape=(n, gdim - 1)``; None if it is rounding.
+
+        Args:
+            motion: Local components, ``shape=(n, gdim)``, length units.
+            terms: Motions that it is the difference of, local components.
+        """
+        if not self.supported.size:
+            return None
+        part = (self._given @ motion[self.supported][:, :, None])[:, :, 0]
+        if not part.any():
+            return None
+        size = sum(np.abs(term) for term in terms)[self.supported].sum(axis=1)
+        still = np.abs(part).max(axis=1) <= STILL * size
+        part[still] = 0.0
+        known = np.zeros((self.count, self.dim - 1))
+        known[self.supported] = part
+        return None if still.all() else known
 
     def without_held(self, tangential: np.ndarray) -> None:
         """Take from tangential components, ``shape=(n, gdim - 1, ...)``, in place, what boundary conditions hold."""
@@ -89,7 +132,10 @@ class ContactPoints:
         return free @ free.transpose(0, 2, 1)
 
     def stiffness(self, K) -> NodalStiffness:
-        """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective."""
+        """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective.
+
+        Along directions that boundary conditions hold, where the matrix has their rows, it is that along the normal.
+        """
         first = K.getOwnershipRange()[0]
         order = np.argsort(self.dofs, axis=None)  # PETSc wants them sorted
         dofs = (self.dofs.ravel()[order] + first).astype(PETSc.IntType)
@@ -106,7 +152,14 @@ class ContactPoints:
         rows.destroy()
         block.destroy()
         local = self.frames @ blocks @ self.frames.transpose(0, 2, 1)
-        return NodalStiffness(local[:, -1, -1].copy(), local[:, :-1, :-1])
+        normal, tangential = local[:, -1, -1].copy(), local[:, :-1, :-1]
+        if self.supported.size:
+            f = self.along[:, :, None] * self.along[:, None, :]
+            held = np.eye(self.dim - 1) - f
+            tangential[self.supported] = (
+                f @ tangential[self.supported] @ f + normal[self.supported, None, None] * held
+            )
+        return NodalStiffness(normal, tangential)
 
 
 def assembled(points, derivatives, size: int) -> tuple:

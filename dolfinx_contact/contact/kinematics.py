@@ -18,11 +18,14 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact.attributes import frozen
+from dolfinx_contact.contact.friction_field import guided
 from dolfinx_contact.contact.history import State, Status
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.results import ContactResults
 from dolfinx_contact.contact.surface import cross
 from dolfinx_contact.error import EPSILON
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.supported import supported
 
 
 class Placed(NamedTuple):
@@ -41,6 +44,10 @@ class ContactKinematics(ContactResults):
     """Motion of the nodes of a ``Contact``, which has ``V``, ``displacements``, ``nodes``, ``x`` and ``plane``."""
 
     _placed: Any = None  # ``Placed``
+    _free_friction: Any = None  # with what it was made of
+    _known: Any = (
+        None  # slip that supports prescribe in the present state, None where there is none
+    )
     _settled: Any = None  # the same and the last state, at the end of the last step
 
     @property
@@ -168,13 +175,53 @@ class ContactKinematics(ContactResults):
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
         """
         values = u.x.array if hasattr(u, "x") else u
-        displacement = self.points.motion(values[: self.points.size]) - self._moved()
+        motion, moved = self.points.motion(values[: self.points.size]), self._moved()
+        displacement = motion - moved
         gap = self._placed.flat + self.wear_depth + displacement[:, -1]
-        slip = (displacement - self.last.displacement)[:, :-1]
+        since = displacement - self.last.displacement
+        self._known = self.points.known(since, (motion, moved, self.last.displacement))
+        slip = since[:, :-1]
         self.points.without_held(slip)
+        if self._known is not None:
+            slip += self._known
         closed = self.points.closed
         gap[closed] = np.maximum(gap[closed], self._apart)
         self.take(displacement=displacement, gap=gap, slip_increment=slip)
+
+    @property
+    def known_slip(self) -> np.ndarray:
+        """Part of ``slip_increment`` that supports prescribe, ``shape=(n, gdim - 1)``, local frame, length units."""
+        return np.zeros_like(self.slip_increment) if self._known is None else self._known
+
+    @property
+    def free_friction(self) -> Friction:
+        """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
+        along = self.points.along
+        if not along.any() or self.friction.frictionless:
+            return self.friction
+        known = self._free_friction
+        if known is None or known[0] is not self.friction or known[1] is not along:
+            found = guided(self.friction, self.points.count, self.points.supported, along)
+            self._free_friction = known = self.friction, along, found
+        return known[2]
+
+    def law_of(self, law, nodes=slice(None)) -> Any:
+        """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
+
+        Args:
+            law: Of the kernel, of these nodes.
+            nodes: Their indices, ``shape=(k,)``; all of them by default.
+        """
+        points = self.points
+        if not points.supported.size or self.friction.frictionless:
+            return law
+        rows = np.arange(points.count)[nodes]
+        at = np.searchsorted(points.supported, rows)
+        at[at == points.supported.size] = 0
+        mine = points.supported[at] == rows
+        known, last = self.known_slip[rows], self.last.reaction[rows, :-1]
+        friction = self.friction if isinstance(nodes, slice) else self.friction.at(rows)
+        return supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
 
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
@@ -197,7 +244,8 @@ class ContactKinematics(ContactResults):
         coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.plane.point))
         gap = terms[:, -1] + coordinates + self.wear_depth
         slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
-        slip[self.points.held] = 0.0
+        if self._known is None:
+            slip[self.points.held] = 0.0
         return EPSILON * gap, EPSILON * slip
 
     # -- history -------------------------------------------------------------------------------

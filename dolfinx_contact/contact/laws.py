@@ -10,7 +10,7 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
-from dolfinx_contact.contact.friction_field import STATE, directed, followed, guided, on_nodes
+from dolfinx_contact.contact.friction_field import STATE, directed, followed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
@@ -19,16 +19,13 @@ from dolfinx_contact.law.wear import Wear
 class ContactLaws(ContactHistory):
     """Friction and wear of a ``Contact``, which has space, plane, frame and nodes."""
 
-    _guides: tuple | None = None
     _field: Friction | None = None  # the law given, if it follows the state
-    _begun: tuple[Friction, Friction] | None = None  # ``_given`` and the law as the step began
+    _begun: Friction | None = None  # the law as the step began
 
     @property
     def friction(self) -> Friction:
         """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, and as
         the state goes on if they follow it.
-
-        Where a support lets a node slide along one direction alone, which is none of the frame's, it has the coefficient of that direction.
         """
         return self._friction
 
@@ -45,8 +42,8 @@ class ContactLaws(ContactHistory):
                 check_law(self.plane, friction, gdim, turned)
         else:
             check_law(self.plane, friction, gdim)
-        self._given, self._field, self._begun = friction, field, None
-        self.guide(self._guides)
+        self._field, self._begun = field, None
+        self._take_law(friction)
 
     @property
     def follows_pressure(self) -> bool:
@@ -63,30 +60,24 @@ class ContactLaws(ContactHistory):
             return
         state = self._state(followed(self._field))
         with raised_together(self.comm):
-            friction = on_nodes(self, self._field, state, self._given.axes)
-        rows = zip((friction.mu, friction.p), (self._given.mu, self._given.p))
+            friction = on_nodes(self, self._field, state, self._friction.axes)
+        rows = zip((friction.mu, friction.p), (self._friction.mu, self._friction.p))
         if not all(np.array_equal(one, other) for one, other in rows):
-            self._given = friction
-            self.guide(self._guides)
+            self._take_law(friction)
         if begin:
-            self._begun = self._given, self._friction
+            self._begun = self._friction
 
     def restore(self) -> None:
         """Return to the last converged state; friction that follows it, too."""
         super().restore()
         if self._begun is not None:
-            self._given, _ = self._begun
-            self.guide(self._guides)
+            self._take_law(self._begun)
 
     def _state(self, names, empty: bool = False) -> dict[str, np.ndarray]:
         """Arrays of this contact by name; zeros, as before anything has touched, if ``empty``.  Collective."""
         return {name: np.zeros(self.nodes.size) if empty else getattr(self, name) for name in names}
 
-    def guide(self, guides: tuple | None) -> None:
-        """From now on some nodes slide along one direction alone, see ``ContactPoints.guided``; on all ranks or on none."""
-        self._guides, friction = guides, self._given
-        if guides is not None and not friction.frictionless:
-            friction = guided(friction, self.nodes.size, *guides)
+    def _take_law(self, friction: Friction) -> None:
         self._friction, self._law = friction, friction.law(self.V.mesh.geometry.dim)
 
     @property
@@ -145,7 +136,7 @@ class ContactLaws(ContactHistory):
         """Coefficients, of a law that follows the state those without one, and axes of all nodes; plane and wear."""
         law = self.friction
         if self._field is not None:
-            law = on_nodes(self, self._field, self._state(STATE, empty=True), self._given.axes)
+            law = on_nodes(self, self._field, self._state(STATE, empty=True), law.axes)
         rows = (law.mu, law.p, (1.0, 0.0) if law.axes is None else law.axes)
         laws = np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
         wear = np.nan if self.wear is None else self.wear.coefficient

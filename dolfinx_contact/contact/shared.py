@@ -63,8 +63,8 @@ class SharedNodes:
             self._rows.append(rows)
             self._slots.append(slots)
         self._spring = springs.sum(axis=1) / (springs > 0).sum(axis=1)
-        copies = ((c.friction, np.tile(rows, n + 2)) for c, rows in zip(contacts, self._rows))
-        self._laws = [friction.at(rows).law(dim) for friction, rows in copies]
+        self._copies = [np.tile(rows, n + 2) for rows in self._rows]
+        self._laws = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._copies)]
         self._law = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._rows)]
 
     def split(self, x: np.ndarray, forces: np.ndarray) -> None:
@@ -87,7 +87,7 @@ class SharedNodes:
         self._force = forces[self._dofs]
         alone = np.eye(n)[:, None, :, None] * (self._frames @ self._force[:, None, :, None])[..., 0]
         starts = np.concatenate((known, alone)).reshape(-1, n * dim)
-        problems = self._problems(n + 2, self._laws)
+        problems = self._problems(n + 2, self._laws, self._copies)
         r = problems.balanced(starts)
         unsolved = problems.unsolved(r).reshape(n + 2, m)
         unsolved[0] /= 2
@@ -95,9 +95,10 @@ class SharedNodes:
         chosen = np.nan_to_num(unsolved, nan=np.inf).argmin(axis=0)
         self._asked = problems.asked(r).reshape(n + 2, m, n * dim)[chosen, np.arange(m)]
 
-    def _problems(self, copies: int, laws: list) -> NodalProblems:
+    def _problems(self, copies: int, laws: list, rows: list) -> NodalProblems:
         """The nodal problems, so many times."""
         m, parts = self._shape[0], []
+        laws = [contact.law_of(law, of) for contact, law, of in zip(self._contacts, laws, rows)]
         for slots, law, (gap, slip) in zip(self._slots, laws, self._motions):
             every = (m * np.arange(copies)[:, None] + slots).ravel()
             spring = np.tile(self._spring[slots], copies)
@@ -118,7 +119,7 @@ class SharedNodes:
         Args:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame; changed in place.
         """
-        problems = self._problems(1, self._law)
+        problems = self._problems(1, self._law, self._rows)
         _, by_asked, by_motion = problems.linearised(self._asked)
         C, F = problems.coupling, problems.stacked
         inverse = C @ np.linalg.pinv(np.eye(C.shape[1]) + by_asked @ C, SINGULAR)

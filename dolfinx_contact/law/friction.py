@@ -208,11 +208,59 @@ class Friction(Guarded):
         smallest = p.min(axis=-1, keepdims=True)
         softness = np.divide(smallest, p, out=np.zeros_like(p), where=p > 0) ** 2
         along = softness * unit
-        if self.axes is not None:
-            cos, sin = self.axes.T
-            along = np.stack((cos * along[:, 0] - sin * along[:, 1], sin * along[:, 0] + cos * along[:, 1]), axis=1)  # fmt: skip
+        along = self._from_axes(along)
         length = np.linalg.norm(along, axis=1, keepdims=True)
         return np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+
+    def drag(self, slip: np.ndarray) -> np.ndarray:
+        """Friction ``P^2 s / |M^-1 P^2 s|`` of unit normal reaction that slip ``s`` meets: ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
+
+        Args:
+            slip: ``shape=(n, T)``, local frame; lengths do not matter.
+
+        Returns:
+            The same shape, dimensionless; zero where ``slip`` or ``mu`` is.
+        """
+        mu, _, unit = self._resisted(slip, slip)
+        return self._from_axes(mu * unit)
+
+    def drag_slope(self, slip: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Derivative of ``along . drag(slip + w along)`` by w, ``shape=(n,)``, per length of the slip."""
+        mu, rate, unit = self._resisted(slip, along)
+        turning = rate - (rate * unit).sum(axis=1, keepdims=True) * unit
+        return (self.along_axes(along) * mu * turning).sum(axis=1)
+
+    def over_radii(self, t: np.ndarray) -> np.ndarray:
+        """``M^-1 t`` along the principal directions, ``shape=(n, T)``; zero without friction."""
+        mu = np.broadcast_to(self.mu[..., : t.shape[1]], t.shape)
+        return np.divide(self.along_axes(t), mu, out=np.zeros_like(t), where=mu > 0)
+
+    def _resisted(self, slip: np.ndarray, along: np.ndarray) -> tuple:
+        """``mu``, ``M^-1 P^2 along`` over the length of ``M^-1 P^2 slip``, and the latter's unit vector: principal directions."""
+        T = slip.shape[1]
+        largest = np.abs(slip).max(axis=1, keepdims=True, initial=0.0)
+        slip, along = (
+            np.divide(part, largest, out=np.zeros_like(part), where=largest > 0)
+            for part in (slip, along)
+        )
+        mu = self.mu[..., :T]
+        weight = self.Q[..., :T] ** 2 * mu
+        largest = weight.max(axis=-1, keepdims=True)
+        weight = np.divide(weight, largest, out=np.zeros_like(weight), where=largest > 0)
+        resisted, rate = (weight * self.along_axes(part) for part in (slip, along))
+        length = np.linalg.norm(resisted, axis=1, keepdims=True)
+        unit, rate = (
+            np.divide(part, length, out=np.zeros_like(part), where=length > 0)
+            for part in (resisted, rate)
+        )
+        return mu, rate, unit
+
+    def _from_axes(self, t: np.ndarray) -> np.ndarray:
+        """Tangential vectors of these components along the principal friction directions."""
+        if self.axes is None:
+            return t
+        (x, y), (cos, sin) = t.T, self.axes.T
+        return np.column_stack((cos * x - sin * y, sin * x + cos * y))
 
     def law(self, dim: int):
         """The kernel's law in ``dim`` = 2 or 3 dimensions.

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.contact.shared import any_shared
+from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance, tie
 from dolfinx_contact.solvers.condensed_input import joint_friction, principal_axes
@@ -24,6 +25,9 @@ from dolfinx_contact.solvers.contact_tangent import next_change
 # Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
 FEW, MANY, ASTRAY = 3000, 6000, 1e-3
 
+# Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
+RIGID = 1e-9
+
 KEPT = 64  # earlier steps: more than a cycle has
 
 
@@ -31,8 +35,9 @@ class CondensedBody:
     """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
 
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
-    sparse right-hand sides; it is held by rank 0 alone.  A degree of freedom fixed by a boundary
-    condition neither moves nor has a reaction of friction.  Without friction at any contact there are
+    sparse right-hand sides; it is held by rank 0 alone.  Directions that a boundary condition fixes have no friction here:
+    it moves nothing, and follows from the answer.  Where a support moves a node across its free direction, both take
+    part in the law, with next to no compliance along the prescribed one.  Without friction at any contact there are
     normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
     forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
     planes that force drives, see ``CondensedPlanes``.
@@ -56,6 +61,14 @@ class CondensedBody:
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
         self._held_by, self._shared = body.anchors or body, any_shared(self._contacts)
+        self._stiffness = stiffness
+        self._set_up()
+
+    def _set_up(self) -> None:
+        """``W`` and the law, as supports move nodes at present.  Collective."""
+        body, contacts, stiffness = self._body, self._contacts, self._stiffness
+        self._moved = [moved_across(contact) for contact in contacts]
+        self._laws = [acting(contact, moved) for contact, moved in zip(contacts, self._moved)]
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
@@ -63,7 +76,7 @@ class CondensedBody:
         self._planes = CondensedPlanes(body, contacts, self._turns, normal)
         self._tied = anchored.size + self._planes.tied
         check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
-        W = self.compliance()
+        W, (prescribed, blocks) = self.compliance(), self._prescribed()
         a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
         self.operator, size = None, nodes.size
         with raised_together(self.comm):
@@ -71,14 +84,17 @@ class CondensedBody:
                 # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
                 inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
                 share = 1 - len(inert) / size
-                W[inert, inert] = np.diag(W)[:size].mean() / max(share, 1 / size)
+                usual = np.diag(W)[:size].mean() / max(share, 1 / size)
+                inert = np.setdiff1d(inert, prescribed)
+                W[inert, inert] = usual
+                for rows, block in zip(prescribed, blocks):
+                    W[np.ix_(rows, rows)] += RIGID * usual * block
                 tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
                 W = self._planes.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
                 self.operator.prepare()  # pays after some ten iterations
-        self._axes = [contact.friction.axes for contact in self._contacts]
-        self.friction = joint_friction(self._contacts, self.gather)
+        self.friction = joint_friction(self._laws, self._contacts, self.gather)
         self._scales = self._gathered_stiffness(stiffness) | {
             "tied_stiffness": np.append(a, np.ones(self._planes.tied))
         }
@@ -88,12 +104,25 @@ class CondensedBody:
 
     def renew_law(self) -> bool:
         """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""
-        now = [contact.friction.axes for contact in self._contacts]
-        turned = not all(map(np.array_equal, now, self._axes))
+        now = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        turned = not all(np.array_equal(a.axes, b.axes) for a, b in zip(now, self._laws))
         if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
             return False
-        self.friction = joint_friction(self._contacts, self.gather)
+        self._laws = now
+        self.friction = joint_friction(self._laws, self._contacts, self.gather)
         return True
+
+    def _begin(self, step) -> np.ndarray:
+        """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
+        free = self._held_by.solve(step.b) if self._anchored else step.free_state()
+        self._planes.begin(step, free)
+        if self.dim == 3:
+            for contact in self._contacts:
+                contact.move(free)
+            now = map(moved_across, self._contacts)
+            if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):
+                self._set_up()
+        return free
 
     def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
         """One load step by Newton's method on the condensed problem.
@@ -102,10 +131,8 @@ class CondensedBody:
             step: The ``LoadStep``.
             start: Not used: reactions of earlier steps are better starts.
         """
-        held, first = self._held_by.solve, self.dim * self.nodes
-        free = held(step.b) if self._anchored else step.free_state()
+        held, first, free = self._held_by.solve, self.dim * self.nodes, self._begin(step)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
-        self._planes.begin(step, free)
         q = self._motion(step, free)
         placed, starts = np.zeros(q.size), self._starts(q)
         rows = q
@@ -191,16 +218,29 @@ class CondensedBody:
         gdim = self._contacts[0].points.dim
         dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, gdim))]
         turns = [np.zeros((0, self.dim, gdim))]
-        for contact in self._contacts:
+        for contact, law in zip(self._contacts, self._laws):
             points = contact.points
             free = ~np.isin(points.dofs, self._body.fixed)
             dofs.append(np.repeat(points.dofs, self.dim, axis=0))
-            turns.append(principal_axes(contact.friction, points.count, gdim)[:, -self.dim :])
+            turns.append(principal_axes(law, points.count, gdim)[:, -self.dim :])
             rows = turns[-1] @ points.frames * free[:, None, :]
             rows[np.linalg.norm(rows, axis=2) < 1e-12] = 0.0  # fixed but for rounding
             frames.append(rows.reshape(-1, gdim))
         self._turns = np.concatenate(turns)
         return Rows(self.comm, np.concatenate(dofs), np.concatenate(frames))
+
+    def _prescribed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Tangential rows of nodes that supports move in one direction, and that direction's dyads, in the order of rows."""
+        if self.dim < 3:
+            return np.zeros((0, 2), int), np.zeros((0, 2, 2))
+        moved, across = np.concatenate(self._moved), []
+        for contact in self._contacts:
+            f = np.zeros((contact.points.count, 2))
+            f[contact.points.supported] = contact.points.along
+            across.append(np.column_stack((-f[:, 1], f[:, 0])))
+        turned = np.einsum("nij,nj->ni", self._turns[:, :2, :2], np.concatenate(across))[moved]
+        first = self.dim * np.flatnonzero(self.gather(moved))
+        return first[:, None] + np.arange(2), self.gather(turned[:, :, None] * turned[:, None, :])
 
     def _anchor_rows(self) -> Rows:
         """One row per anchor, of all components of its node, as blocks of right-hand sides want them."""
@@ -211,9 +251,10 @@ class CondensedBody:
     def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
-        for contact in self._contacts:
+        for contact, moved in zip(self._contacts, self._moved):
             contact.move(displacement)
-            rows.append(np.column_stack((contact.slip_increment, contact.gap)))
+            slip = contact.slip_increment - np.where(moved[:, None], 0.0, contact.known_slip)
+            rows.append(np.column_stack((slip, contact.gap)))
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
         held = anchored.gather(anchored.of(displacement))
@@ -288,6 +329,24 @@ class CondensedBody:
             turned = np.einsum("nij,njk,nlk->nil", turns, blocks, turns)
             gathered["tangential_stiffness"] = self.gather(turned)
         return gathered
+
+
+def moved_across(contact) -> np.ndarray:
+    """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
+    points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
+    rows = points.supported
+    moved[rows] = points.along.any(axis=1) & contact.known_slip[rows].any(axis=1)
+    return moved
+
+
+def acting(contact, moved: np.ndarray) -> Friction:
+    """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
+    free, whole = contact.free_friction, contact.friction
+    if free is whole or not moved.any():
+        return free
+    mu, p = (np.where(moved[:, None], a, b) for a, b in ((whole.mu, free.mu), (whole.p, free.p)))
+    axes = np.tile([1.0, 0.0], (moved.size, 1)) if whole.axes is None else whole.axes
+    return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
 
 
 def components(contacts) -> int:

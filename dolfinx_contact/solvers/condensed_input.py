@@ -81,18 +81,19 @@ def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
     return turns
 
 
-def joint_friction(contacts, gather) -> Friction:
+def joint_friction(laws, contacts, gather) -> Friction:
     """The law of all nodes; contacts with the same coefficients stay one uniform law.
 
     Args:
+        laws: Friction of each contact.
         contacts: The contacts of a body.
         gather: Function that gathers rows of nodes from all ranks.  Collective.
     """
-    laws = [contact.friction for contact in contacts]
     first = laws[0]
-    if first.mu.ndim == 1 and all(
+    uniform = first.mu.ndim == 1 and all(
         np.array_equal(f.mu, first.mu) and np.array_equal(f.p, first.p) for f in laws
-    ):
+    )
+    if gather(np.array([uniform])).all():
         return Friction(first.mu, np.where(first.mu > 0, first.p, 1.0))
     sizes = [len(contact.nodes) for contact in contacts]
     mu, p = (

@@ -1,0 +1,201 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+r"""The law at nodes whose motion along the surface supports prescribe, wholly or but for one direction ``f``.
+
+A reaction along a prescribed direction moves nothing: the support carries the rest of what acts there.  So it is a
+function of the normal reaction R and of the slip, not an unknown.  With the friction of unit normal reaction against a slip s,
+
+.. math:: d(s) = \frac{P^2 s}{|M^{-1} P^2 s|},
+
+- a node that is moved along ``k`` slips by ``s = k + w f``: ``r_t = -R d(s)``, where ``r_f = tau_f + rho w`` makes of the
+  predictor ``tau`` what the body can balance, the only unknown ``w`` being the slip along ``f``;
+- one that is not moved, ``k = 0``, slips along ``f`` alone: ``|r_f| <= R f.d(f)``, with the part across in the ratio of ``d(f)``;
+  beside it, it keeps the friction of the last step, as far as the cone leaves room, until it slips.
+
+These are the law of [dSFMH07, Section 1] for all components together.  Needs NumPy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfinx_contact.law.friction import Friction
+
+# Rounding in directions and friction kept, over their size.
+ROUNDED = 32 * np.finfo(float).eps
+
+# Steps for the slip along a free direction: Newton's, or halves of the interval.
+STEPS = 100
+
+OPEN, STICK, SLIP = 0, 1, 2
+
+
+def across(friction: Friction, along: np.ndarray) -> np.ndarray:
+    """Friction per friction along ``f`` of nodes that slip along it, ``d(f) / f.d(f)``, ``shape=(n, T)``; zero where ``f`` is."""
+    ratio = friction.drag(along)
+    forward = _dot(ratio, along)[:, None]
+    ratio = np.divide(ratio, forward, out=along.copy(), where=forward > 0)
+    straight = np.abs(ratio - along).max(axis=1, keepdims=True) <= ROUNDED
+    return np.where(straight, along, ratio)
+
+
+def supported(law, friction: Friction, nodes, along, known, last):
+    """The kernel's law, or the one that takes its place where supports move, guide, or have moved a node.
+
+    Args:
+        law: Of the kernel, of ``n`` nodes.
+        friction: Its coefficients.
+        nodes: Those that supports hold in any tangential direction, ``shape=(k,)``.
+        along: ``f`` of these nodes, unit vectors, zero where none is free, ``shape=(k, T)``, local frame.
+        known: Slip along the other directions, ``shape=(n, T)``; zero where it is no more than rounding.
+        last: Tangential reactions of the last step, ``shape=(n, T)``.
+    """
+    coefficients = friction.at(nodes)
+    rough = np.broadcast_to(coefficients.mu[..., 0] > 0.0, nodes.shape)
+    ratio, moved, last = across(coefficients, along), known[nodes], last[nodes]
+    kept = last - _dot(last, along)[:, None] * ratio
+    kept[np.abs(kept) <= ROUNDED * np.abs(last).max(axis=1, keepdims=True)] = 0.0
+    mine = ((moved != 0.0) | (kept != 0.0) | (ratio != along)).any(axis=1) & rough
+    if not mine.any():
+        return law
+    parts = (part[mine] for part in (nodes, along, ratio, moved, kept))
+    return SupportedLaw(law, coefficients.at(np.flatnonzero(mine)), known, *parts)
+
+
+@dataclass(frozen=True)
+class SupportedLaw:
+    """The kernel's law, but for ``k`` nodes; see ``supported``.
+
+    Args:
+        law: Of the kernel, of ``n`` nodes.
+        friction: Coefficients of the ``k`` nodes.
+        known: Slip along held directions, ``shape=(n, T)``, part of the slip that maps are given.
+        nodes, along, ratio, moved, kept: Of the ``k`` nodes: indices, ``f``, ``d(f) / f.d(f)``, ``known``, and the friction
+            of the last step that is not along the ratio.
+    """
+
+    law: object
+    friction: Friction
+    known: np.ndarray
+    nodes: np.ndarray
+    along: np.ndarray
+    ratio: np.ndarray
+    moved: np.ndarray
+    kept: np.ndarray
+
+    def return_map(self, reaction, gap, slip, normal, tangential):
+        found = self.law.return_map(reaction, gap, slip - self.known, normal, tangential)
+        return self._replaced(found, reaction, gap, slip, normal, tangential)
+
+    def return_jacobian(self, reaction, gap, slip, normal, tangential):
+        found = self.law.return_jacobian(reaction, gap, slip - self.known, normal, tangential)
+        return self._replaced(found, reaction, gap, slip, normal, tangential)
+
+    def bipotential_map(self, reaction, gap, slip, rho):
+        found = self.law.bipotential_map(reaction, gap, slip - self.known, rho)
+        return self._replaced(found, reaction, gap, slip, rho, rho)
+
+    def bipotential_jacobian(self, reaction, gap, slip, rho):
+        found = self.law.bipotential_jacobian(reaction, gap, slip - self.known, rho)
+        return self._replaced(found, reaction, gap, slip, rho, rho)
+
+    def _replaced(self, found, reaction, gap, slip, normal, tangential) -> tuple:
+        """What the kernel has found, with the ``k`` nodes' own."""
+        nodes, f = self.nodes, self.along
+        R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
+        tau = _dot(reaction[nodes, :-1] - tangential[nodes, None] * slip[nodes], f)
+        answer = _Answer(self.friction, f, tangential[nodes])
+        answer.find(R, tau, self.moved, self.kept, self.ratio)
+        made, status, *derivatives = found
+        made, status = made.copy(), status.copy()
+        made[nodes] = np.column_stack((answer.friction, R))
+        status[nodes] = np.where(R > 0.0, np.where(answer.slips, SLIP, STICK), OPEN)
+        if not derivatives:
+            return made, status
+        return made, status, *answer.derivatives(derivatives, nodes, R > 0.0, normal[nodes])
+
+
+class _Answer:
+    """Friction of ``k`` supported nodes, and its derivatives by R and by the predictor along ``f``."""
+
+    def __init__(self, law: Friction, f: np.ndarray, rho: np.ndarray):
+        self._law, self._f, self._rho = law, f, rho
+
+    def find(self, R, tau, known, kept, ratio) -> None:
+        moved = known.any(axis=1)
+        guided = self._f.any(axis=1)
+        d, slope = self._law.drag(known), np.zeros(R.size)
+        both = np.flatnonzero(moved & guided)
+        if both.size:
+            w = self._slipped(both, R[both], tau[both], known[both])
+            d[both], slope[both] = self._resisting(both, w, known[both])
+        d_f = _dot(d, self._f)
+        stiff = self._rho + R * np.maximum(slope, 0.0)
+        self.friction = -R[:, None] * d
+        self.by_predictor, self.by_R = R * np.maximum(slope, 0.0) / stiff, -d_f * self._rho / stiff
+        rest = ~moved
+        most = _dot(self._law.drag(self._f), self._f)
+        slips = np.abs(tau) > most * R
+        along = np.clip(tau, -most * R, most * R)
+        stuck = along[:, None] * ratio
+        stuck += self._room(stuck, np.where(slips[:, None], 0.0, kept), R) * kept
+        self.friction[rest] = stuck[rest]
+        self.by_predictor[rest] = (guided & ~slips)[rest]
+        self.by_R[rest] = (slips * np.sign(tau) * most)[rest]
+        self.slips = moved | (guided & slips)
+
+    def _slipped(self, rows, R, tau, known) -> np.ndarray:
+        """``w`` with ``rho w + R f.d(known + w f) + tau = 0``, which grows with w: Newton's steps within an interval."""
+        rho = self._rho[rows]
+        most = R * np.linalg.norm(self._law.at(rows).mu[..., : known.shape[1]], axis=-1)
+        low, high = (-tau - most) / rho, (-tau + most) / rho
+        w = -tau / rho
+        for _ in range(STEPS):
+            d, slope = self._resisting(rows, w, known)
+            left = rho * w + R * _dot(d, self._f[rows]) + tau
+            low, high = np.where(left < 0.0, w, low), np.where(left > 0.0, w, high)
+            following = w - left / (rho + R * np.maximum(slope, 0.0))
+            outside = ~((low < following) & (following < high))
+            following = np.where(outside, (low + high) / 2, following)
+            following = np.where(left == 0.0, w, following)
+            done = np.abs(following - w) <= np.finfo(float).eps * np.abs(w)
+            w = following
+            if done.all():
+                break
+        return w
+
+    def _resisting(self, rows, w, known) -> tuple[np.ndarray, np.ndarray]:
+        """``d(known + w f)`` and the derivative of ``f.d`` by w."""
+        law, f = self._law.at(rows), self._f[rows]
+        slip = known + w[:, None] * f
+        return law.drag(slip), law.drag_slope(slip, f)
+
+    def _room(self, friction, kept, R) -> np.ndarray:
+        """Largest part of ``kept`` up to one with which ``friction`` stays within the cone, ``shape=(k, 1)``."""
+        a, b = (self._law.over_radii(part) for part in (friction, kept))
+        A, B, C = _dot(b, b), _dot(a, b), np.minimum(_dot(a, a) - R**2, 0.0)
+        root = np.sqrt(B**2 - A * C) - B
+        part = np.divide(root, A, out=np.zeros_like(A), where=A > 0)
+        return np.clip(part, 0.0, 1.0)[:, None]
+
+    def derivatives(self, found, nodes, touches, normal) -> list:
+        """The kernel's derivatives with these nodes' own, by the reaction before and by the motion."""
+        f, T = self._f, self._f.shape[1]
+        by_reaction = np.zeros((len(nodes), T + 1, T + 1))
+        by_reaction[:, :T, :T] = self.by_predictor[:, None, None] * f[:, :, None] * f[:, None, :]
+        by_reaction[:, :T, T] = self.by_R[:, None] * f
+        by_reaction[:, T, T] = 1.0
+        by_reaction[~touches] = 0.0
+        rates = np.column_stack((np.repeat(self._rho[:, None], T, axis=1), normal))
+        replaced = []
+        for whole, part in zip(found, (by_reaction, -by_reaction * rates[:, None, :])):
+            whole = whole.copy()
+            whole[nodes] = part
+            replaced.append(whole)
+        return replaced
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.einsum("ni,ni->n", one, other)
