@@ -537,6 +537,45 @@ def test_what_makes_no_sense_is_refused(make, message):
         make()
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [lambda g: -g, lambda g: 2 * g, lambda g: 0.9 * g, lambda g: g[::-1], lambda g: g / np.linalg.norm(g, axis=0)],
+    ids=["sign", "twice", "short", "order", "unit length"],
+)  # fmt: skip
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_gradient_that_is_none_of_the_distance_is_refused(d, wrong):
+    """Sign, length and order of components, with the position and both values; in single precision it is good enough."""
+
+    def distance(y):
+        return 3 * (y[-1] + 0.1 * y[0] ** 2)
+
+    def gradient(y):
+        return np.array([0.6 * y[0], *np.zeros((d - 2, len(y[0]))), np.full(len(y[0]), 3.0)])
+
+    point = np.zeros(d)
+    with pytest.raises(ValueError, match=r"gradient of RigidSurface is \[.*\] at \[.*differences of distance are \[.*, (3.0|2.99)"):  # fmt: skip
+        block(dc.RigidSurface(distance, point, lambda y: wrong(gradient(y))))
+    block(dc.RigidSurface(distance, point, gradient))
+    rough = dc.RigidSurface(lambda y: distance(y).astype(np.float32), point, gradient)
+    block(rough)
+
+
+def test_a_gradient_may_be_that_of_either_side_of_an_edge():
+    """On the ridge of a roof differences are the mean of both sides; another one than theirs is refused."""
+    for slope, fits in ((0.5, True), (-0.5, True), (0.0, True), (1.0, False)):
+
+        def gradient(y, slope=slope):
+            side = np.where(np.abs(y[0]) < 1e-9, slope / 0.5, np.sign(y[0]))
+            return np.array([0.5 * side, np.ones_like(side)])
+
+        roof = dc.RigidSurface(lambda y: y[1] + 0.5 * np.abs(y[0]), (0, 0), gradient)
+        if fits:
+            block(roof)
+        else:
+            with pytest.raises(ValueError, match=r"gradient of RigidSurface is \[1.0, 1.0\]"):
+                block(roof)
+
+
 def test_dimensions_have_to_agree():
     """A circle under a block in three dimensions."""
     V = block(dc.RigidPlane((0, 0, 0), (0, 0, 1))).V

@@ -20,6 +20,9 @@ from dolfinx_contact.contact.ufl_distance import by_ufl, is_ufl
 # Step of central differences over the size of the nodes' positions: rounding and truncation alike.
 STEP = float(np.cbrt(np.finfo(float).eps))
 
+# Part of its length by which a gradient may be off differences: as far as those of values in single precision may be.
+APART = 0.05
+
 # A gradient is none if it is that much smaller than the largest one.
 FLAT = 1e-12
 
@@ -37,7 +40,7 @@ class RigidSurface(CurvedSurface):
             ``SpatialCoordinate``, numbers and ``Constant`` of any mesh; its gradient is then UFL's.
         point: About which it rotates, at which force acts, ``shape=(gdim,)``, global frame, length units.
         gradient: Function of the same positions that gives the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
-            central differences, exact to ten digits.
+            central differences, exact to ten digits.  A Contact compares it with differences at its nodes.
         axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
             unless friction is isotropic or the body two-dimensional.
 
@@ -61,12 +64,14 @@ class RigidSurface(CurvedSurface):
         axis: ArrayLike | None = None,
     ) -> None:
         super().__init__(vector("point", point))
+        self._derived = gradient is None  # and nothing to be checked
         if is_ufl(distance):
             if gradient is not None:
                 raise ValueError(
                     "gradient must be None where distance is in UFL, which derives it."
                 )
             distance, gradient = by_ufl(distance, self.point.size)
+            self._derived = True
         for name, function in (("distance", distance), ("gradient", gradient)):
             if not (callable(function) or function is gradient is None):
                 raise ValueError(f"{name} must be a function of positions, got {function!r}.")
@@ -87,14 +92,42 @@ class RigidSurface(CurvedSurface):
         """Gradient at positions, ``shape=(n, gdim)``."""
         if self._gradient is not None:
             return self._of("gradient", self._gradient, y, y.T.shape).T
+        after, before = self._beside(y, 1), self._beside(y, -1)
+        return (after[0] - before[0]) / (after[1] - before[1])
+
+    def _beside(self, y: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+        """Values a small step along each axis from positions, and the coordinates there, ``shape=(n, gdim)`` each."""
         step = STEP * (np.abs(y - self.point).max(initial=0.0) or 1.0)
-        slopes = np.empty_like(y)
-        for k, shift in enumerate(step * np.eye(y.shape[1])):
-            ends = [
-                self._of("distance", self._values, z, y.shape[:1]) for z in (y + shift, y - shift)
-            ]
-            slopes[:, k] = (ends[0] - ends[1]) / ((y + shift) - (y - shift))[:, k]
-        return slopes
+        moved = [y + side * shift for shift in step * np.eye(y.shape[1])]
+        values = [self._of("distance", self._values, z, y.shape[:1]) for z in moved]
+        return np.column_stack(values), np.column_stack([z[:, k] for k, z in enumerate(moved)])
+
+    def check_at(self, y: np.ndarray) -> None:
+        """See ``Surface``: compare the gradient given with differences of the distance.
+
+        Where slopes jump any between those of both sides will do.
+
+        Raises:
+            ValueError: it has another sign, direction or length.
+        """
+        if self._derived or not len(y):
+            return
+        given, here = self._slopes(y), self._of("distance", self._values, y, y.shape[:1])
+        try:
+            sides = [self._beside(y, side) for side in (1, -1)]
+        except ValueError:  # beside these positions the function has no values
+            return
+        found = np.array([(values - here[:, None]) / (at - y) for values, at in sides])
+        off = np.linalg.norm(given - np.clip(given, found.min(axis=0), found.max(axis=0)), axis=1)
+        lengths = np.linalg.norm([given, *found], axis=2).max(axis=0)
+        wrong = off > APART * lengths
+        if wrong.any():
+            k = int(np.argmax(wrong * off))
+            raise ValueError(
+                f"gradient of RigidSurface is {given[k].tolist()} at {y[k].tolist()}, relative to it, where differences of "
+                f"distance are {found.mean(axis=0)[k].tolist()}: give the derivatives of distance, with their signs and "
+                "length, or leave gradient out."
+            )
 
     def distance(self, y: np.ndarray) -> np.ndarray:
         """Value over the length of the gradient, ``shape=(n,)``."""

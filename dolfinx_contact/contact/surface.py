@@ -124,6 +124,9 @@ class Surface(Drive):
         """Rows (t1, t2, n), in two dimensions (t, n), orthonormal: ``shape=(n, gdim, gdim)``, or one for all."""
         raise NotImplementedError
 
+    def check_at(self, y: np.ndarray) -> None:
+        """Raise a ``ValueError`` if what the user says of the surface contradicts itself at positions of nodes."""
+
     def described(self) -> np.ndarray:
         """Numbers that say which surface it is, for checkpoints."""
         raise NotImplementedError
