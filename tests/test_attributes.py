@@ -140,7 +140,7 @@ def test_friction_that_does_not_fit_is_refused():
     scene = pressed()
     u, old = scene.u.x.array.copy(), scene.contact.friction
     with pytest.raises(ValueError, match="friction must be a Friction"):
-        scene.contact.friction = 0.3
+        scene.contact.friction = "0.3"
     with pytest.raises(ValueError, match="wear must be a Wear"):
         scene.contact.wear = 1e-4
     rows = len(scene.contact.nodes) + (COMM.rank == 0)

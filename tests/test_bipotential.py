@@ -231,7 +231,7 @@ def test_wrong_arguments():
     for wrong, named in (
         ((r, np.zeros(2), slip, Friction(0.2)), "gap must have shape (3,), not (2,)"),
         ((r, gap, np.zeros((3, 3)), Friction(0.2)), "slip_increment must have shape (3, 2)"),
-        ((r, gap, slip, 0.2), "Friction"),
+        ((r, gap, slip, "0.2"), "Friction"),
         ((r, gap, slip.astype(complex), Friction(0.2)), "complex"),
         ((r, gap, slip, Friction(np.ones((2, 2)))), "3 nodes"),
     ):

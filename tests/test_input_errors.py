@@ -189,11 +189,25 @@ def test_contact_refuses_wrong_types(scene):
     for arguments, message in [
         (("V", scene.facets, plane(), FRICTION), "V must be"),
         ((scene.V, scene.facets, (0, 0, 1), FRICTION), "plane must be a RigidPlane"),
-        ((scene.V, scene.facets, plane(), 0.3), "friction must be a Friction"),
+        ((scene.V, scene.facets, plane(), "0.3"), "friction must be a Friction or a number"),
+        ((scene.V, scene.facets, plane(), True), "friction must be a Friction or a number"),
+        ((scene.V, scene.facets, plane(), -0.3), "mu must not be negative"),
         ((scene.V, scene.facets, dc.RigidPlane((0, 0), (0, 1)), FRICTION), "dimensions"),
     ]:
         with pytest.raises(ValueError, match=message):
             dc.Contact(*arguments)
+
+
+def test_a_number_is_isotropic_friction(scene):
+    """Wherever a law is taken: by a contact, exchanged, by the condensed solver and the certificate."""
+    contact = dc.Contact(scene.V, scene.facets, plane(), 0.3)
+    assert repr(contact.friction) == repr(dc.Friction(0.3))
+    contact.friction = np.float64(0.1)
+    assert repr(contact.friction) == repr(dc.Friction(0.1))
+    W, q = np.eye(3), np.array([0.05, 0.0, -1.0])
+    with_number, with_law = (dc.solve_condensed(W, q, law) for law in (0.02, dc.Friction(0.02)))
+    assert with_number.reaction == pytest.approx(with_law.reaction)
+    assert dc.bipotential_gap([[0.3, 0, 1]], [0], [[-0.01, 0]], 0.3) == pytest.approx([0.0])
 
 
 def test_orthotropic_friction_needs_an_axis(scene):

@@ -69,7 +69,7 @@ def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
         )
     if not isinstance(friction, Friction):
         raise ValueError(
-            f"friction must be a Friction, got {type(friction).__name__}: {friction!r}."
+            f"friction must be a Friction or a number, got {type(friction).__name__}: {friction!r}."
         )
     if plane.point.size != gdim:
         raise ValueError(f"{plane} has {plane.point.size} dimensions, the mesh {gdim}.")

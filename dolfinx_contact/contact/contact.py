@@ -29,7 +29,7 @@ from dolfinx_contact.contact.kinematics import ContactKinematics
 from dolfinx_contact.contact.surface import Surface
 from dolfinx_contact.error import NodalStiffness
 from dolfinx_contact.law.dissipation import work_of_friction
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.law.wear import Wear
 
@@ -49,7 +49,7 @@ class Contact(ContactKinematics):
             space, whose first such sub-space they are, or that sub-space itself.
         facets: Local indices of boundary facets, integers; a rank may have none.
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
-        friction: The friction law, the same on all ranks; or on all of them one with coefficients
+        friction: The friction law, or a number, its isotropic coefficient, the same on all ranks; or on all of them one with coefficients
             per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
 
@@ -76,10 +76,10 @@ class Contact(ContactKinematics):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction, wear: Wear | None = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction | float, wear: Wear | None = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
-        mesh = V.mesh
+        mesh, friction = V.mesh, as_friction(friction)
         gdim, fdim = mesh.geometry.dim, mesh.topology.dim - 1
         for dims in ((fdim, fdim + 1), (fdim, 0)):
             mesh.topology.create_connectivity(*dims)

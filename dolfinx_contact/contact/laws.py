@@ -12,7 +12,7 @@ from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
 from dolfinx_contact.contact.friction_field import STATE, directed, followed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.wear import Wear
 
 
@@ -30,8 +30,8 @@ class ContactLaws(ContactHistory):
         return self._friction
 
     @friction.setter
-    def friction(self, friction: Friction) -> None:
-        gdim, field = self.V.mesh.geometry.dim, None
+    def friction(self, friction: Friction | float) -> None:
+        gdim, field, friction = self.V.mesh.geometry.dim, None, as_friction(friction)
         if getattr(friction, "field", False):
             names = followed(friction)
             field = friction if names else None

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.friction_cone import as_nodes
 
 
 def bipotential_gap(
-    r: ArrayLike, gap: ArrayLike, slip_increment: ArrayLike, friction: Friction
+    r: ArrayLike, gap: ArrayLike, slip_increment: ArrayLike, friction: Friction | float
 ) -> np.ndarray:
     """Gap ``b_c(-du, r) + du . r`` of the bi-potential of [dSFMH07, Section 1].
 
@@ -42,8 +42,9 @@ def bipotential_gap(
         >>> dc.bipotential_gap([[0.3, 0, 1]], [0], slip, dc.Friction(mu=0.3)).round(12)
         array([0.])
     """
+    friction = as_friction(friction)
     if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction, not {friction!r}")
+        raise ValueError(f"friction must be a Friction or a number, not {friction!r}")
     r = np.asarray(r)
     dim = r.shape[1] if r.ndim == 2 and r.shape[1] == 2 else 3
     r = as_nodes("r", r, dim)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -310,6 +311,12 @@ def _unit_vectors(axes, mu: np.ndarray) -> np.ndarray:
             f"{length[wrong][0]}"
         )
     return frozen(given.astype(np.float64) / length[:, None])
+
+
+def as_friction(friction: Any) -> Any:
+    """A number as isotropic friction; anything else as it is."""
+    number = isinstance(friction, Real) or (isinstance(friction, np.ndarray) and friction.ndim == 0)
+    return Friction(friction) if number and not isinstance(friction, (bool, np.bool_)) else friction
 
 
 def is_field(value) -> bool:

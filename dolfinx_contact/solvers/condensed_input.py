@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dolfinx_contact.checks import finite
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, as_friction
 
 
 def checked_problem(q, W, friction, r0) -> tuple:
@@ -34,8 +34,9 @@ def checked_problem(q, W, friction, r0) -> tuple:
                 f"{mu.shape}; those of two directions are a Friction((mu_1, mu_2))."
             )
         friction = Friction(np.column_stack((mu, mu)))
+    friction = as_friction(friction)
     if not isinstance(friction, Friction):
-        raise ValueError(f"friction must be a Friction or an array, not {friction!r}.")
+        raise ValueError(f"friction must be a Friction, a number or an array, not {friction!r}.")
     if friction.field:
         raise ValueError(
             f"{friction!r}: give numbers for the contacts, there are no positions here."

@@ -130,7 +130,7 @@ class CondensedNewton:
 def solve_condensed(
     W: Any,
     q: ArrayLike,
-    friction: Friction | ArrayLike,
+    friction: Friction | float | ArrayLike,
     solver: CondensedNewton | None = None,
     tol: float = 1e-8,
     r0: ArrayLike | None = None,
@@ -157,7 +157,7 @@ def solve_condensed(
             rank-deficient and slightly unsymmetric.  Of 64 contacts or more it is kept without its
             zeros if no more than a fifth of its entries are others, however it was given.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
-        friction: A ``Friction``, of coefficients for all contacts or ``shape=(n, 2)`` for each; or an array of one
+        friction: A ``Friction``, or a number, of coefficients for all contacts, or ``shape=(n, 2)`` for each; or an array of one
             coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
         solver: ``CondensedNewton(...)``; None is one with default options.
         tol: Largest error and, unless the solver says otherwise, slip error.
