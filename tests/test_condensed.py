@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The condensed operator of a body, and CondensedNewton as solver of a ContactProblem."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scenes
@@ -11,7 +13,8 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.solvers import compliance, condensed
+from dolfinx_contact.error import Errors
+from dolfinx_contact.solvers import automatic, compliance, condensed
 from dolfinx_contact.solvers.base import SolverResult
 
 CASES = {
@@ -250,3 +253,24 @@ def test_a_quarter_of_the_punch_is_a_quarter_of_the_whole(solver, law):
         same = [np.argmin(np.linalg.norm(x - point, axis=1)) for point in y]
         assert np.linalg.norm(x[same] - y) < 1e-12
         assert np.abs(r[same] - part).max() <= 1e-8 * np.abs(r).max()
+
+
+@pytest.mark.parametrize("end,given", [(1.0, False), (1e-2, False), (1e-5, True)])
+def test_where_the_second_solver_starts(end, given):
+    """The second solver of the default has a start of its own, unless the end of the first one misses no more than digits."""
+    starts, x = [], np.array([3.0])
+
+    def solver(error):
+        def solve(step, start):
+            starts.append(start)
+            step.error = error
+            return SolverResult(x, 1, error, "this one", ())
+
+        return SimpleNamespace(solve=solve)
+
+    bound = object.__new__(automatic.BoundAutomatic)
+    bound._why, bound._solvers, bound._bound = "", [0, 1], {0: solver(end), 1: solver(0.0)}
+    step = SimpleNamespace(tol=1e-8, slides=lambda: False)
+    step.measure = lambda x: Errors(step.error, 0.0, 0.0)
+    bound.solve(step)
+    assert starts[0] is None and (starts[1] is x if given else starts[1] is None)

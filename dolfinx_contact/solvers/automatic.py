@@ -8,7 +8,7 @@ import numpy as np
 
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import fits
-from dolfinx_contact.solvers.condensed import components
+from dolfinx_contact.solvers.condensed import ASTRAY, components
 from dolfinx_contact.solvers.condensed_newton import CondensedNewton
 from dolfinx_contact.solvers.fixed_point import FixedPoint
 from dolfinx_contact.solvers.linearised import Linearised
@@ -102,7 +102,8 @@ class BoundAutomatic:
             errors = step.measure(found.x)
             if best is None or errors.largest < smallest:
                 smallest, best = errors.largest, found
-                start = found.x if smallest < np.inf else None
+                # far from a solution the errors of an end tell nothing: the other solver has a start of its own
+                start = found.x if smallest <= ASTRAY else None
             if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
                 break
             if step.slides():
