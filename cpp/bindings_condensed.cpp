@@ -177,6 +177,7 @@ void bind_condensed(py::module_ &m) {
             })
         .def_readonly("error", &Solution::error)
         .def_readonly("slip_error", &Solution::slip_error)
+        .def_readonly("local_error", &Solution::local_error)
         .def_property_readonly(
             "rounding", [](const Solution &s) { return std::max(s.rounding, s.slip_rounding); })
         .def_readonly("change", &Solution::change)
@@ -205,21 +206,25 @@ void bind_condensed(py::module_ &m) {
                const std::vector<Array> &starts, double tol, double slip_tol,
                const std::optional<Array> &stiffness,
                const std::optional<Array> &tangential_stiffness,
-               const std::optional<Array> &tied_stiffness, double external, double max_seconds,
-               int max_iterations, int newton_iterations, bool fallbacks,
+               const std::optional<Array> &tied_stiffness, double external, double local_tol,
+               double max_seconds, int max_iterations, int newton_iterations, bool fallbacks,
+               const std::vector<std::string> &without,
                const std::optional<std::function<void(double, const std::array<int, 3> &)>>
                    &monitor) {
                 const Scales scales{optional(stiffness), optional(tangential_stiffness),
                                     optional(tied_stiffness), external};
                 return solve_any(op, mu, p, q, starts,
-                                 {tol, slip_tol, max_seconds, max_iterations, newton_iterations,
-                                  fallbacks, scales, heed_signals(), monitor.value_or(nullptr)});
+                                 {tol, slip_tol, local_tol, max_seconds, max_iterations,
+                                  newton_iterations, fallbacks, without, scales, heed_signals(),
+                                  monitor.value_or(nullptr)});
             },
             py::arg("mu"), py::arg("p"), py::arg("q"), py::arg("starts"), py::arg("tol"),
             py::arg("slip_tol"), py::arg("stiffness") = py::none(),
             py::arg("tangential_stiffness") = py::none(), py::arg("tied_stiffness") = py::none(),
             py::arg("external") = 0.0,
+            py::arg("local_tol") = std::numeric_limits<double>::infinity(),
             py::arg("max_seconds") = std::numeric_limits<double>::infinity(),
             py::arg("max_iterations") = 200'000, py::arg("newton_iterations") = 60,
-            py::arg("fallbacks") = true, py::arg("monitor") = py::none());
+            py::arg("fallbacks") = true, py::arg("without") = std::vector<std::string>{},
+            py::arg("monitor") = py::none());
 }

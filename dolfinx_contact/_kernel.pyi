@@ -309,6 +309,8 @@ class CondensedSolution:
     @property
     def iterations(self) -> int: ...
     @property
+    def local_error(self) -> float: ...
+    @property
     def reaction(self) -> numpy.typing.NDArray[numpy.float64]: ...
     @property
     def rounding(self) -> float: ...
@@ -354,10 +356,12 @@ class CondensedOperator:
         tangential_stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
         tied_stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
         external: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        local_tol: typing.SupportsFloat | typing.SupportsIndex = ...,
         max_seconds: typing.SupportsFloat | typing.SupportsIndex = ...,
         max_iterations: typing.SupportsInt | typing.SupportsIndex = 200000,
         newton_iterations: typing.SupportsInt | typing.SupportsIndex = 60,
         fallbacks: bool = True,
+        without: collections.abc.Sequence[str] = [],
         monitor: collections.abc.Callable[
             [float, typing.Annotated[list[int], "FixedSize(3)"]], None
         ]

@@ -173,3 +173,72 @@ def test_change_is_what_is_missing():
             expected = distance / np.linalg.norm(tight.reaction)
             assert loose.change == pytest.approx(expected, rel=0.05, abs=1e-4 * 1e-6)
     assert compared >= 20
+
+
+@pytest.mark.parametrize(
+    "W,q", [(-310, -310), (-300, 0), (300, 1), (308, 308), (0, -300), (0, 300)]
+)
+def test_numbers_near_the_ends_of_double_precision(W, q):
+    """A block that slides, W = 10^W I and q = 10^q (1, 0, -1): r = 10^(q - W) (-mu, 0, 1), and errors that are numbers."""
+    load = float(f"1e{q}") * np.array([[1.0, 0.0, -1.0]])
+    found = solved(float(f"1e{W}") * np.eye(3), load, Friction((0.3, 0.2), (0.1, 0.2)))
+    expected = 10.0 ** (q - W) * np.array([[-0.3, 0.0, 1.0]])
+    assert np.abs(found.reaction - expected).max() <= 1e-8 * 10.0 ** (q - W)
+    assert np.isfinite([found.error, found.slip_error, found.rounding]).all()
+    assert max(found.error, found.slip_error) <= TOL
+
+
+def test_powers_of_two_change_nothing():
+    """The same problem in units that are powers of two apart, up to 2^900: the same reactions to the last bit."""
+    scene = random_problem(3, contacts=70, rank=210, mu_range=(0.1, 0.6), ratio=2.0)
+    law = Friction(scene.mu, scene.p)
+    found = solved(scene.W, scene.q, law)
+    for length, force in ((900, 0), (-900, 50), (20, 900), (0, -900)):
+        W, q = np.ldexp(scene.W, length - force), np.ldexp(scene.q, length)
+        assert np.array_equal(np.ldexp(solved(W, q, law).reaction, -force), found.reaction)
+
+
+@pytest.mark.parametrize("W,q", [(1e-200, 1e150), (1e200, 1e-200)])
+def test_reactions_that_double_precision_does_not_have(W, q):
+    """Reactions of 1e350 or 1e-400 are refused with the remedy, neither infinite nor zero."""
+    with pytest.raises(ValueError, match="other units"):
+        solved(W * np.eye(3), [[q, 0, -q]], Friction(0.3))
+
+
+def apart(seed, W, q):
+    """Two problems of four contacts that know nothing of each other, the second W times as soft under q times the load."""
+    rng, n = np.random.default_rng(seed), 12
+    first, second = rng.normal(size=(2, n, n))
+    blocks = [B @ B.T / n + 0.1 * np.eye(n) for B in (first, second)]
+    loads = rng.normal(size=(2, 4, 3)) - [0, 0, 1]
+    whole = np.zeros((2 * n, 2 * n))
+    whole[:n, :n], whole[n:, n:] = blocks[0], W * blocks[1]
+    return whole, np.vstack((loads[0], q * loads[1])), blocks, loads
+
+
+@pytest.mark.parametrize("W,q", [(1e6, 1.0), (1e9, 1.0), (1e12, 1.0), (1e-9, 1.0), (1.0, 1e-6)])
+def test_contacts_far_apart(W, q):
+    """Compliances up to 1e12 apart, loads a million: the reactions of each part are those of that part alone."""
+    law = Friction((0.5, 0.3), (0.2, 0.4))
+    for seed in range(5):
+        whole, load, blocks, loads = apart(seed, W, q)
+        found = solved(whole, load, law)
+        parts = found.reaction[:4], found.reaction[4:] * (W / q)
+        for part, block, own in zip(parts, blocks, loads):
+            alone = solved(block, own, law, tol=1e-12).reaction
+            assert np.linalg.norm(part - alone) <= 1e-6 * np.linalg.norm(alone)
+        assert found.local_error <= TOL
+
+
+def test_the_error_of_one_contact():
+    """Of two blocks the one that bears a millionth is off by 9 %: no error sees it but that of one contact.
+
+    The start is a hundredth above the reaction, from where Newton's residual maps it to 0.91 of it.
+    """
+    operator = _kernel.CondensedOperator(np.eye(6), 3)
+    q = np.array([0, 0, -1.0, 0, 0, -1e-6])
+    arguments = dict(mu=np.full(2, 0.3), p=np.ones(2), q=q, tol=1e-3, slip_tol=1e-3)
+    state = operator.solve(
+        starts=[-q * [1, 1, 1, 1, 1, 1.01]], newton_iterations=1, max_iterations=1, **arguments
+    )
+    assert state.error <= 1e-6 and state.local_error == pytest.approx(0.09 / 0.91, rel=1e-6)

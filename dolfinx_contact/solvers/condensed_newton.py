@@ -105,7 +105,7 @@ class CondensedNewton:
         result = CondensedResult(
             found.reaction, found.displacement, found.status, found.error, found.slip_error,
             found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
-            found.tied, found.unsolvable, found.closing,
+            found.tied, found.unsolvable, found.closing, found.local_error,
         )  # fmt: skip
         if not found.converged:
             raise CondensedNotConverged(result)
@@ -204,28 +204,35 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
     """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
 
-    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off.  Large problems are
-    not searched by all methods again: where W is rank deficient reactions stay open anyway.
+    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off; where contacts are unlike
+    each other, those of some.  Large problems are not searched by all methods again: where W is rank deficient reactions
+    stay open anyway.
     """
     cheap = solver.fallbacks and q.size <= 100
     most = min(solver.max_iterations, 100 * solver.newton_iterations)
-    options = {"slip_tol": None, "max_iterations": most, "fallbacks": cheap}
-    finer = CondensedNewton(**vars(solver) | options)
-    for factor in (1e-2, 1e-4):
-        if found.change <= tol or found.error <= 10 * found.rounding:
-            break
-        if max(found.error, found.slip_error) <= factor * tol:
-            continue
-        try:
-            nearer = finer.solve_condensed(
-                operator, friction, q, max(factor * tol, 1e-14), [found.reaction]
-            )
-        except CondensedNotConverged:
-            break
-        open_still = nearer.change > 0.1 * found.change
-        found = replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
-        if open_still:  # no smaller error tells them
-            break
+    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "max_iterations": most})
+
+    def again(tol, fallbacks, **limits):
+        finer.fallbacks = fallbacks
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RoundingWarning)
+            nearer = finer.solve_condensed(operator, friction, q, tol, [found.reaction], **limits)
+        return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
+
+    try:
+        for factor in (1e-2, 1e-4):
+            if found.change <= tol or found.error <= 10 * found.rounding:
+                break
+            if max(found.error, found.slip_error) > factor * tol:
+                change, found = found.change, again(max(factor * tol, 1e-14), cheap)
+                if found.change > 0.1 * change:  # no smaller error tells them
+                    break
+        if found.local_error > tol:
+            found = again(tol, False, local_tol=tol)
+    except CondensedNotConverged as failure:
+        best = failure.best
+        if max(best.error, best.slip_error) <= tol and best.local_error < found.local_error:
+            found = replace(best, branch=found.branch, tried=found.tried + best.tried)
     return found
 
 

@@ -31,6 +31,9 @@ class CondensedResult:
         status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
         error: ``|r - proj(r - kappa w)|`` over the forces that act, see ``solve_condensed``.
         slip_error: Defect of the slip rule, as a force, over the same.
+        local_error: The largest of both errors of one contact, over the force that acts in it, ``max(|r|, kappa |w|)`` of
+            that contact; zero if rounding may explain it.  ``error`` and ``slip_error`` hardly see contacts that are far
+            softer, or bear far less, than others.
         rounding: What double precision leaves of the errors; an error above ``tol`` is below it.
         change: How much Newton's next step would still move the reactions, over the same forces:
             an estimate of what is missing to the solution nearby, which where W is ill conditioned
@@ -64,6 +67,7 @@ class CondensedResult:
     tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
     unsolvable: bool = False
     closing: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    local_error: float = 0.0
 
 
 class CondensedNotConverged(RuntimeError):

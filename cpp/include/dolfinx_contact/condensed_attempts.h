@@ -50,7 +50,7 @@ template <int T, int P> class Attempts {
         judge_.judge(found);
         last_error_ = worst(found);
         system.accurate = found.near_rounding;
-        found.converged = Judge<P>::accepts(found, options_.tol, options_.slip_tol);
+        found.converged = Judge<P>::accepts(found, options_);
         if (found.converged || worst(found) < worst(best_)) {
             found.tried = std::move(best_.tried);
             best_ = std::move(found);
@@ -262,7 +262,9 @@ template <int T, int P> class Attempts {
                 best_.unsolvable = !plane.all_states(accept);
         }
     }
-    static double worst(const Solution &s) { return std::max(s.error, s.slip_error); }
+    double worst(const Solution &s) const {
+        return std::isfinite(options_.local_tol) ? s.local_error : std::max(s.error, s.slip_error);
+    }
 
     /// Newton's method at the end of a path of solutions from an easier problem, solved from a
     /// random start: there contacts give way more, by `shift` times the mean compliance, friction
@@ -309,6 +311,9 @@ template <int T, int P> class Attempts {
     template <class Try> bool attempt(const char *name, Try &&action) {
         if (budget_.spent())
             return true;
+        const auto &without = options_.without;
+        if (std::find(without.begin(), without.end(), name) != without.end())
+            return false;
         const int iterations = budget_.iterations;
         const double seconds = budget_.seconds();
         action();

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "condensed_attempts.h"
+#include <stdexcept>
 
 namespace dolfinx_contact::condensed {
 /// The solver of one problem: P tangential directions, T of them with friction (T = P or 0).
@@ -17,7 +18,8 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
         best_.reaction = VectorXd::Zero(q_.size());
         best_.tied = op_.tied();
         judge_.judge(best_);
-        if (best_.error <= best_.rounding) { // nothing presses: zero reactions are the answer
+        if (Judge<P>::reached(best_.error, 0.0,
+                              best_.rounding)) { // nothing presses: zero reactions are the answer
             best_.change = 0.0;
             best_.converged = true;
             best_.branch = "free";
@@ -95,7 +97,7 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
             constexpr int few = 5;
             return attempt("continuation", [&] { paths(few); });
         };
-        if (few_paths() || attempt("proximal point", [&] { this->swept(given, 300); }) ||
+        if (few_paths() || attempt("sweeps and proximal point", [&] { this->swept(given, 300); }) ||
             attempt("sweeps", [&] { this->swept(zero, 2000); }))
             return;
         if (sparse ? by_turns(150) : path())
@@ -142,11 +144,51 @@ template <int T, int P> class Cascade : private Attempts<T, P> {
     }
 };
 
+/// A problem of which neither W nor q is near the largest or smallest number there is. Squares of
+/// such would not be numbers.
+class Units {
+  public:
+    Units(const Operator &op, const VectorXd &q)
+        : length_(Power::to_one(q)), force_(length_ - op.exponent()), stiffness_(-op.exponent()) {}
+
+    VectorXd q(const VectorXd &given) const { return Power(length_)(given); }
+    std::vector<VectorXd> starts(std::vector<VectorXd> given) const {
+        for (VectorXd &start : given)
+            start = Power(force_)(start).eval();
+        return given;
+    }
+    Options options(Options given) const {
+        Scales &scales = given.scales;
+        for (VectorXd *stiffness : {&scales.stiffness, &scales.tangential, &scales.tied})
+            *stiffness = Power(stiffness_)(*stiffness).eval();
+        scales.external = Power(force_)(scales.external);
+        return given;
+    }
+    /// In the units of who asked.
+    Solution back(Solution found) const {
+        const bool pressed = !found.reaction.isZero(0.0);
+        found.reaction = Power(-force_)(found.reaction).eval();
+        found.displacement = Power(-length_)(found.displacement).eval();
+        found.acting = Power(-force_)(found.acting);
+        const double largest = found.reaction.size() > 0 ? found.reaction.cwiseAbs().maxCoeff() : 0;
+        if (found.converged && pressed && !std::isnormal(largest))
+            throw std::range_error("the reactions are too large or too small for double precision: "
+                                   "choose other units of length or force");
+        return found;
+    }
+
+  private:
+    int length_, force_, stiffness_; // exponents of two
+};
+
 template <int T>
 Solution solve(const Operator &op, const AnyLaw<T> &law, const VectorXd &q,
                const std::vector<VectorXd> &starts, const Options &options) {
+    const Units units(op, q);
+    const VectorXd scaled = units.q(q);
+    const Options inside = units.options(options);
     if (T == 0 || Coefficients<T>(law, op.nodes()).frictionless())
-        return Cascade<0, T>(op, law, q, options).run(starts);
-    return Cascade<T, T>(op, law, q, options).run(starts);
+        return units.back(Cascade<0, T>(op, law, scaled, inside).run(units.starts(starts)));
+    return units.back(Cascade<T, T>(op, law, scaled, inside).run(units.starts(starts)));
 }
 } // namespace dolfinx_contact::condensed

@@ -75,6 +75,7 @@ template <int P> class Judge {
         }
         s.error = ratio(left.law, s.acting);
         s.slip_error = ratio(left.slip, s.acting);
+        s.local_error = left.local;
         s.rounding = eps * ratio(left.size, s.acting);
         s.slip_rounding = eps * ratio(left.slip_size, s.acting);
         const bool lost = acts_ && external_ <= eps * left.size;
@@ -83,9 +84,14 @@ template <int P> class Judge {
     }
 
     /// Whether the errors of a judged state are within their tolerances or within rounding.
-    static bool accepts(const Solution &s, double tol, double slip_tol) {
-        return s.error <= std::max(tol, s.rounding) &&
-               s.slip_error <= std::max(slip_tol, s.slip_rounding);
+    static bool accepts(const Solution &s, const Options &options) {
+        return reached(s.error, options.tol, s.rounding) &&
+               reached(s.slip_error, options.slip_tol, s.slip_rounding) &&
+               s.local_error <= options.local_tol;
+    }
+    /// What is not finite never is.
+    static bool reached(double error, double tol, double rounding) {
+        return std::isfinite(error) && std::isfinite(rounding) && error <= std::max(tol, rounding);
     }
 
     /// Whether normal forces y >= 0 of the contacts prove that no reactions are accepted. Accepted
@@ -135,9 +141,10 @@ template <int P> class Judge {
     }
 
     /// What the law and the slip rule leave, and the size of the terms of which it is the
-    /// difference; forces, Euclidean over all contacts.
+    /// difference; forces, Euclidean over all contacts. The largest of a contact over its own
+    /// scale.
     struct Left {
-        double law, slip, size, slip_size;
+        double law, slip, size, slip_size, local;
     };
 
     static double ratio(double part, double whole) {
@@ -193,8 +200,11 @@ template <int P> class Judge {
                     s.status[static_cast<std::size_t>(i)] = at.branch;
                     if (at.branch == Branch::open && at.r.isZero(0.0L))
                         continue; // no terms that cancel
-                    sums.law += at.defect.squaredNorm();
-                    add_sizes(law, i, at, size.segment<D>(D * i), sums);
+                    Sums contact;
+                    contact.law = at.defect.squaredNorm();
+                    add_sizes(law, i, at, size.segment<D>(D * i), contact);
+                    const Real moved = kappa_[i] * kappa_[i] * at.w.squaredNorm();
+                    sums.add(contact, std::max(at.r.squaredNorm(), moved));
                 }
             },
             law_);
@@ -204,11 +214,24 @@ template <int P> class Judge {
             sums.size += terms * terms;
         }
         const auto root = [](Real x) { return static_cast<double>(std::sqrt(x)); };
-        return {root(sums.law), root(sums.slip), root(sums.size), root(sums.slip_size)};
+        return {root(sums.law), root(sums.slip), root(sums.size), root(sums.slip_size),
+                root(sums.local)};
     }
 
     struct Sums {
-        Real law = 0.0L, slip = 0.0L, size = 0.0L, slip_size = 0.0L;
+        Real law = 0.0L, slip = 0.0L, size = 0.0L, slip_size = 0.0L; // squares
+        Real local = 0.0L; // the largest of a contact over its own scale
+
+        void add(const Sums &contact, Real scale) {
+            law += contact.law;
+            slip += contact.slip;
+            size += contact.size;
+            slip_size += contact.slip_size;
+            for (const auto &[left, terms] :
+                 {std::pair(contact.law, contact.size), std::pair(contact.slip, contact.slip_size)})
+                if (left > eps * eps * terms) // else it may be rounding
+                    local = std::max(local, left / scale);
+        }
     };
 
     /// What cancels at a contact, component by component, and its slip defect as a force.

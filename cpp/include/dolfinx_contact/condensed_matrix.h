@@ -12,6 +12,29 @@ namespace dolfinx_contact::condensed {
 using Real = long double; ///< of the judge; where it is no more than double, so much the worse
 using VectorXl = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 
+/// Times a power of two, which loses no digit, in two factors: one alone may be out of range.
+class Power {
+  public:
+    explicit Power(int exponent)
+        : half_(std::ldexp(1.0, exponent / 2)), rest_(std::ldexp(1.0, exponent - exponent / 2)) {}
+
+    double operator()(double x) const { return x * half_ * rest_; }
+    template <class Matrix> auto operator()(const Eigen::MatrixBase<Matrix> &A) const {
+        return A * half_ * rest_;
+    }
+    /// The exponent that brings the largest magnitude to between a half and one; zero for zeros.
+    template <class Matrix> static int to_one(const Eigen::DenseBase<Matrix> &A) {
+        const double largest = A.size() > 0 ? A.derived().cwiseAbs().maxCoeff() : 0.0;
+        int exponent = 0;
+        if (std::isfinite(largest))
+            std::frexp(largest, &exponent);
+        return -exponent;
+    }
+
+  private:
+    double half_, rest_;
+};
+
 /// A square matrix of which all or, if it is symmetric, one triangle is stored, or all entries but
 /// the zeros; a view.
 class Square {

@@ -26,25 +26,28 @@ class Operator {
     template <class Derived>
     Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0,
              const LinearAlgebra &algebra = linear_algebra())
-        : size_(W.rows()), tied_(tied), dim_(dim), algebra_(algebra),
+        : size_(W.rows()), tied_(tied), dim_(dim), exponent_(Power::to_one(W)), algebra_(algebra),
           symmetric_((W.array() == W.transpose().array()).all()) {
         if (!zeros_pay() || !take_sparse(W))
             take_dense(W);
     }
     Operator(const Sparse &W, int dim, Index tied = 0,
              const LinearAlgebra &algebra = linear_algebra())
-        : size_(W.rows()), tied_(tied), dim_(dim), algebra_(algebra), symmetric_(is_symmetric(W)),
-          sparse_(W) {
+        : size_(W.rows()), tied_(tied), dim_(dim), exponent_(Power::to_one(W.coeffs())),
+          algebra_(algebra), symmetric_(is_symmetric(W)), sparse_(W) {
         if (!zeros_pay() || !is_sparse(sparse_.nonZeros())) {
             take_dense(MatrixXd(sparse_));
             sparse_ = {};
         } else {
+            scale_sparse();
             set_sparse();
         }
     }
     Operator(const Operator &) = delete; // views look into it
 
+    /// Times two to the power `exponent`, so that its largest entry is between a half and one.
     const Square &W() const { return *W_; }
+    int exponent() const { return exponent_; }
     int dim() const { return dim_; }
     Index nodes() const { return (size_ - tied_) / dim_; }
     Index tied() const { return tied_; }
@@ -133,9 +136,9 @@ class Operator {
     template <class Derived> void take_dense(const Eigen::MatrixBase<Derived> &W) {
         values_.resize(size_, size_ + (symmetric_ ? 1 : 0));
         if (symmetric_)
-            values_.rightCols(size_).template triangularView<Eigen::Upper>() = W.derived();
+            values_.rightCols(size_).template triangularView<Eigen::Upper>() = Power(exponent_)(W);
         else
-            values_ = W;
+            values_ = Power(exponent_)(W);
         set(square(values_.data() + (symmetric_ ? size_ : 0), Part::upper));
     }
     /// The entries that are not zero, if they are few.
@@ -143,8 +146,13 @@ class Operator {
         if (!is_sparse((W.array() != 0.0).count()))
             return false;
         sparse_ = W.sparseView(0.0, 0.0);
+        scale_sparse();
         set_sparse();
         return true;
+    }
+    void scale_sparse() {
+        for (double &value : sparse_.coeffs())
+            value = Power(exponent_)(value);
     }
     void set_sparse() {
         pattern_.emplace(sparse_, dim_);
@@ -160,7 +168,7 @@ class Operator {
     }
 
     Index size_, tied_;
-    int dim_;
+    int dim_, exponent_;
     const LinearAlgebra &algebra_;
     bool symmetric_;
     MatrixXd values_, inverse_values_;

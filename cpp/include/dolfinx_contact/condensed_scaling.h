@@ -109,11 +109,30 @@ template <int T, int P> class Scaling {
         }
         if (form_ == Form::units_of_contacts)
             set_units_of_contacts(system);
+        else if (unlike())
+            even_out(system);
         system.set_metric(form_ != Form::usual);
         return system;
     }
 
   private:
+    /// Whether normal compliances differ a hundredfold.
+    bool unlike() const {
+        constexpr double far = 1e2;
+        const auto normal = op_.W().diagonal()(Eigen::seqN(Index{P}, op_.nodes(), Index{P + 1}));
+        return op_.nodes() > 0 && normal.minCoeff() > 0.0 &&
+               normal.maxCoeff() > far * normal.minCoeff();
+    }
+    /// Units of each contact, in which all have the same normal compliance: else those that are
+    /// soft or bear little hardly count beside others.
+    void even_out(System<T> &system) const {
+        const VectorXd diagonal = op_.W().diagonal();
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            const double unit = std::sqrt(op_.mean_normal() / diagonal[(P + 1) * i + P]);
+            system.left.template segment<D>(D * i) *= unit;
+            system.right.template segment<D>(D * i) *= unit;
+        }
+    }
     /// mu with its ratio to the mean of all directions to a power.
     double bent(Index i, int c, double power) const {
         const double mu = coefficients_.mu(i, c);

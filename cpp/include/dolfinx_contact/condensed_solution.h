@@ -9,6 +9,7 @@
 #include <array>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace dolfinx_contact::condensed {
 /// One entry of the cascade that was tried.
@@ -25,6 +26,7 @@ struct Solution {
     VectorXd reaction, displacement;
     std::vector<Branch> status;
     double error = none, slip_error = none;
+    double local_error = none; ///< the largest of a contact, over the force that acts in it
     double rounding = none, slip_rounding = none; ///< what double precision leaves of the errors
     double change = none; ///< of the reactions in Newton's next step, over `acting`
     double acting = 0.0;  ///< the force that errors are relative to
@@ -51,10 +53,12 @@ struct Scales {
 struct Options {
     double tol = 1e-8;      ///< largest error of a solution
     double slip_tol = 1e-8; ///< largest slip error of a solution
+    double local_tol = std::numeric_limits<double>::infinity(); ///< largest error of one contact
     double max_seconds = std::numeric_limits<double>::infinity();
     int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
     int newton_iterations = 60;   ///< Newton iterations of one attempt
     bool fallbacks = true;
+    std::vector<std::string> without = {}; ///< methods that are left out, to measure what they do
     Scales scales = {};
     /// Called in every iteration of every method; what it throws ends the search.
     std::function<void()> heed = {};
@@ -72,6 +76,9 @@ struct Options {
 ///   over all contacts and tied rows, kappa by default 1 / W_nn;
 /// - slip_error: |kappa_t (w_t + |w_t| d)| / S, Euclidean over slipping contacts, |kappa_t w_t| on
 ///   sticking ones, kappa_t by default 1 / W along the defect;
+/// - local_error: the largest of both of one contact, over max(|r|, kappa |w|) of that contact,
+/// where
+///   it is above eps times the size of the terms that cancel;
 /// - rounding: eps times the size of the terms that cancel in them, over S.
 ///
 /// T = 0 is contact without friction on normal components alone.
