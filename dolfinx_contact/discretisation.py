@@ -91,7 +91,8 @@ def estimate(
     same mesh, of a finer mesh, of smaller increments.  The difference of a quantity is its estimated error,
     ``abs(J(u) - J(U)) * share``, which is the error itself if the reference's own is small beside it (saturation;
     R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
-    all that depends on history are estimated as accumulated.
+    all that depends on history are estimated as accumulated.  A surface that is driven by displacement may belong to both; one driven
+    by force moves in each problem in its own way: make one for each.
 
     Args:
         problem: Whose error is asked for.

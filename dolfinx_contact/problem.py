@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from itertools import count
 from time import perf_counter
 from typing import Any
 
@@ -29,6 +30,7 @@ from dolfinx_contact.problem_input import (
     checked_options,
     follow,
     hold,
+    take_contacts,
 )
 from dolfinx_contact.problem_states import ProblemStates
 from dolfinx_contact.results.record import (
@@ -47,6 +49,7 @@ from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.unseen import Unseen
 
 LOG = logging.getLogger("dolfinx_contact")
+NUMBERS = count(1)  # of problems, in the order in which they are made: the same on all ranks
 
 
 class ContactProblem(ProblemStates):
@@ -139,9 +142,10 @@ class ContactProblem(ProblemStates):
         self._bound = self._bound_to = None
         self._assembled, self._memory = 0, {}
         self._laws, self._freedom = self._present_laws(), freedom(self.contacts)
-        for contact in self.contacts:
-            contact.belong_to(self)
+        take_contacts(self, self.contacts)
+        self._stood = self._places()
         self._begin()
+        self.number = next(NUMBERS)
         self._made = True
 
     def close(self) -> None:

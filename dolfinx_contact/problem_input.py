@@ -246,6 +246,19 @@ class ProblemOptions(Guarded):
         return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
 
 
+def take_contacts(problem, contacts) -> None:
+    """From now on a problem makes the history of its contacts; warns where another one has begun it."""
+    begun = [contact for contact in contacts if contact.has_history]
+    if begun:
+        warnings.warn(
+            f"{len(begun)} of {len(contacts)} contacts have a history of steps in another ContactProblem, which ends here: "
+            "without reactions, slip, work and wear it begins anew. Make a Contact for each problem, if that is not meant.",
+            stacklevel=3,
+        )
+    for contact in contacts:
+        contact.belong_to(problem)
+
+
 def check_alive(problem, body, contacts) -> None:
     """Raise a ``ValueError`` if a problem can no longer go on."""
     if body.closed:
@@ -255,6 +268,8 @@ def check_alive(problem, body, contacts) -> None:
             "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
             "go on with that one, or make a Contact for each."
         )
+    for plane in {id(contact.plane): contact.plane for contact in contacts}.values():
+        plane.take(problem.number)
 
 
 def check_step(u, comm, contacts) -> None:

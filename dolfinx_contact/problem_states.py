@@ -61,11 +61,15 @@ class ProblemStates(ProblemOptions):
         self._kept = Kept(
             self._states,
             [contact.history() for contact in self.contacts],
-            [(contact.plane.displacement, contact.plane.rotation) for contact in self.contacts],
+            self._places(),
             self.body.known,
             tuple(self._memory.get("past", ())),
             self._variables.last,
         )
+
+    def _places(self) -> list[tuple]:
+        """Displacement and rotation of each contact's surface."""
+        return [(contact.plane.displacement, contact.plane.rotation) for contact in self.contacts]
 
     def _remember(self, past) -> None:
         """Starts for the condensed solver."""
@@ -74,8 +78,10 @@ class ProblemStates(ProblemOptions):
         kept.extend(past)
 
     def reset(self) -> None:
-        """Return to the undeformed body without reactions or history; planes stay where they are."""
+        """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""
         check_alive(self, self.body, self.contacts)
+        for contact, where in zip(self.contacts, self._stood):
+            contact.plane.displacement, contact.plane.rotation = where
         self._begin()
         self._variables.reset()
         self._restore()

@@ -187,7 +187,8 @@ def test_an_initial_guess_is_kept():
 def test_a_contact_has_one_history():
     """A second problem on a contact begins its history anew: the first one says so, and does not go on with another's."""
     scene = pressed()
-    second = dc.ContactProblem(scene.F, scene.u, [scene.contact], bcs=scene.bcs)
+    with pytest.warns(UserWarning, match="begins anew"):
+        second = dc.ContactProblem(scene.F, scene.u, [scene.contact], bcs=scene.bcs)
     for verb in (scene.problem.solve, scene.problem.reset):
         with pytest.raises(ValueError, match="made later"):
             verb()

@@ -123,6 +123,11 @@ class Contact(ContactKinematics):
         """Whether no later problem has taken this contact."""
         return self._owner is not None and self._owner() is problem
 
+    @property
+    def has_history(self) -> bool:
+        """Whether a step was made since the contact was, or since it was reset; the same on all ranks."""
+        return self._settled_by is not None
+
     def mesh_has_moved(self) -> bool:
         """Whether the mesh has been moved or scaled since the contact was made, on this rank."""
         return self._digest() != self._geometry

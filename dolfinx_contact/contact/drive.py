@@ -61,6 +61,24 @@ class Drive(Guarded):
         self._moment: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
         self._spin: np.ndarray | None = None
+        self._taken = 0
+
+    def take(self, problem: int) -> None:
+        """Let a problem step with the surface: what force has moved belongs to one problem, the one that was made last.
+
+        Args:
+            problem: Its number; later ones have larger numbers.
+
+        Raises:
+            ValueError: a problem that was made later steps with it.
+        """
+        if problem < self._taken:
+            raise ValueError(
+                f"{self} is driven by force in a ContactProblem made later, whose motion this one would take for its own: "
+                "make a surface and a Contact for each problem."
+            )
+        if self._free or self._taken:
+            self._taken = problem
 
     @property
     def directions(self) -> tuple[str, ...]:

@@ -114,7 +114,10 @@ class ContactLaws(ContactHistory):
 
     def save(self) -> dict[str, np.ndarray]:
         """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
-        return super().save() | self._laws() | {"plane": self.plane.displacement}
+        saved = super().save() | self._laws() | {"plane": self.plane.displacement}
+        if self._settled_by is not None:
+            saved["law_of_last_step"] = self._rows(self._settled_by)
+        return saved
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size, or another law or plane was saved."""
@@ -131,17 +134,26 @@ class ContactLaws(ContactHistory):
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         super().load(saved)
         self.plane.displacement = saved["plane"]
+        self._settled_by = self.friction  # of older checkpoints nothing else is known
+        rows = saved.get("law_of_last_step", self._rows(self.friction))
+        if not np.array_equal(rows, self._rows(self.friction)):
+            mu, p, axes = np.split(rows, 3, axis=1)
+            turned = (axes != (1.0, 0.0)).any()
+            self._settled_by = Friction(mu, np.where(mu > 0, p, 1.0), axes=axes if turned else None)
 
     def _laws(self) -> dict[str, np.ndarray]:
         """Coefficients, of a law that follows the state those without one, and axes of all nodes; plane and wear."""
         law = self.friction
         if self._field is not None:
             law = on_nodes(self, self._field, self._state(STATE, empty=True), law.axes)
-        rows = (law.mu, law.p, (1.0, 0.0) if law.axes is None else law.axes)
-        laws = np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
         wear = np.nan if self.wear is None else self.wear.coefficient
         parts = (self.plane.described(), np.broadcast_to(wear, 2))
-        return {"laws": laws, "rigid_plane": np.concatenate(parts)}
+        return {"laws": self._rows(law), "rigid_plane": np.concatenate(parts)}
+
+    def _rows(self, law: Friction) -> np.ndarray:
+        """Coefficients of cone and slip rule, and axes, of each node, ``shape=(n, 6)``."""
+        rows = (law.mu, law.p, (1.0, 0.0) if law.axes is None else law.axes)
+        return np.concatenate([np.broadcast_to(row, (self.nodes.size, 2)) for row in rows], axis=1)
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
