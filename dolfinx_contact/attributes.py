@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,51 @@ def frozen(array: np.ndarray) -> np.ndarray:
     """The array itself, from now on read-only: what is computed from it cannot be changed behind its back."""
     array.flags.writeable = False
     return array
+
+
+class Whole(np.ndarray):
+    """A read-only array of an attribute that is assigned as a whole, and says so; what is computed from it is a plain array.
+
+    ``surface.displacement += way`` assigns a new one.
+    """
+
+    called: str = ""
+
+    def __array_finalize__(self, source) -> None:
+        self.called = getattr(source, "called", "")
+
+    def __array_wrap__(self, array, context=None, return_scalar=False):
+        return array[()] if array.ndim == 0 else array.view(np.ndarray)
+
+    def __setitem__(self, key, value) -> None:
+        if self.flags.writeable:  # a copy of it
+            super().__setitem__(key, value)
+            return
+        raise ValueError(
+            f"{self.called} is read-only, it is assigned as a whole: {self.called} = ..., or {self.called} += ... for all components."
+        )
+
+    def __iadd__(self, other):
+        return super().__iadd__(other) if self.flags.writeable else self + other
+
+    def __isub__(self, other):
+        return super().__isub__(other) if self.flags.writeable else self - other
+
+    def copy(self, order="C") -> np.ndarray:
+        """A plain array that may be changed."""
+        return np.array(self, order=order)
+
+    def __repr__(self) -> str:
+        return repr(self.view(np.ndarray))
+
+
+def whole(name: str, array: np.ndarray | None) -> Any:
+    """A view of a read-only array that is the attribute ``name``; None stays None."""
+    if array is None:
+        return None
+    view = array.view(Whole)
+    view.called = name
+    return view
 
 
 class Guarded:

@@ -3,6 +3,8 @@
 A test that hangs here means that one rank raised and another waits for it.
 """
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 import scenes
@@ -48,6 +50,30 @@ def test_plane_refuses(changes, message):
     """A plane without a direction, or with a wrong one, names the argument and its value."""
     with pytest.raises(ValueError, match=message):
         plane(**changes)
+
+
+@pytest.mark.parametrize("name", ["displacement", "rotation", "force", "moment", "drive", "guides"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_component_of_what_is_assigned_as_a_whole_is_refused(d, name):
+    """The message says how to do it; adding to all works, copies and what is computed are arrays like any other."""
+    surface = dc.RigidSphere(np.zeros(d), 1.0)
+    size = 1 if d == 2 and name in ("rotation", "moment") else d
+    given = np.eye(d) if name == "guides" else np.arange(1.0, 1.0 + size)
+    setattr(surface, name, given)
+    with pytest.raises(ValueError, match=f"plane.{name} is read-only, it is assigned as a whole"):
+        getattr(surface, name)[0] = 2.0
+    before = getattr(surface, name)
+    assert (before == given).all() and type(before + 1) is type(before.copy()) is np.ndarray
+    for taken in (before.copy(), deepcopy(before), np.array(before)):
+        taken[0] = 7.0
+    if name != "guides":
+        other = deepcopy(surface)
+        setattr(other, name, getattr(other, name) + given)
+        assert getattr(other, name) == pytest.approx(2 * given)
+    surface.displacement += np.ones(d)
+    surface.displacement -= 0.5 * np.ones(d)
+    start = given if name == "displacement" else np.zeros(d)
+    assert surface.displacement == pytest.approx(start + 0.5)
 
 
 @pytest.mark.parametrize("value", [(0, 0), (0, 0, np.nan), "far", (0, 0, 1j)])

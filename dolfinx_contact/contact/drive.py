@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import Guarded, frozen
+from dolfinx_contact.attributes import Guarded, frozen, whole
 from dolfinx_contact.checks import finite
 
 # Part by which guides may miss unit length and right angles: half of the digits.
@@ -113,7 +113,7 @@ class Drive(Guarded):
     @property
     def force(self) -> np.ndarray | None:
         """Force of the surface on the bodies at its point, ``shape=(gdim,)``, global frame; None is no force."""
-        return self._force
+        return whole("plane.force", self._force)
 
     @force.setter
     def force(self, value: ArrayLike | None) -> None:
@@ -123,7 +123,7 @@ class Drive(Guarded):
     @property
     def moment(self) -> np.ndarray | None:
         """Moment of the surface on the bodies about its point, ``shape=(3,)``, in 2-D one number; None is zero."""
-        return self._moment
+        return whole("plane.moment", self._moment)
 
     @moment.setter
     def moment(self, value: ArrayLike | None) -> None:
@@ -159,7 +159,7 @@ class Drive(Guarded):
     @property
     def drive(self) -> np.ndarray:
         """Displacement of the springs' far end, ``shape=(gdim,)``, global frame."""
-        return self._drive
+        return whole("plane.drive", self._drive)
 
     @drive.setter
     def drive(self, value: ArrayLike) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import frozen
+from dolfinx_contact.attributes import frozen, whole
 from dolfinx_contact.checks import finite
 from dolfinx_contact.contact.drive import Drive, check_guides, vector
 
@@ -51,7 +51,7 @@ class Surface(Drive):
     @property
     def displacement(self) -> np.ndarray:
         """Displacement from the first position, ``shape=(gdim,)``, global frame, length units."""
-        return self._displacement
+        return whole("plane.displacement", self._displacement)
 
     @displacement.setter
     def displacement(self, value: ArrayLike) -> None:
@@ -60,7 +60,7 @@ class Surface(Drive):
     @property
     def rotation(self) -> np.ndarray:
         """Rotation from the first position about ``point``, radians: its vector, ``shape=(3,)``; one angle in 2-D."""
-        return self._rotation
+        return whole("plane.rotation", self._rotation)
 
     @rotation.setter
     def rotation(self, value: ArrayLike) -> None:
@@ -78,7 +78,7 @@ class Surface(Drive):
 
         They stay when the surface turns.
         """
-        return self._guides
+        return whole("plane.guides", self._guides)
 
     @guides.setter
     def guides(self, value: ArrayLike) -> None:
