@@ -75,7 +75,7 @@ class ContactProblem(ProblemStates):
         entity_maps: How meshes lie in each other, where ``F`` has Functions on other ones than ``u``, as ``fem.form`` takes
             it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
-            "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one.
+            "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, by volume: with the least integral of |du|^2.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.bodies.forms import times_volume
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed_input import principal_axes
 
@@ -232,7 +233,7 @@ class Statics:
         return sums + self.loads, sizes + np.abs(self.loads)
 
     def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
-        """A solution whose undetermined motions are those nearest to the last displacement.  Collective.
+        """A solution whose undetermined motions are those nearest to the last displacement, by volume.  Collective.
 
         Args:
             step: The ``LoadStep``; has measured ``x``.
@@ -251,7 +252,13 @@ class Statics:
                 'friction or a soft spring, or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
             )
         Z = self._modes @ motions
-        apart, sizes = self._body.total(Z.T @ (self._last - x)), self._body.total(Z.T @ Z)
+        weighed = times_volume(
+            self._body.displacements, Z
+        )  # nearest is least the integral of |du|^2
+        apart, sizes = (
+            self._body.total(weighed.T @ (self._last - x)),
+            self._body.total(weighed.T @ Z),
+        )
         way = Z @ np.linalg.solve(sizes, apart)
         for halved in range(HALVED):
             trial = x + 0.5**halved * way

@@ -8,6 +8,9 @@ import hashlib
 
 import numpy as np
 import ufl
+from dolfinx import fem
+
+from dolfinx_contact import compat
 
 
 def derivative_of(F, u, J, moving: bool = False):
@@ -80,3 +83,21 @@ def digest_of(parameters) -> bytes:
         values = parameter.x.array if hasattr(parameter, "x") else parameter.value
         digest.update(np.ascontiguousarray(values))
     return digest.digest()
+
+
+def times_volume(of, modes: np.ndarray) -> np.ndarray:
+    """Integrals of displacements times each shape function over the body's volume, ``shape=(owned dofs, m)``.  Collective.
+
+    Args:
+        of: ``Displacements``.
+        modes: Values of owned degrees of freedom, of the same shape.
+    """
+    z, integral = fem.Function(of.V), fem.Function(of.V)
+    form = fem.form(ufl.inner(z, ufl.TestFunction(of.V)) * ufl.dx)
+    columns, size = [], of.count * of.dim
+    for mode in modes.T:
+        z.x.array[:size] = of.rows(mode).ravel()
+        z.x.scatter_forward()
+        compat.assemble_into(integral.x, form)
+        columns.append(integral.x.array[:size].reshape(of.count, of.dim).copy())
+    return of.vectors(np.stack(columns, axis=-1))
