@@ -53,18 +53,20 @@ def pytest_addoption(parser):
         action="store_true",
         help="of each test function the first set of parameters alone",
     )
+    parser.addoption("--rest", action="store_true", help="what --once leaves out")
 
 
 @pytest.hookimpl(trylast=True)  # of those that -m and -k leave
 def pytest_collection_modifyitems(config, items):
-    if not config.getoption("--once"):
+    once, rest = config.getoption("--once"), config.getoption("--rest")
+    if not once and not rest:
         return
     first = {}
     for item in items:
         first.setdefault((item.path, getattr(item, "originalname", item.name)), item)
-    chosen = list(first.values())
-    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
-    items[:] = chosen
+    firsts = set(first.values())
+    config.hook.pytest_deselected(items=[item for item in items if (item in firsts) == rest])
+    items[:] = [item for item in items if (item in firsts) != rest]
 
 
 def pytest_sessionstart(session):

@@ -11,6 +11,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.contact.plane_balance import PlaneBalance
 from mechanics.scenes import build, problem_of
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 E, TOL = 210e3, 1e-10
 SOLVERS = {"default": None, "fixed point": dc.FixedPoint(), "paper's map": dc.FixedPoint(map="bipotential")}  # fmt: skip

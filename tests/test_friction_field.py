@@ -12,6 +12,7 @@ from dolfinx import fem
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 
 

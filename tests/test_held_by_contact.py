@@ -14,6 +14,7 @@ from dolfinx_contact.compat import functionspace
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.statics import Statics
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 TOL = 1e-9
 SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint, "multigrid": dc.FixedPoint}  # fmt: skip

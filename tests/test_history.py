@@ -12,6 +12,7 @@ import scenes
 import dolfinx_contact as dc
 from dolfinx_contact.compat import partitioner
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 PROGRAMME = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006), (0.003, 0, -0.004)]
 

@@ -14,6 +14,7 @@ from dolfinx import fem, mesh
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 FRICTION = dc.Friction(mu=0.3)
 

@@ -13,6 +13,7 @@ from dolfinx import fem, mesh
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.compat import functionspace, interpolation_points
 
+pytestmark = pytest.mark.ranks
 E, NU = 200.0, 0.3
 SHEAR, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
 YIELD, HARDENING = 0.5, 20.0

@@ -16,6 +16,7 @@ from test_any_body import BULK, rubber_seal
 
 from dolfinx_contact.compat import mixed_functionspace, partitioner
 
+pytestmark = pytest.mark.ranks
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
 TILTED = pytest.mark.parametrize(
     "tilted", [pytest.param(False, marks=pytest.mark.slow), True], ids=["flat", "tilted"]

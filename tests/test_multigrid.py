@@ -11,6 +11,7 @@ from dolfinx_contact.compat import partitioner
 from dolfinx_contact.petsc import linear_solver
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
 
+pytestmark = pytest.mark.ranks
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 # Cells of the block, and who owns them: flat elements are shared out like tiles, tall stacks by height.
 SHARES = {

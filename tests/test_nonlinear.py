@@ -17,6 +17,7 @@ from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.solvers.base import SolverResult
 from mechanics.material import elasticity
 
+pytestmark = pytest.mark.ranks
 SOLVERS = {
     "default": None,
     "sparse": dc.SparseNewton(),

@@ -14,6 +14,7 @@ from mpi4py import MPI
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 SOLVERS = {"condensed": dc.CondensedNewton, "fixed point": dc.FixedPoint}
 AXES = [(1.0, 0.0, 0.0), (1.0, 0.6, 0.0), (0.2, -1.0, 0.0), (1.0, 1.0, 0.0)]

@@ -9,6 +9,7 @@ from scenes import COMM, MPI
 
 from dolfinx_contact.petsc import linear_solver
 
+pytestmark = pytest.mark.ranks
 SLIPS = pytest.mark.parametrize("slips", [False, True], ids=["stick", "slip"])
 TILTED = pytest.mark.parametrize("tilted", [False, True], ids=["flat", "tilted"])
 

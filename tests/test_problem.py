@@ -9,6 +9,7 @@ from petsc4py import PETSc
 import dolfinx_contact as dc
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
 
+pytestmark = pytest.mark.ranks
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 CASES = {
     "A": {"mu": 0.2, "p": None},

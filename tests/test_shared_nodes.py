@@ -20,7 +20,7 @@ from mechanics.corners import STRAIN, Push, build_corner
 from mechanics.judge_corners import CornerJudge
 
 # Ends of the faces are held with the faces beyond.
-pytestmark = pytest.mark.filterwarnings("ignore:.* are left out")
+pytestmark = [pytest.mark.ranks, pytest.mark.filterwarnings("ignore:.* are left out")]
 COMM, TOL = scenes.COMM, 1e-8
 SOLVERS = {"default": None, "condensed": dc.CondensedNewton(), "fixed point": dc.FixedPoint()}
 FIXED_POINT_IS_SLOW = ["default", "condensed", pytest.param("fixed point", marks=pytest.mark.slow)]

@@ -21,6 +21,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 from mechanics.material import elasticity
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 E, FAR = 1000.0, 20.0  # the box ends at FAR, half the punch is of length 1
 

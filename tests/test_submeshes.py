@@ -16,6 +16,7 @@ from dolfinx import fem, mesh
 from dolfinx_contact.compat import functionspace, mixed_functionspace
 from mechanics.material import elasticity
 
+pytestmark = pytest.mark.ranks
 E, NU = 200.0, 0.3
 KNOWN = "entity_maps" in signature(fem.form).parameters
 needs_maps = pytest.mark.skipif(not KNOWN, reason="this DOLFINx has no entity maps")

@@ -17,6 +17,7 @@ from dolfinx_contact.compat import functionspace
 from dolfinx_contact.contact.ufl_distance import by_ufl
 from mechanics.material import elasticity
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 E = 1000.0
 
