@@ -7,7 +7,7 @@
 # make stress   every solver on some 840 scenes, each answer judged from the mechanics in NumPy; resumable
 # make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
 # make report   error against run time: every solver, and the peers beside it;
-#               docs/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
+#               results/report/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
 .PHONY: punch study stress report docs test test-rest test-wheel test-all format stubs clean

@@ -1,13 +1,13 @@
 """The punch as an animation of its stick and slip zones, and in space.  From the root of the clone:
 
-python -m docs.moving_pictures            # docs/study/cycle.gif, from a run of studies/punch
-python -m docs.moving_pictures space      # docs/study/space.png, from results/punch of `make punch`; needs PyVista
+python -m docs.moving_pictures            # results/study/cycle.gif, from a run of studies/punch
+python -m docs.moving_pictures space      # results/study/space.png, from results/punch of `make punch`; needs PyVista
 """
 
 import sys
 from pathlib import Path
 
-FOLDER = Path(__file__).parent / "study"
+FOLDER = Path(__file__).parents[1] / "results" / "study"
 
 
 def cycle(case: str = "C", refine: int = 0) -> Path:

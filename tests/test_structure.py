@@ -1,6 +1,7 @@
 """What programs keep to: short functions, no path of their own making, no import circle."""
 
 import ast
+import subprocess
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -75,3 +76,12 @@ def test_there_is_no_import_circle():
     assert set(graph) <= set(order)
     assert "mechanics.judge" in graph["mechanics.judge_scene"]
     assert "dolfinx_contact.step" in graph["dolfinx_contact.problem"]
+
+
+def test_the_repository_is_light():
+    """All tracked files together are below 5 MB: what programs make is made, not tracked."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0:
+        pytest.skip("no clone")
+    files = [ROOT / name for name in listed.stdout.split("\0") if name]
+    assert sum(file.stat().st_size for file in files if file.exists()) < 5e6

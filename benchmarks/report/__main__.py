@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Error against run time: every solver, and the peers beside it.
 
-    make report              # half an hour and more; docs/report.html, docs/report/
-    make report QUICK=1      # minutes; results/report-quick/
+    make report              # half an hour and more; results/report/report.html
+    make report QUICK=1      # minutes; results/report-quick/report.html
 
 Every measurement has a process of its own, one thread, and is kept under results/; a run that is stopped
 continues; what was measured with other settings, or with code that has changed since, is measured anew.  All times are
@@ -143,16 +143,15 @@ def main(argv=None) -> Path:
     add("--size", choices=sizes, default="full", help="smallest: minutes less, for the tests")
     add("--sections", nargs="+", choices=SECTIONS, default=list(SECTIONS))
     add("--minutes", type=float, default=float("inf"), help="begin no measurement after these")
-    add("--measurements", type=Path, help="where measurements are kept (default: results/report)")
-    add("--output", type=Path, help="of the page (default: docs, or results/report-quick)")
+    add("--measurements", type=Path, help="where measurements are kept (default: in the output)")
+    add("--output", type=Path, help="of the page (default: results/report or results/report-quick)")
     add("--keep", action="store_true", help="sections that are not measured: as report.json of the output has them")  # fmt: skip
     add("--redraw", action="store_true", help="measure nothing, draw what report.json of the output has")  # fmt: skip
     options = parser.parse_args(argv)
-    quick = ROOT / "results" / "report-quick"
-    kept, output = quick / "measurements", quick
-    if options.size == "full":
-        kept, output = ROOT / "results" / "report", ROOT / "docs"
-    kept, output = options.measurements or kept, options.output or output
+    output = options.output or ROOT / "results" / (
+        "report" if options.size == "full" else "report-quick"
+    )
+    kept = options.measurements or output / "measurements"
     figures = output / "report"
     file = figures / "report.json"
     if options.redraw:
