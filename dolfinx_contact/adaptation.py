@@ -120,11 +120,22 @@ def adapt(
 
 
 def _pair(compute: Callable[[Any], Pair], mesh: Any) -> Pair:
-    problem, reference = compute(mesh)
     with raised_together(mesh.comm):
-        if any(of.body.V.mesh is not mesh for of in (problem, reference)):
-            raise ValueError("compute must return two problems on the mesh that it is given.")
-    return problem, reference
+        pair = compute(mesh)
+    with raised_together(mesh.comm):
+        if (
+            not isinstance(pair, (tuple, list))
+            or len(pair) != 2
+            or not all(_is_on(mesh, of) for of in pair)
+        ):
+            raise ValueError(
+                f"compute must return two ContactProblems on the mesh that it is given, of lower and of higher order, got {pair!r}."
+            )
+    return tuple(pair)
+
+
+def _is_on(mesh: Any, problem: Any) -> bool:
+    return hasattr(problem, "contacts") and problem.body.V.mesh is mesh
 
 
 def _check(mesh, share: float, quantity: str, quantities: Mapping, meshes: int) -> None:

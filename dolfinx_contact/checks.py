@@ -32,6 +32,14 @@ def finite(name: str, value, copy: bool = True) -> np.ndarray:
     return array.astype(np.float64, copy=copy)
 
 
+def number(name: str, value) -> float:
+    """One finite real number, alone or in an array of one, or a ``ValueError``."""
+    array = np.asarray(value)
+    if array.size != 1 or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be one finite real number, got {value!r}.")
+    return float(array.item())
+
+
 def positive(name: str, value, whole: bool = False, finite: bool = False) -> float:
     """A positive number, or a ``ValueError``; of a whole one infinity is none."""
     try:

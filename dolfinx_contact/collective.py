@@ -3,34 +3,61 @@
 from __future__ import annotations
 
 import pickle
-from contextlib import contextmanager
+import sys
+from time import monotonic, sleep
+from traceback import print_exception
 
 import numpy as np
 from mpi4py import MPI
 
+# Seconds that a rank that failed waits for the others, which may be busy with work of their own.
+PATIENCE = 60.0
 
-@contextmanager
-def raised_together(comm):
+
+class raised_together:
     """Raise on every rank of ``comm`` what the block raised on any of them.
 
-    The block must not communicate.  One shared flag is exchanged after it; only if it is up does
-    the first rank that failed send its message to the others.
+    One shared flag is exchanged after the block; only if it is up does the first rank that failed send its message to the
+    others.  A block that communicates may leave the others in its midst, where they wait for the rank that failed: if they
+    have not come to the end of the block ``PATIENCE`` seconds later, that rank prints its error and ends all of them.
     """
-    if comm.size == 1:
-        yield
-        return
-    error = None
-    try:
-        yield
-    except BaseException as caught:  # Ctrl-C, too: the other ranks must not be left waiting
-        error = caught
-    first = comm.allreduce(comm.rank if error is not None else comm.size, op=MPI.MIN)
-    if first == comm.size:
-        return
-    kind, message = comm.bcast(_told(error) if comm.rank == first else None, root=first)
-    if error is not None:
-        raise error
-    raise kind(f"{message} (found on rank {first})")
+
+    def __init__(self, comm):
+        self._comm = comm
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, _, error: BaseException | None, __
+    ) -> None:  # Ctrl-C, too, must not leave the others waiting
+        comm = self._comm
+        if comm.size == 1 or (first := _first_to_fail(comm, error)) == comm.size:
+            return
+        kind, message = comm.bcast(_told(error) if comm.rank == first else None, root=first)
+        if error is None:
+            raise kind(f"{message} (found on rank {first})")
+
+
+def _first_to_fail(comm, error: BaseException | None) -> int:
+    """The lowest rank with an error, or the number of ranks."""
+    mine, first = np.array([comm.size if error is None else comm.rank]), np.empty(1, dtype=int)
+    request = comm.Iallreduce(mine, first, op=MPI.MIN)
+    if error is None:
+        request.Wait()
+    until = monotonic() + PATIENCE
+    while error is not None and not request.Test():
+        if monotonic() > until:
+            print_exception(type(error), error, error.__traceback__)
+            print(
+                f"dolfinx_contact: rank {comm.rank} failed with the error above. {PATIENCE:g} s later others still wait for it "
+                "in the midst of what it left: all of them are ended.",
+                file=sys.stderr,
+                flush=True,
+            )
+            comm.Abort(1)
+        sleep(1e-3)
+    return int(first[0])
 
 
 def by_first_rank(comm, work, tell=None):
@@ -90,15 +117,18 @@ def described(value) -> str:
     return f"{type(value).__name__}({', '.join(f'{k}={v!r}' for k, v in sorted(plain.items()))})"
 
 
-def _told(error) -> tuple[type, str]:
-    """Type and message of an error for the other ranks, to which not every type can be sent, or made from a message."""
-    kind = type(error)
-    try:
-        pickle.dumps(kind)
-        kind(str(error))
-    except Exception:
-        return RuntimeError, f"{kind.__name__}: {error}"
-    return kind, str(error)
+def _told(error: BaseException) -> tuple[type, str]:
+    """Type and message of an error for the other ranks: the nearest of its types that can be sent, and made from a message."""
+    for kind in type(error).__mro__:
+        try:
+            pickle.dumps(kind)
+            kind(str(error))
+            break
+        except Exception:
+            continue
+    if kind is type(error):
+        return kind, str(error)
+    return RuntimeError if kind is Exception else kind, f"{type(error).__name__}: {error}"
 
 
 class OverRanks:

@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TypeVar
 
 import numpy as np
+from mpi4py import MPI
 
-from dolfinx_contact.checks import positive
+from dolfinx_contact.checks import number, positive
+from dolfinx_contact.collective import agree, raised_together
 
 Mesh = TypeVar("Mesh")
 
@@ -55,8 +59,9 @@ def converge(
     accuracy: float,
     meshes: Sequence[Mesh],
     halvings: int = 0,
+    comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Converged:
-    """Refine meshes and halve increments until the estimated error of a number is small enough.
+    """Refine meshes and halve increments until the estimated error of a number is small enough.  Collective.
 
     On every mesh but the last in use the increments are halved first, where it costs least.  The estimates:
 
@@ -73,25 +78,27 @@ def converge(
         accuracy: Relative.
         meshes: What ``compute`` makes a mesh of, from the coarsest to the finest, at least two; each with cells of half the size.
         halvings: Of the increments, at most; 0 if there is no history, or none is to be estimated.
+        comm: The ranks that compute together; ``MPI.COMM_SELF`` where each rank has a number of its own.
 
     Returns:
         A ``Converged``.  Where meshes or halvings do not suffice it says so by ``reached``.
 
     Raises:
-        ValueError: fewer than two meshes, an accuracy that is not positive, a value that is zero or not finite.
+        ValueError: fewer than two meshes, one given twice, an accuracy that is not positive, a value that is zero, no finite
+            real number, or not the same on all ranks.
 
     Example:
         >>> found = dc.converge(lambda n, parts: 1.0 + n**-2 + 0.1 / parts, 0.01, [4, 8, 16, 32], halvings=6)
         >>> bool(abs(found.value - 1.0) < 0.02)
         True
     """
-    accuracy = positive("accuracy", accuracy, finite=True)
-    if len(meshes) < 2:
-        raise ValueError(f"meshes must be at least two, from the coarsest on, got {meshes!r}.")
+    with raised_together(comm):
+        accuracy = _checked(compute, accuracy, meshes, halvings)
+    agree(comm, accuracy=accuracy, meshes=len(meshes), halvings=halvings)
     tried: dict[tuple, float] = {}
 
     def at(level: int, halved: int) -> float:
-        return _value(compute, tried, (meshes[level], 2**halved))
+        return _value(compute, tried, (meshes[level], 2**halved), comm)
 
     halved, of_mesh = 0, 0.0
     for level in range(1, len(meshes)):
@@ -105,6 +112,7 @@ def converge(
         errors = [float(error / abs(value)) for error in (of_mesh, increments)]
         if sum(errors) <= accuracy:
             break
+    _warn_of_equal(tried)
     return Converged(value, *errors, sum(errors) <= accuracy, tried)
 
 
@@ -121,13 +129,58 @@ def _halve(
     return 0, 0.0
 
 
-def _value(compute, tried: dict[tuple, float], key: tuple) -> float:
+def _value(compute, tried: dict[tuple, float], key: tuple, comm) -> float:
     """Of a run, which is made once."""
     if key not in tried:
-        value = float(compute(*key))
-        if not np.isfinite(value) or value == 0:
-            raise ValueError(
-                f"compute must return a finite number other than zero, got {value!r} for {key}."
-            )
+        with raised_together(comm):
+            returned = compute(*key)
+        with raised_together(comm):
+            value = number(f"what compute returns for {key}", returned)
+            if value == 0:
+                raise ValueError(
+                    f"compute must return a number other than zero, got {value!r} for {key}."
+                )
+        agree(comm, **{f"what compute returns for {key}": value})
         tried[key] = value
     return tried[key]
+
+
+def _checked(compute, accuracy, meshes, halvings) -> float:
+    """The accuracy, if all makes sense."""
+    accuracy = positive("accuracy", accuracy, finite=True)
+    if not callable(compute):
+        raise ValueError(
+            f"compute must be a function of a mesh and a number of parts, got {compute!r}."
+        )
+    if len(meshes) < 2:
+        raise ValueError(f"meshes must be at least two, from the coarsest on, got {meshes!r}.")
+    if not isinstance(halvings, (int, np.integer)) or halvings < 0:
+        raise ValueError(f"halvings must be a whole number, 0 or more, got {halvings!r}.")
+    try:
+        sizes = dict.fromkeys(meshes)
+    except TypeError:
+        raise ValueError(f"meshes must be numbers, names, tuples or meshes, not lists or arrays, got {meshes!r}.") from None  # fmt: skip
+    if all(isinstance(mesh, Real) for mesh in meshes):
+        rises = np.diff(np.array(meshes, dtype=float))
+        finer = (rises > 0).all() or (rises < 0).all()
+    elif all(hasattr(mesh, "topology") for mesh in meshes):
+        sizes = [mesh.topology.index_map(mesh.topology.dim).size_global for mesh in meshes]
+        finer = (np.diff(sizes) > 0).all()
+    else:
+        finer = len(sizes) == len(meshes)
+    if not finer:
+        raise ValueError(f"meshes must be from the coarsest to the finest, each finer than the one before, got {meshes!r}.")  # fmt: skip
+    return accuracy
+
+
+def _warn_of_equal(tried: dict[tuple, float]) -> None:
+    """Warn of runs that should differ and do not in any digit: an error estimated from them is zero."""
+    first: dict[float, tuple] = {}
+    for key, value in tried.items():
+        if first.setdefault(value, key) != key:
+            warnings.warn(
+                f"compute returned {value!r} to the last digit for {first[value]} and for {key}, so no error is seen: check "
+                "that it uses the mesh and the number of parts that it is given.",
+                stacklevel=3,
+            )
+            return

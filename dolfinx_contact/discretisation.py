@@ -16,7 +16,7 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import KDTree
 
 from dolfinx_contact import compat
-from dolfinx_contact.checks import positive
+from dolfinx_contact.checks import finite, positive
 from dolfinx_contact.collective import agree, raised_together
 
 if TYPE_CHECKING:
@@ -129,6 +129,7 @@ def estimate(
     for name, of in {**QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
             value, better = _numbers(name, of(problem), of(reference))
+        agree(comm, **{f"quantity {name!r}": (value.tolist(), better.tolist())})
         found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     if same_mesh or not any(contact.plane.curved for contact in problem.contacts):
@@ -240,12 +241,9 @@ def _check_pair(problem, reference) -> None:
 
 
 def _numbers(name: str, *of) -> list[np.ndarray]:
-    value, better = found = [np.ravel(np.asarray(numbers, dtype=float)) for numbers in of]
-    for numbers in found:
-        if numbers.size == 0 or not np.isfinite(numbers).all():
-            raise ValueError(
-                f"quantity {name!r} must be a finite number or several, got {numbers!r}."
-            )
+    value, better = found = [np.ravel(finite(f"quantity {name!r}", numbers)) for numbers in of]
+    if value.size == 0:
+        raise ValueError(f"quantity {name!r} must be a finite number or several, got {of[0]!r}.")
     if value.size != better.size:
         raise ValueError(
             f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."

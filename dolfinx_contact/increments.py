@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.checks import finite, positive
+from dolfinx_contact.checks import finite, number, positive
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.results.history import History
 from dolfinx_contact.results.record import NotConverged, Step
@@ -61,40 +61,55 @@ def advance(
         >>> table = dc.advance(problem, programme, points=[0.5, 1.0])
     """
     comm = problem.body.comm
-    with raised_together(comm):
-        ends = np.atleast_1d(finite("points", points))
-        if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
-            raise ValueError(f"points must rise from start = {start!r}, got {points!r}.")
-        smallest = positive("smallest", smallest, finite=True)
-        if not callable(programme):
-            raise ValueError(f"programme must be a function of one number, got {programme!r}.")
-    agree(comm, points=ends.tolist(), start=float(start), smallest=smallest)
+    ends, start, smallest = _checked(comm, programme, points, start, smallest, monitor)
     history = History(problem) if history is None else history
-    bar = _bar(comm.rank, ends[-1] - start)
-    now = float(start)
+    bar, now = _bar(comm.rank, ends[-1] - start), start
+
+    def accepted(at: float, step: Step) -> None:
+        nonlocal now
+        history.record(step, t=at)
+        if monitor is not None:
+            with raised_together(comm):
+                monitor(at, step)
+        if bar is not None:
+            bar.update(at - now)
+        now = at
+
     try:
-        for end in ends.tolist():
-            for at, step in _increments(problem, programme, now, end, smallest):
-                history.record(step, t=at)
-                if monitor is not None:
-                    monitor(at, step)
-                if bar is not None:
-                    bar.update(at - now)
-                now = at
+        for end in ends:
+            _in_increments(problem, programme, now, end, smallest, accepted)
     finally:
         if bar is not None:
             bar.close()
     return history
 
 
-def _increments(problem, programme, now: float, end: float, smallest: float):
-    """Parameter and record of every step from ``now`` to ``end``."""
+def _checked(comm, programme, points, start, smallest, monitor) -> tuple[list, float, float]:
+    """Points, start and smallest increment as numbers, the same on all ranks.  Collective."""
+    with raised_together(comm):
+        start, ends = number("start", start), np.atleast_1d(finite("points", points))
+        if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
+            raise ValueError(f"points must rise from start = {start!r}, got {points!r}.")
+        smallest = positive("smallest", smallest, finite=True)
+        if not callable(programme):
+            raise ValueError(f"programme must be a function of one number, got {programme!r}.")
+        if not (monitor is None or callable(monitor)):
+            raise ValueError(
+                f"monitor must be a function of parameter and record, got {monitor!r}."
+            )
+    agree(comm, points=ends.tolist(), start=start, smallest=smallest)
+    return ends.tolist(), start, smallest
+
+
+def _in_increments(problem, programme, now: float, end: float, smallest: float, accepted) -> None:
+    """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
     whole, begun = end - now, now
     # Increments are the whole over ``parts``, of which so many are done.
     parts, done, easy = 1, 0, 0
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
-        programme(at)
+        with raised_together(problem.body.comm):
+            programme(at)
         try:
             step = problem.solve()
         except NotConverged as failure:
@@ -105,7 +120,7 @@ def _increments(problem, programme, now: float, end: float, smallest: float):
                 LOG.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
             continue
         now, done, easy = at, done + 1, easy + 1
-        yield at, step
+        accepted(at, step)
         if easy >= EASY and parts > 1 and done % 2 == 0:
             parts, done, easy = parts // 2, done // 2, 0
 

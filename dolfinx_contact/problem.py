@@ -180,23 +180,12 @@ class ContactProblem(ProblemStates):
         stood = [contact.plane.displacement for contact in self.contacts]
         self._variables.settle()  # with what the user has written into them
         try:
-            self._check_input()
-            self._renew_laws(begin=True)
-            step, found = self._search()
-            step.rest()
-            done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
-            if not converged(step.errors, done, self.tol):
-                raise NotConverged(
-                    f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {refusal(step, self.contacts)}.",
-                    done,
-                    self.body.values(found.x),
-                    [contact.reaction for contact in self.contacts],
-                )
-            self.body.put(found.x)
-            self._variables.advance(self.u)
+            with raised_together(self.body.comm):  # whatever happens on one rank alone
+                done, found = self._step(start)
         except BaseException as failure:
             self._log(f"step failed: {type(failure).__name__}: {failure}")
-            if not isinstance(failure, Exception) or isinstance(failure, PETSc.Error):
+            stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
+            if self.body.comm.allreduce(stopped, op=MPI.LOR):
                 self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
                 self.body.forget()
             for contact, where in zip(self.contacts, stood):
@@ -218,6 +207,24 @@ class ContactProblem(ProblemStates):
         self._unseen.check_wear(self.contacts, self._stiffness)
         warn_of_rounding(done, self.tol)
         return done
+
+    def _step(self, start: float) -> tuple[Step, SolverResult]:
+        """Record and displacement of a step that has converged, shown and given to internal variables."""
+        self._check_input()
+        self._renew_laws(begin=True)
+        step, found = self._search()
+        step.rest()
+        done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
+        if not converged(step.errors, done, self.tol):
+            raise NotConverged(
+                f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {refusal(step, self.contacts)}.",
+                done,
+                self.body.values(found.x),
+                [contact.reaction for contact in self.contacts],
+            )
+        self.body.put(found.x)
+        self._variables.advance(self.u)
+        return done, found
 
     def load_step(self) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.

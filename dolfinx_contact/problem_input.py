@@ -173,11 +173,9 @@ def follow(contacts, body, u: np.ndarray, known: list) -> bool:
         u: Last converged displacement, owned degrees of freedom.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
-    moving = [contact for contact in contacts if contact.follows]
-    if moving:
-        with raised_together(body.comm):
-            for contact in moving:
-                contact.follow(u)
+    for contact in contacts:
+        if contact.follows:
+            contact.follow(u)
     changed = [c for c, points in zip(contacts, known) if c.points is not points]
     known[:] = [contact.points for contact in contacts]
     if changed:
@@ -190,7 +188,8 @@ def check_planes(contacts, body) -> None:
     for contact in contacts:
         plane, gdim = contact.plane, contact.points.dim
         x = body.displacements.x[:, :gdim]
-        height = plane.distance(plane.relative(x))
+        with raised_together(body.comm):
+            height = plane.distance(plane.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.gap)
         if highest < DEEP * deepest:

@@ -3,7 +3,6 @@
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
-import numpy as np
 import pytest
 from demo_hertz import FORCE, A
 from helpers import rounded_body
@@ -32,7 +31,8 @@ def test_no_history():
     assert not found.reached and list(found.tried) == [(2, 1), (4, 1), (8, 1)]
     assert found.value == 1.125 and found.increment_error == 0
     assert found.mesh_error == pytest.approx(0.125 / 1.125)
-    exact = dc.converge(lambda n, parts: 2.0, 1e-3, "abc", halvings=1)
+    with pytest.warns(UserWarning, match="no error is seen"):
+        exact = dc.converge(lambda n, parts: 2.0, 1e-3, "abc", halvings=1)
     assert exact.reached and exact.error == 0 and len(exact.tried) == 3
 
 
@@ -42,9 +42,8 @@ def test_what_cannot_be_meant():
         dc.converge(lambda n, parts: 1.0, 0.0, [1, 2])
     with pytest.raises(ValueError, match="at least two"):
         dc.converge(lambda n, parts: 1.0, 0.1, [1])
-    for wrong in (0.0, np.nan):
-        with pytest.raises(ValueError, match=r"other than zero, got .* for \(1, 1\)"):
-            dc.converge(lambda n, parts, v=wrong: v, 0.1, [1, 2])
+    with pytest.raises(ValueError, match=r"other than zero, got .* for \(1, 1\)"):
+        dc.converge(lambda n, parts: 0.0, 0.1, [1, 2])
 
 
 @pytest.mark.parametrize("accuracy", [0.03, 0.01])

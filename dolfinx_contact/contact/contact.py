@@ -95,7 +95,7 @@ class Contact(ContactKinematics):
         self.x = frozen(self.displacements.x[self.nodes])
         with raised_together(mesh.comm):
             plane.check_at(plane.relative(self._at))
-            self.place()
+        self.place()
         self.friction, self.wear, self.rho = friction, wear, None
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
         described = mesh.comm.bcast(self.described(), root=0)

@@ -49,9 +49,8 @@ def approach(body, contacts, u: np.ndarray) -> None:
     """
     curved = [contact for contact in contacts if contact.plane.free and contact.plane.curved]
     for _ in range(APPROACHES if curved else 0):
-        with raised_together(body.comm):
-            for contact in curved:
-                contact.follow(u)
+        for contact in curved:
+            contact.follow(u)
         if not DrivenPlanes(body, curved).touch(u, NEAR * body.extent):
             return
 

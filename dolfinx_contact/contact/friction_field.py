@@ -10,6 +10,7 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
+from dolfinx_contact.checks import finite
 from dolfinx_contact.law.friction import Friction, is_field
 
 # Part of a direction that has to lie in the plane.
@@ -127,11 +128,7 @@ def _values(contact, name: str, given, state) -> np.ndarray:
     if hasattr(given, "function_space"):
         return _of_function(contact, name, given)
     n = contact.nodes.size
-    values = given(contact.x.T.copy(), **state)
-    try:
-        values = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must give an array of real numbers, got {values!r}.") from None
+    values = finite(f"what {name} gives", given(contact.x.T.copy(), **state))
     return np.zeros((2, 0)) if n == 0 else values
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact.attributes import frozen
+from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.friction_field import guided
 from dolfinx_contact.contact.history import State, Status
 from dolfinx_contact.contact.interface import ContactPoints
@@ -75,13 +76,14 @@ class ContactKinematics(ContactResults):
     def place(self, home: np.ndarray | None = None, there: np.ndarray | None = None) -> None:
         """Take frames and gaps at positions relative to the surface; None is where the undeformed body stands.
 
-        ``there`` are positions in space, with None those of the undeformed body, for lever arms.
+        ``there`` are positions in space, with None those of the undeformed body, for lever arms.  Collective.
         """
         plane, x = self.plane, self._at
         if home is None:
             home = plane.relative(x) if plane.varies else x
-        own = plane.frames(home)
-        frame, flat = plane.turned(own), plane.distance(home)
+        with raised_together(self.comm):  # the user's functions
+            own = plane.frames(home)
+            frame, flat = plane.turned(own), plane.distance(home)
         if home is not x:
             flat = flat - _times(own, home - x)[:, -1]
         before = self._placed

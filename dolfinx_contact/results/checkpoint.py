@@ -45,8 +45,10 @@ def save(path, body, contacts, states, past, variables) -> None:
         known = body.known
         mine |= {"digest": known.digest[None], "load": rows(known.load)}
         mine["free" if known.exact else "rough"] = rows(known.displacement)
-    for k, contact in enumerate(contacts):
-        mine |= {f"contact{k}_{name}": array for name, array in contact.save().items()}
+    with raised_together(comm):  # the user's functions
+        saved = [contact.save() for contact in contacts]
+    for k, of_contact in enumerate(saved):
+        mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
     if past:
         of_contacts = [nodes[f"contact{k}_nodes"] for k in range(len(contacts))]
         mine["past_nodes"] = np.concatenate(of_contacts)
