@@ -211,7 +211,6 @@ class ContactProblem(ProblemStates):
     def _step(self, start: float) -> tuple[Step, SolverResult]:
         """Record and displacement of a step that has converged, shown and given to internal variables."""
         self._check_input()
-        self._renew_laws(begin=True)
         step, found = self._search()
         step.rest()
         done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
@@ -240,6 +239,7 @@ class ContactProblem(ProblemStates):
             if turned or not body.nonlinear:  # else its stiffness is new in every iteration
                 self._unbind()
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
+        self._renew_laws(begin=True)  # in the frames of this step
         b, external = body.load()
         last, before = self._states
         starts = [body.taken(self.u.x.array), 2 * last - before]

@@ -4,10 +4,14 @@
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem, mesh
 from mpi4py import MPI
+from scenes import elasticity
 from test_force import E, free_block
 
 import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
 
 SPRINGS = {
     "by name": (("n", "t1"), {"n": 0.5 * E, "t1": 0.1 * E}),
@@ -149,3 +153,152 @@ def test_reset_returns_surfaces_to_where_the_problem_found_them(moved_before):
         assert np.array_equal(scene.plane.displacement, start[0])
         assert np.array_equal(scene.plane.rotation, start[1])
     assert np.allclose(runs[1], runs[0], rtol=0, atol=1e-9 * E)
+
+
+def slab(surface, friction, centre=(0.0, 0.0), width=0.2, height=0.1):
+    """A slab of bricks above z = 0 whose head is moved, its contact and problem."""
+    low = [centre[0] - width / 2, centre[1] - width / 2, 0.0]
+    high = [centre[0] + width / 2, centre[1] + width / 2, height]
+    body = mesh.create_box(MPI.COMM_WORLD, [low, high], [2, 2, 1], mesh.CellType.hexahedron)
+    V = functionspace(body, ("Lagrange", 1, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = elasticity(u, v, 1000.0, 0.0)
+    foot, head = (
+        mesh.locate_entities_boundary(body, 2, lambda x, z=z: np.isclose(x[2], z))
+        for z in (0, height)
+    )
+    held = fem.Constant(body, np.zeros(3))
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, head), V)
+    contact = dc.Contact(V, foot, surface, friction)
+    return contact, dc.ContactProblem(F, u, [contact], bcs=[bc]), held
+
+
+def parallel(x):
+    return np.stack((1 + 0 * x[0], 0 * x[0], 0 * x[0]))
+
+
+def rings(x):
+    return np.stack((-x[1], x[0], 0 * x[0]))
+
+
+TURNING = [("body", parallel, 0.4), ("surface", parallel, 0.1), ("body", rings, 0.1), ("surface", rings, 0.1)]  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("of, grooves, right", TURNING)
+def test_grooves_move_with_their_owner_under_a_turntable(of, grooves, right, solver):
+    """A table turned by 90 degrees slides along y: parallel grooves of the table lie across, those of the block along x;
+    rings about the axis lie along the slip, whoever has them."""
+    table = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0))
+    friction = dc.Friction((0.1, 0.4), axes=grooves, of=of)
+    contact, problem, held = slab(table, friction, (1.0, 0.0), 0.02, 0.01)
+    problem.solver, held.value = solver, (0, 0, -1e-4)
+    for degrees in (0, 20, 40, 60, 80, 89.4, 89.7, 90):  # at last without a chord for an arc
+        table.rotation = (0, 0, np.radians(degrees))
+        problem.solve()
+    found = contact.force()
+    assert abs(found[1]) / found[2] == pytest.approx(right, rel=0.01)
+
+
+def test_grooves_of_a_surface_are_where_the_surface_has_them():
+    """A strip whose grooves turn beyond x = 0.5 slides under a block: friction is that of where the block stands on it."""
+
+    def two_fields(y):
+        return np.where(y[0] > 0.5, [[0.0], [1.0], [0.0]], [[1.0], [0.0], [0.0]])
+
+    strip = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0))
+    contact, problem, held = slab(strip, dc.Friction((0.1, 0.4), axes=two_fields, of="surface"))
+    held.value, found = (0, 0, -1e-3), []
+    for way in (0.0, 0.1, 0.2, 0.7, 0.9, 1.0, 0.8, 0.3, 0.1):
+        strip.displacement = (-way, 0, 0)
+        problem.solve()
+        force = contact.force()
+        found.append(abs(force[0]) / force[2])
+    assert found[2] == pytest.approx(0.1, rel=1e-6)
+    assert found[5:7] == pytest.approx([0.4, 0.4], rel=1e-6)
+    assert found[8] == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), None])
+def test_grooves_of_a_body_on_a_ball(axis):
+    """Directions in space are the same at all nodes, whatever frames the ball has: across the grooves friction is mu_y N."""
+    ball = dc.RigidSphere((0.03, 0.02, -50), 50, axis=axis)
+    contact, problem, _ = slab(ball, dc.Friction((0.1, 0.4), axes=parallel), width=1.0, height=0.3)
+    for k in range(9):
+        ball.displacement = (0, 0.02 * k, 0.02)
+        problem.solve()
+    force, tilt = contact.force() / contact.force()[2], 0.18 / 50  # of the normal
+    assert force == pytest.approx([0, (0.4 - tilt) / (1 + 0.4 * tilt), 1], abs=0.002)
+
+
+def test_grooves_assigned_before_or_after_the_surface_turned():
+    """What a field of axes means does not depend on when it was given."""
+    forces = []
+    for early in (True, False):
+        table = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0))
+        grooved, plain = dc.Friction((0.1, 0.4), axes=parallel), dc.Friction(0.2)
+        contact, problem, held = slab(table, grooved if early else plain)
+        held.value, table.rotation = (0, 0, -1e-3), (0, 0, 1.0)
+        if not early:
+            contact.friction = grooved
+        problem.solve()
+        held.value = (0, 0.05, -1e-3)
+        problem.solve()
+        forces.append(contact.force())
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9)
+    assert abs(forces[0][1]) / forces[0][2] == pytest.approx(0.4, rel=1e-5)
+
+
+@pytest.mark.parametrize("of", ["body", "surface"])
+def test_textures_go_on_after_load_rewind_and_failure(of, tmp_path):
+    """Grooves under a turning table: the run through a file, and one taken back and failed on the way, do the same work."""
+    path = MPI.COMM_WORLD.bcast(tmp_path, root=0) / "state.npz"
+    works = []
+    for way in ("straight", "loaded", "rewound"):
+        table = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0))
+        friction = dc.Friction((0.1, 0.4), (0.3, 0.1), axes=rings, of=of)
+        contact, problem, held = slab(table, friction, (0.3, 0.2))
+        held.value = (0, 0, -1e-3)
+        for k in range(3 if way == "loaded" else 0, 6):
+            if k == 3 and way == "straight":
+                problem.save(path)
+            if k == 3 and way == "loaded":
+                problem.load(path)
+            if k == 3 and way == "rewound":
+                table.rotation = (0, 0, 1.0)
+                problem.solve()
+                problem.rewind()
+                held.value = (np.nan, 0, 0)
+                with pytest.raises(ValueError, match="NaN"):
+                    problem.solve()
+                held.value = (0, 0, -1e-3)
+            table.rotation = (0, 0, 0.2 * k)
+            problem.solve()
+        works.append(MPI.COMM_WORLD.allreduce(contact.dissipation.sum()))
+    assert works[1:] == pytest.approx([works[0]] * 2, rel=1e-9)
+
+
+def test_fields_of_friction_are_read_at_every_step():
+    """A callable over a number, and a Function, changed between steps: the next step slides with the new coefficient."""
+    plane, mu = dc.RigidPlane((0, 0, 0), (0, 0, 1)), [0.2]
+    contact, problem, held = slab(plane, dc.Friction(lambda x: mu[0] + 0 * x[0]), width=1.0)
+    held.value = (0, 0, -1e-3)
+    problem.solve()
+    given = fem.Function(functionspace(contact.V.mesh, ("Lagrange", 1)))
+    for k, value in enumerate((0.2, 0.3, 0.1, 0.25)):  # the first two by the callable
+        mu[0] = given.x.array[:] = value
+        if k == 2:
+            contact.friction = dc.Friction(given)
+        held.value = (0.1 * (k + 1), 0, -1e-3)
+        problem.solve()
+        force = contact.force()
+        assert -force[0] / force[2] == pytest.approx(value, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "wrong", [dict(of="table"), dict(of="surface"), dict(of="surface", axes=np.ones((4, 2)))]
+)
+def test_an_owner_that_makes_no_sense_is_refused(wrong):
+    """Only the body or the surface can have a texture, and only a callable knows the surface's positions."""
+    with pytest.raises(ValueError, match="of must be"):
+        dc.Friction((0.1, 0.4), **wrong)

@@ -249,7 +249,7 @@ class Contact(ContactKinematics):
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
-        law, law_before, slip = self.friction, self._settled_by, self.slip_increment
+        law, law_before, slip = self.friction, self.law_before, self.slip_increment
         if self._begun is None:
             work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
         else:  # forces before the step with the law at its beginning

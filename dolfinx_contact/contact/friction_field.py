@@ -30,7 +30,7 @@ def followed(friction: Friction) -> list[str]:
 
 
 def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=None) -> Friction:
-    """The law with coefficients and axes for each owned node of a contact, which has ``displacements``, ``nodes``, ``x`` and ``frame``.
+    """The law with coefficients and axes for each owned node of a contact, as its frames are at present.
 
     Args:
         contact: The contact.
@@ -44,7 +44,7 @@ def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=Non
     """
     given, k = friction.given(), friction.exponent
     mu, p = (_coefficients(contact, name, given[name], state) for name in ("mu", "p"))
-    return Friction(mu, p, k, axes=_axes(contact, given["axes"]) if axes is None else axes)
+    return Friction(mu, p, k, axes=_axes(contact, friction) if axes is None else axes)
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
@@ -98,22 +98,30 @@ def _coefficients(contact, name: str, given, state):
     return np.broadcast_to(values, (2, n)).T.copy()
 
 
-def _axes(contact, given):
+def directions(contact, friction: Friction) -> np.ndarray:
+    """Directions of a field of axes at the reference positions of the nodes, ``shape=(n, 2)`` or ``(n, 3)``: the same in every state."""
+    values = _values(contact, "axes", friction.given()["axes"], {})
+    return (values / np.linalg.norm(values, axis=0)).T.copy()
+
+
+def _axes(contact, friction: Friction):
+    given = friction.given()["axes"]
     if not is_field(given):
         return given
-    n, gdim = contact.nodes.size, contact.points.dim
-    values = _values(contact, "axes", given, {})
+    n, gdim, of_surface = contact.nodes.size, contact.points.dim, friction.of == "surface"
+    values = _values(contact, "axes", given, {}, contact.home if of_surface else None)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
+    frame = contact.own_frame if of_surface else contact.frame
     if len(values) == 2:
         along = values
     elif contact.plane.curved:
-        along = np.einsum("nij,jn->in", contact.frame[:, :2], values)
+        along = np.einsum("nij,jn->in", frame[:, :2], values)
     else:
-        along = contact.frame[:2] @ values
+        along = frame[:2] @ values
     length, full = np.linalg.norm(along, axis=0), np.linalg.norm(values, axis=0)
     if not (length > ALONG * full).all():
         node = int(np.argmin(length - ALONG * full))
@@ -123,12 +131,13 @@ def _axes(contact, given):
     return (along / length).T.copy()
 
 
-def _values(contact, name: str, given, state) -> np.ndarray:
-    """Values at the nodes, ``shape=(n,)`` or ``(components, n)``."""
+def _values(contact, name: str, given, state, at=None) -> np.ndarray:
+    """Values at the nodes, ``shape=(n,)`` or ``(components, n)``; of a callable also ``at`` other positions, ``shape=(n, 3)``."""
     if hasattr(given, "function_space"):
         return _of_function(contact, name, given)
     n = contact.nodes.size
-    values = finite(f"what {name} gives", given(contact.x.T.copy(), **state))
+    at = contact.x if at is None else at
+    values = finite(f"what {name} gives", given(at.T.copy(), **state))
     return np.zeros((2, 0)) if n == 0 else values
 
 

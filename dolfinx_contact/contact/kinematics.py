@@ -20,7 +20,7 @@ from dolfinx import fem
 from dolfinx_contact.attributes import frozen
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.friction_field import guided
-from dolfinx_contact.contact.history import State, Status
+from dolfinx_contact.contact.history import ContactHistory, State, Status
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.results import ContactResults
 from dolfinx_contact.contact.surface import cross
@@ -62,6 +62,21 @@ class ContactKinematics(ContactResults):
         return self._placed.points
 
     @property
+    def home(self) -> np.ndarray:
+        """Positions relative to the surface for which frames and gaps were taken, in its axes, ``shape=(n, gdim)``."""
+        return self._placed.home
+
+    @property
+    def own_frame(self) -> np.ndarray:
+        """As ``frame``, in the axes of the surface."""
+        return self._placed.own
+
+    @property
+    def _wanders(self) -> bool:
+        """Whether it matters where on the surface nodes are."""
+        return self.plane.varies or self.textured
+
+    @property
     def _at(self) -> np.ndarray:
         return self.x[:, : self.V.mesh.geometry.dim]
 
@@ -80,7 +95,7 @@ class ContactKinematics(ContactResults):
         """
         plane, x = self.plane, self._at
         if home is None:
-            home = plane.relative(x) if plane.varies else x
+            home = plane.relative(x) if self._wanders else x
         with raised_together(self.comm):  # the user's functions
             own = plane.frames(home)
             frame, flat = plane.turned(own), plane.distance(home)
@@ -108,7 +123,9 @@ class ContactKinematics(ContactResults):
         """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
         plane = self.plane
         return (
-            plane.varies or plane.spins or not np.array_equal(plane.rotation, self._placed.rotation)
+            self._wanders
+            or plane.spins
+            or not np.array_equal(plane.rotation, self._placed.rotation)
         )
 
     def follow(self, u: np.ndarray) -> None:
@@ -121,7 +138,7 @@ class ContactKinematics(ContactResults):
         """
         (placed, last), plane = self._settled, self.plane
         there = self._at + u[self.points.dofs]
-        self.place(plane.relative(there) if plane.varies else placed.home, there)
+        self.place(plane.relative(there) if self._wanders else placed.home, there)
         now = self._placed
         if plane.curved:
             moved = _turned_back(placed.own, last.displacement)
@@ -130,7 +147,7 @@ class ContactKinematics(ContactResults):
             carried = _carried(last.reaction, placed.frame, now.frame)
             last = last._replace(reaction=frozen(carried))
         self._last = last
-        super().restore()
+        ContactHistory.restore(self)  # the state alone
 
     # -- motion --------------------------------------------------------------------------------
 
@@ -254,6 +271,17 @@ class ContactKinematics(ContactResults):
 
     def _settle_here(self) -> None:
         self._settled = self._placed, self._last
+
+    @property
+    def law_before(self) -> Friction | None:
+        """The law by which the last step was settled, its axes carried in space to the frames of this one; None before the first."""
+        law = self._settled_by
+        if law is None or law.axes is None or self._settled[0].points is self.points:
+            return law
+        n, gdim = self._at.shape
+        axes = np.column_stack((law.axes, np.zeros((n, gdim - 2))))
+        axes = _carried(axes, self._settled[0].frame, self.frame)[:, :2]
+        return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
 
     def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
         """See ``ContactHistory``; with what a rotation found in the step is beyond the first order."""

@@ -10,22 +10,23 @@ import numpy as np
 
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
-from dolfinx_contact.contact.friction_field import STATE, directed, followed, on_nodes
+from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
-from dolfinx_contact.law.friction import Friction, as_friction
+from dolfinx_contact.law.friction import Friction, as_friction, is_field
 from dolfinx_contact.law.wear import Wear
 
 
 class ContactLaws(ContactHistory):
     """Friction and wear of a ``Contact``, which has space, plane, frame and nodes."""
 
-    _field: Friction | None = None  # the law given, if it follows the state
-    _begun: Friction | None = None  # the law as the step began
+    _field: Friction | None = None  # the law given, if anything in it is a field
+    _begun: Friction | None = None  # the law as the step began, if it follows the state
+    _rested: Friction | None = None  # a field's law in the last converged state
 
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, and as
-        the state goes on if they follow it.
+        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, anew at the start
+        of each step, and as the state goes on if they follow it.
         """
         return self._friction
 
@@ -33,17 +34,25 @@ class ContactLaws(ContactHistory):
     def friction(self, friction: Friction | float) -> None:
         gdim, field, friction = self.V.mesh.geometry.dim, None, as_friction(friction)
         if getattr(friction, "field", False):
-            names = followed(friction)
-            field = friction if names else None
-            state = self._state(names, empty="_present" not in self.__dict__)
-            with raised_together(self.comm):
-                turned = directed(friction, gdim)
-                friction = on_nodes(self, friction, state)
-                check_law(self.plane, friction, gdim, turned)
+            field = friction
+            friction = self._evaluated(field, empty="_present" not in self.__dict__)
         else:
             check_law(self.plane, friction, gdim)
-        self._field, self._begun = field, None
+        self._field, self._begun, self._rested = field, None, None
         self._take_law(friction)
+
+    def _evaluated(self, field: Friction, empty: bool = False, axes=None) -> Friction:
+        """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
+        state, gdim = self._state(followed(field), empty), self.V.mesh.geometry.dim
+        with raised_together(self.comm):
+            friction = on_nodes(self, field, state, axes)
+            check_law(self.plane, friction, gdim, directed(field, gdim))
+        return friction
+
+    @property
+    def textured(self) -> bool:
+        """Whether axes of friction depend on where nodes are on the surface."""
+        return self._field is not None and self._field.of == "surface"
 
     @property
     def follows_pressure(self) -> bool:
@@ -51,27 +60,28 @@ class ContactLaws(ContactHistory):
         return self._field is not None and "pressure" in followed(self._field)
 
     def renew_friction(self, begin: bool = False) -> None:
-        """Let friction that follows the state be that of the present one.  Collective.
+        """Let fields have their present values.  Collective.
 
         Args:
-            begin: A step begins here.
+            begin: A step begins here, with frames of its own; else only what follows the pressure has changed.
         """
-        if self._field is None:
+        if self._field is None or not (begin or self.follows_pressure):
             return
-        state = self._state(followed(self._field))
-        with raised_together(self.comm):
-            friction = on_nodes(self, self._field, state, self._friction.axes)
-        rows = zip((friction.mu, friction.p), (self._friction.mu, self._friction.p))
-        if not all(np.array_equal(one, other) for one, other in rows):
+        before = self._friction
+        friction = self._evaluated(self._field, axes=None if begin else before.axes)
+        if not _same(friction, before):
             self._take_law(friction)
-        if begin:
+        if not begin:
+            return
+        self._rested = before
+        if followed(self._field):
             self._begun = self._friction
 
     def restore(self) -> None:
-        """Return to the last converged state; friction that follows it, too."""
+        """Return to the last converged state; friction given by fields, too."""
         super().restore()
-        if self._begun is not None:
-            self._take_law(self._begun)
+        if self._rested is not None:
+            self._take_law(self._rested)
 
     def _state(self, names, empty: bool = False) -> dict[str, np.ndarray]:
         """Arrays of this contact by name; zeros, as before anything has touched, if ``empty``.  Collective."""
@@ -124,7 +134,9 @@ class ContactLaws(ContactHistory):
         super().check_saved(saved)
         for name, array in self._laws().items():
             if name in saved and not _alike(saved[name], array):
-                what = {"laws": "friction", "rigid_plane": "plane or wear"}[name]
+                what = {"laws": "friction", "texture": "friction", "rigid_plane": "plane or wear"}[
+                    name
+                ]
                 raise ValueError(
                     f"checkpoint: it was written with another {what}: here {self.friction}, {self.plane}, "
                     f"wear {self.wear}. Set what the run had, then load."
@@ -134,6 +146,10 @@ class ContactLaws(ContactHistory):
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         super().load(saved)
         self.plane.displacement = saved["plane"]
+        if self._field is not None:
+            self._take_law(
+                self._evaluated(self._field)
+            )  # in the frames of the state that was saved
         self._settled_by = self.friction  # of older checkpoints nothing else is known
         rows = saved.get("law_of_last_step", self._rows(self.friction))
         if not np.array_equal(rows, self._rows(self.friction)):
@@ -142,13 +158,19 @@ class ContactLaws(ContactHistory):
             self._settled_by = Friction(mu, np.where(mu > 0, p, 1.0), axes=axes if turned else None)
 
     def _laws(self) -> dict[str, np.ndarray]:
-        """Coefficients, of a law that follows the state those without one, and axes of all nodes; plane and wear."""
-        law = self.friction
+        """Coefficients, of a law that follows the state those without one, and axes of all nodes; plane and wear.
+
+        Of a field of axes the directions that were given: those in the frames change with the state.
+        """
+        law, texture = self.friction, {}
         if self._field is not None:
-            law = on_nodes(self, self._field, self._state(STATE, empty=True), law.axes)
+            law = self._evaluated(self._field, empty=True, axes=law.axes)
+            if is_field(self._field.given()["axes"]):
+                texture = {"texture": directions(self, self._field)}
+                law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else self.wear.coefficient
         parts = (self.plane.described(), np.broadcast_to(wear, 2))
-        return {"laws": self._rows(law), "rigid_plane": np.concatenate(parts)}
+        return {"laws": self._rows(law), "rigid_plane": np.concatenate(parts)} | texture
 
     def _rows(self, law: Friction) -> np.ndarray:
         """Coefficients of cone and slip rule, and axes, of each node, ``shape=(n, 6)``."""
@@ -158,3 +180,10 @@ class ContactLaws(ContactHistory):
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, 1e-12, 0.0, equal_nan=True)
+
+
+def _same(one: Friction, other: Friction) -> bool:
+    """Whether two laws of nodes have the same coefficients and axes."""
+    return all(
+        np.array_equal(getattr(one, name), getattr(other, name)) for name in ("mu", "p", "axes")
+    )

@@ -22,6 +22,8 @@ from dolfinx_contact.checks import finite
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
 
+OWNERS = ("body", "surface")  # of a texture
+
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
 
@@ -69,13 +71,16 @@ class Friction(Guarded):
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
-            ``(cos, sin)`` in the tangential part of the local frame, ``shape=(n, 2)``. Omitted: the
+            ``(cos, sin)`` in the tangential part of the local frame, ``shape=(n, 2)``, with which they turn. Omitted: the
             frame's own first direction. As a field also directions in space, ``(3, n)``, of any length, which
-            are projected on the plane.
+            are projected on the surface.
+        of: Whose texture a field of ``axes`` is: of the "body", at reference positions, whose directions stay while surfaces
+            turn; or of the "surface", a callable of its own positions, that moves and turns with it. ``mu``, ``p`` and wear
+            are of the body.
 
     ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as DOLFINx interpolates them, that return
     values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them
-    at its own nodes when it takes the law: ``contact.friction`` has the values. Until then there are none. A callable of ``mu``
+    at its own nodes when it takes the law, and anew at the start of each step: ``contact.friction`` has the values. A callable of ``mu``
     or ``p`` that also has an argument named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth`` gets that array of
     the contact, ``shape=(n,)``: the law follows the state, the pressure that at the end of the step, see docs/howto/fields.md.
 
@@ -102,6 +107,7 @@ class Friction(Guarded):
     mu: np.ndarray
     p: np.ndarray
     axes: np.ndarray | None
+    of: str
     frictionless: bool
     isotropic: bool
     associated: bool
@@ -109,9 +115,17 @@ class Friction(Guarded):
     exponent: float | None
     _remedy = "it is immutable, make a new Friction."
 
-    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, k: float | None = None, *, axes: ArrayLike | Field | None = None) -> None:  # fmt: skip
+    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, k: float | None = None, *, axes: ArrayLike | Field | None = None, of: str = "body") -> None:  # fmt: skip
         if p is not None and k is not None:
             raise ValueError(f"give p or k, not both (mu={mu!r}, p={p!r}, k={k!r})")
+        if of not in OWNERS or (
+            of == "surface" and (not callable(axes) or hasattr(axes, "function_space"))
+        ):
+            raise ValueError(
+                f'of must be "body" or "surface", the owner of axes given as a field, and "surface" needs a callable of its own '
+                f"positions: got of={of!r} with axes={axes!r}"
+            )
+        self.of = of
         self._given, self.exponent = {"mu": mu, "p": p, "axes": axes}, k
         self._laws: dict[int, Any] = {}
         self.field = any(map(is_field, self._given.values()))
@@ -161,7 +175,7 @@ class Friction(Guarded):
     def __reduce__(self) -> tuple:
         if self.field:
             mu, p, axes = self._given.values()
-            return partial(Friction, axes=axes), (mu, p, self.exponent)
+            return partial(Friction, axes=axes, of=self.of), (mu, p, self.exponent)
         return partial(Friction, axes=self.axes), (self.mu, np.where(self.mu > 0, self.p, 1.0))
 
     def __repr__(self) -> str:
