@@ -132,7 +132,7 @@ def ring(
         pressure: Its element.
         volume: Degree to which what changes the volume is integrated.
     """
-    domain, sides = half_ring(2, cells)
+    domain, sides = half_ring(2, cells, curved=True)
     W = taylor_hood(domain, *([("Lagrange", 1)] if jacobian else []), pressure=pressure)
     bcs = clamped_middle(W.sub(0))
     bend(domain)

@@ -9,6 +9,8 @@ import numpy as np
 from dolfinx import fem, mesh
 from scenes import COMM
 
+from dolfinx_contact.compat import second_order
+
 INNER, DEEP = 0.6, 0.2  # of the ring of outer radius 1: inner radius, length of half of it
 
 
@@ -22,12 +24,13 @@ def clamp(V, axis, where, value=0.0):
     return fem.dirichletbc(held, dofs, part)
 
 
-def half_ring(gdim, cells):
-    """The ring before it is bent, in quadrilaterals or bricks, and the facets that may touch above and below."""
+def half_ring(gdim, cells, curved=False):
+    """The ring before it is bent, in quadrilaterals or bricks, straight or curved, and the facets that may touch above and below."""
     size = [*cells, 1][:gdim]
     kind = mesh.CellType.quadrilateral if gdim == 2 else mesh.CellType.hexahedron
     create = mesh.create_rectangle if gdim == 2 else mesh.create_box
     domain = create(COMM, [np.zeros(gdim), np.ones(gdim)], size, kind)
+    domain = second_order(domain) if curved else domain
 
     def touching(side):
         return mesh.locate_entities_boundary(

@@ -31,7 +31,7 @@ def total(form) -> float:
 
 def ring(gdim, mu=0.0, plane_strain=False, degree=1, cells=(3, 14), stored=None, tol=1e-10):
     """Half a thick ring (x > 0) between two planes that come down from above and up from below."""
-    domain, sides = half_ring(gdim, cells)
+    domain, sides = half_ring(gdim, cells, curved=degree == 2)
     V = functionspace(domain, ("Lagrange", degree, (gdim,)))
     bcs = clamped_middle(V)
     if gdim == 3:
