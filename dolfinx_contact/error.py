@@ -92,7 +92,7 @@ def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...
 
 
 def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
-    """Nodes called slipping whose slip is less than what is unknown of a state, ``shape=(n,)``, booleans.
+    """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
 
     On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
 
@@ -101,9 +101,8 @@ def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
         stiffness: Of its nodes.
         unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
     """
-    made = np.linalg.norm(
-        np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_increment), axis=1
-    )
+    slip = contact.slip_kept + contact.slip_increment  # else what is slow would never slip
+    made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, slip), axis=1)
     rough = (np.broadcast_to(contact.friction.mu, (made.size, 2)) > 0.0).any(axis=1)
     return rough & (contact.status == int(Status.SLIP)) & (made <= unknown)
 

@@ -278,3 +278,51 @@ def test_increments_of_the_punch(case):
         work[factor] = COMM.allreduce(punch.contact.dissipation.sum())
     assert work[1] == pytest.approx(work[8], rel=0.02)
     assert work[4] == pytest.approx(work[8], rel=0.002)
+
+
+@pytest.mark.parametrize("cells", [(3, 3, 2), (4, 2)])
+def test_what_sticks_does_no_work(cells):
+    """A block that is shaken while all nodes stick gathers no work, path or wear, whatever slip its tolerance leaves in a step."""
+    scene = scenes.block(
+        cells=cells, mu=0.5, p=None, tol=1e-4, wear=dc.Wear(1e-4), solver=dc.FixedPoint()
+    )
+    c, across = scene.contact, [0.0] * (len(cells) - 2)
+    for x in (0.0, 2e-3):
+        scene.move_top(x, *across, -0.02)
+        scene.problem.solve()
+    sums = c.dissipation, c.slip_path, c.wear_depth
+    slipped = 0.0
+    for k in range(12):
+        scene.move_top(2e-3 - 1e-4 * (k % 2), *across, -0.02)
+        assert scene.problem.solve().counts.slip == 0
+        slipped += COMM.allreduce(np.abs(c.slip_increment).sum())
+    assert slipped > 0.0
+    for now, before in zip((c.dissipation, c.slip_path, c.wear_depth), sums):
+        assert np.array_equal(now, before)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_slow_sliding_works_as_fast_sliding(solver, tmp_path):
+    """mu N times the way, in steps each of which slips less than the tolerance leaves unknown; also where the run is taken up again."""
+    way, works, path = 1e-4, [], COMM.bcast(tmp_path, root=0) / "state.npz"
+    for tol, steps in ((1e-10, 1), (1e-4, 50)):
+        scene = scenes.block(cells=(2, 2, 1), mu=0.3, p=None, tol=tol, solver=solver)
+        for x in (0.0, 0.02, 0.03):
+            scene.move_top(x, 0, -0.01)
+            scene.problem.solve()
+        before, stuck = scene.contact.dissipation, 0
+        for k in range(steps):
+            scene.move_top(0.03 + way * (k + 1) / steps, 0, -0.01)
+            stuck += scene.problem.solve().counts.stick
+            if k == steps // 2:
+                kept = scene.contact.slip_kept
+                scene.problem.save(path)
+                scene.problem.reset()
+                assert not scene.contact.slip_kept.any()
+                scene.problem.load(path)
+                assert np.array_equal(scene.contact.slip_kept, kept)
+        works.append(COMM.allreduce((scene.contact.dissipation - before).sum()))
+        if steps == 1:
+            assert works[0] == pytest.approx(0.3 * scene.contact.force()[2] * way, rel=5e-3)
+    assert stuck > 0  # else it is not slow
+    assert works[1] == pytest.approx(works[0], rel=0.05)

@@ -249,7 +249,11 @@ class Contact(ContactKinematics):
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
-        law, law_before, slip = self.friction, self.law_before, self.slip_increment
+        law, law_before = self.friction, self.law_before
+        slip = self.slip_kept + self.slip_increment
+        rough = np.broadcast_to(law.mu, (len(slip), 2)).any(axis=1)
+        sticks = (rough & (self.status == int(Status.STICK)))[:, None]
+        slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
         if self._begun is None:
             work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
         else:  # forces before the step with the law at its beginning
@@ -257,10 +261,10 @@ class Contact(ContactKinematics):
             work = work_of_friction(self._begun, before, slipped, none, slip, law_before)
             work += work_of_friction(law, none, slipped, self.reaction, slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
-        path = touched * np.linalg.norm(self.slip_increment, axis=1)
+        path = touched * np.linalg.norm(slip, axis=1)
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
-        self.settle(work.sum(axis=1), path, depth)
+        self.settle(work.sum(axis=1), path, depth, kept)
         self._settled_by = self.friction
 
     def worn_in_a_leap(self, stiffness: NodalStiffness) -> tuple[float, float, list]:

@@ -36,6 +36,7 @@ class State(NamedTuple):
 
 
 SUMS = ("dissipation", "slip_path", "wear_depth")
+KEPT = "slip_kept"
 
 
 class ContactHistory(Guarded):
@@ -46,6 +47,7 @@ class ContactHistory(Guarded):
     def begin(self, state: State) -> None:
         """Forget everything: this is the state, and all sums are zero."""
         self._sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
+        self._sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
         self._last = State(*map(frozen, state))
         self.restore()
 
@@ -57,10 +59,13 @@ class ContactHistory(Guarded):
         """Return to the last converged state."""
         self._present = self._last
 
-    def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
-        """Make the present state the last converged one, and add to the sums what the step did."""
+    def settle(
+        self, work: np.ndarray, path: np.ndarray, depth: np.ndarray, kept: np.ndarray
+    ) -> None:
+        """Make the present state the last converged one, and add to the sums what the step did; ``kept`` is the new ``slip_kept``."""
         added = dict(zip(SUMS, (work, path, depth)))
         self._sums = {name: frozen(self._sums[name] + added[name]) for name in SUMS}
+        self._sums[KEPT] = frozen(kept)
         self._last = self._present
 
     def history(self) -> tuple:
@@ -79,6 +84,8 @@ class ContactHistory(Guarded):
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size."""
         for name, array in ContactHistory.save(self).items():
+            if name == KEPT and name not in saved:
+                continue  # older checkpoints do not have it
             if name not in saved or saved[name].shape != array.shape:
                 found = saved[name].shape if name in saved else "nothing"
                 raise ValueError(
@@ -89,7 +96,8 @@ class ContactHistory(Guarded):
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank."""
         self._last = State(*(frozen(np.array(saved[name])) for name in State._fields))
-        self._sums = {name: frozen(np.array(saved[name])) for name in SUMS}
+        none = np.zeros_like(self._last.slip_increment)
+        self._sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
         self.restore()
 
     @property
@@ -146,3 +154,11 @@ class ContactHistory(Guarded):
     def wear_depth(self) -> np.ndarray:
         """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
         return self._sums["wear_depth"]
+
+    @property
+    def slip_kept(self) -> np.ndarray:
+        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``, local frame, length.
+
+        A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
+        """
+        return self._sums[KEPT]

@@ -283,9 +283,11 @@ class ContactKinematics(ContactResults):
         axes = _carried(axes, self._settled[0].frame, self.frame)[:, :2]
         return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
 
-    def settle(self, work: np.ndarray, path: np.ndarray, depth: np.ndarray) -> None:
+    def settle(
+        self, work: np.ndarray, path: np.ndarray, depth: np.ndarray, kept: np.ndarray
+    ) -> None:
         """See ``ContactHistory``; with what a rotation found in the step is beyond the first order."""
-        super().settle(work, path, depth)
+        super().settle(work, path, depth, kept)
         if self.plane.spin is not None:
             ended = copy(self.plane)
             ended.end_step()
