@@ -92,6 +92,12 @@ class ContactHistory(Guarded):
                     f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
                     "for another mesh or another contact."
                 )
+        wrong = [name for name in SUMS if (saved[name] < 0).any()]
+        wrong += ["status"] * (not np.isin(saved["status"], list(map(int, Status))).all())
+        if wrong:
+            raise ValueError(
+                f"checkpoint: {wrong[0]} has values that no step leaves: take another file."
+            )
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank."""

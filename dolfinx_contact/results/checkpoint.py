@@ -9,7 +9,7 @@ every run, so neither the ranks' shares nor their number need be those that wrot
 from __future__ import annotations
 
 import os
-import zipfile
+from contextlib import suppress
 
 import numpy as np
 from dolfinx import fem
@@ -17,8 +17,18 @@ from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import FreeState
+from dolfinx_contact.checks import number
 from dolfinx_contact.collective import raised_together
 from dolfinx_contact.numbering import original_cells, original_nodes
+
+# Of what is written.  Files of before 27 November 2026 have none.
+VERSION = 1
+
+# Ends of the names of arrays that not every history has, and of those that files without a version may lack.
+LATELY = ("law_of_last_step", "home", "rotation_of_plane")
+NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
+
+ANEW = "Take another one, or write it anew with problem.save."
 
 
 def save(path, body, contacts, states, past, variables) -> None:
@@ -36,19 +46,11 @@ def save(path, body, contacts, states, past, variables) -> None:
     with raised_together(comm):
         _check_path(path)
     body.refresh()
-    mine, rows = nodes | {"ranks": np.array([len(nodes["nodes"])])}, body.displacements.rows
-    for name, array in zip(("u", "before"), states):
-        mine[name] = rows(array)
-    if body.displacements.mixed:
-        mine |= {f"mixed_{name}": _by_cells(body, a) for name, a in zip(("u", "before"), states)}
-    elif body.known:
-        known = body.known
+    mine = nodes | {"ranks": np.array([len(nodes["nodes"])])} | _arrays(body, contacts, states)
+    if body.known and not body.displacements.mixed:
+        known, rows = body.known, body.displacements.rows
         mine |= {"digest": known.digest[None], "load": rows(known.load)}
         mine["free" if known.exact else "rough"] = rows(known.displacement)
-    with raised_together(comm):  # the user's functions
-        saved = [contact.save() for contact in contacts]
-    for k, of_contact in enumerate(saved):
-        mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
     if past:
         of_contacts = [nodes[f"contact{k}_nodes"] for k in range(len(contacts))]
         mine["past_nodes"] = np.concatenate(of_contacts)
@@ -60,16 +62,46 @@ def save(path, body, contacts, states, past, variables) -> None:
             file = {
                 name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
                 for name in mine
-            } | {"stiffness": np.array(stiffness)}
+            } | {"stiffness": np.array(stiffness), "version": np.array(VERSION)}
             if past:
                 last = past[-1]
                 alike = [step for step in past if step[0].size == last[0].size]
                 file["past"] = np.array([step[:2] for step in alike])
                 file["past_tied"] = last[2]
-            unfinished = f"{path}.unfinished"
-            with open(unfinished, "wb") as stream:
-                np.savez(stream, **file)
-            os.replace(unfinished, path)
+            _write(path, file)
+
+
+def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
+    """Displacements and histories of contacts by name; this rank's rows.  Collective."""
+    mine = {name: body.displacements.rows(of) for name, of in zip(("u", "before"), states)}
+    if body.displacements.mixed:
+        mine |= {f"mixed_{name}": _by_cells(body, of) for name, of in zip(("u", "before"), states)}
+    with raised_together(body.comm):  # the user's functions
+        saved = [contact.save() for contact in contacts]
+    for k, of_contact in enumerate(saved):
+        mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
+    return mine
+
+
+def _write(path, file: dict[str, np.ndarray]) -> None:
+    """Replace a file in one go: whenever the machine stops, the old one or the new one is whole."""
+    unfinished = f"{path}.unfinished"
+    try:
+        with open(unfinished, "wb") as stream:
+            np.savez(stream, **file)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(unfinished, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(unfinished)
+        raise
+    with suppress(OSError):  # not every system opens folders
+        folder = os.open(os.path.dirname(os.path.abspath(path)), os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
@@ -86,19 +118,20 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
         _check_path(path)
     body.refresh(np.zeros(body.size) if body.displacements.mixed else None)  # it scales unknowns
     asked = comm.gather(_nodes(body, contacts) | variables.cells(), root=0)
+    like = _arrays(body, contacts, [np.zeros(body.size)] * 2) | variables.save()
     stiffness = body.stiffness_norm()
     parts, past = None, ()
     with raised_together(comm):
         if comm.rank == 0:
             file = _opened(path)
             _check_file(path, file, asked, stiffness)
+            _check_arrays(path, file, like)
             orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
             parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
             if "past" in file:
                 names = [f"contact{k}_nodes" for k in range(len(contacts))]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
-                at = _positions(file["past_nodes"], np.argsort(file["past_nodes"]), order)
-                past = _past(file["past"], int(file.get("past_tied", 0)), at)
+                past = _past(path, file, order)
     mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
     own = [
         {n.removeprefix(prefix): a for n, a in mine.items() if n.startswith(prefix)}
@@ -111,7 +144,8 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
         contact.load(saved)
     variables.load(mine)
     body.known = None
-    if comm.allreduce("digest" in mine, op=MPI.LAND):
+    is_known = {"digest", "load"} <= mine.keys() and ("free" in mine or "rough" in mine)
+    if comm.allreduce(is_known, op=MPI.LAND):
         exact = "free" in mine
         free = mine["free" if exact else "rough"].ravel()
         body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
@@ -129,7 +163,9 @@ def _opened(path) -> dict[str, np.ndarray]:
     try:
         with open(path, "rb") as stream, np.load(stream) as opened:
             return dict(opened)
-    except (ValueError, EOFError, TypeError, zipfile.BadZipFile) as error:
+    except OSError:
+        raise
+    except Exception as error:  # of zip files, compression, headers: NumPy passes on what it meets
         raise ValueError(f"{path} is no checkpoint: {error}.") from None
 
 
@@ -137,12 +173,16 @@ def _check_file(path, file, asked, stiffness: float) -> None:
     """Raise a ``ValueError`` unless the file has as many nodes and the same stiffness as the problem that asks."""
     if not {"u", "before", "nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
+    if (version := _number(path, file, "version", 0)) > VERSION:
+        raise ValueError(
+            f"checkpoint {path} is of version {version:.0f}, this dolfinx_contact reads up to {VERSION}: take the one that wrote it."
+        )
     for name in asked[0]:
         size = sum(len(nodes[name]) for nodes in asked)
-        if name not in file or len(file[name]) != size:
-            found = len(file[name]) if name in file else "none"
+        if name not in file or file[name].shape != (size,):
+            found = file[name].size if name in file else "none"
             raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
-    saved = float(file.get("stiffness", stiffness))  # older checkpoints do not have it
+    saved = _number(path, file, "stiffness", stiffness)  # older checkpoints do not have it
     if not abs(saved - stiffness) <= 1e-9 * stiffness:
         raise ValueError(
             f"checkpoint {path} was written with another stiffness (norm {saved:.12g}, here {stiffness:.12g}): set "
@@ -150,10 +190,59 @@ def _check_file(path, file, asked, stiffness: float) -> None:
         )
 
 
-def _past(saved: np.ndarray, tied: int, at: np.ndarray) -> list[tuple]:
-    """Earlier condensed steps in another order of nodes; what belongs to anchors stays behind them."""
+def _number(path, file: dict[str, np.ndarray], name: str, otherwise: float) -> float:
+    """A number in the file, or what counts where it has none."""
+    try:
+        return number(f"checkpoint {path}: {name}", file.get(name, otherwise))
+    except ValueError as error:
+        raise ValueError(f"{error} {ANEW}") from None
+
+
+def _check_arrays(path, file: dict[str, np.ndarray], like: dict[str, np.ndarray]) -> None:
+    """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
+    older = NEWER if "version" not in file else LATELY
+    missing = [name for name in like if name not in file and not name.endswith(older)]
+    if missing:
+        raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {ANEW}")
+    like = like | {name: like["u"] for name in ("load", "free", "rough")}
+    for name, array in file.items():
+        surface = name.endswith("rigid_plane")  # compared by the contact; without wear it has NaN
+        if name == "digest":
+            continue
+        if array.dtype.kind not in "iuf":
+            raise ValueError(
+                f"checkpoint {path}: {name} must be numbers, not {array.dtype}. {ANEW}"
+            )
+        if not surface and not name.startswith("state_") and not np.isfinite(array).all():
+            raise ValueError(f"checkpoint {path}: {name} must be finite. {ANEW}")
+        if name not in like or surface:
+            continue
+        rows = () if name.endswith("_plane") else file[_nodes_of(name)].shape
+        shape, kind = rows + like[name].shape[len(rows) :], like[name].dtype
+        if array.shape != shape or not np.can_cast(array.dtype, kind, "same_kind"):
+            raise ValueError(
+                f"checkpoint {path}: {name} needs shape {shape} and type {kind}, found {array.shape}, {array.dtype}: it was "
+                f"written for another mesh or other contacts, or changed. {ANEW}"
+            )
+
+
+def _nodes_of(name: str) -> str:
+    """Name of the indices to which the rows of an array belong."""
+    prefix = name.split("_")[0]
+    return f"{prefix}_nodes" if prefix.startswith(("contact", "state", "mixed")) else "nodes"
+
+
+def _past(path, file, order: np.ndarray) -> list[tuple]:
+    """Earlier condensed steps for nodes in this order; what belongs to anchors stays behind them."""
+    saved, nodes = file["past"], file.get("past_nodes", np.zeros(0))
+    tied = int(_number(path, file, "past_tied", 0))
+    size = int(np.prod(saved.shape[2:])) - tied
+    if nodes.shape != order.shape or saved.ndim < 3 or saved.shape[1] != 2 or size < 0 or size % max(len(nodes), 1):  # fmt: skip
+        raise ValueError(
+            f"checkpoint {path}: past and past_nodes do not belong to each other. {ANEW}"
+        )
+    at = _positions(nodes, np.argsort(nodes), order)
     flat = saved.reshape(*saved.shape[:2], -1)
-    size = flat.shape[2] - tied
     nodal = flat[:, :, :size].reshape(*flat.shape[:2], len(at), -1)[:, :, at]
     ordered = np.concatenate((nodal.reshape(*flat.shape[:2], size), flat[:, :, size:]), axis=2)
     return [(q, force, tied) for q, force in ordered]
@@ -199,7 +288,7 @@ def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]
     # Of the coefficients for which the free state holds a rank knows its own share alone.
-    if "digest" in file and len(file["ranks"]) == ranks:
+    if "digest" in file and file["ranks"].shape == file["digest"].shape[:1] == (ranks,):
         last = np.cumsum(file["ranks"])[rank]
         if np.array_equal(file["nodes"][last - file["ranks"][rank] : last], nodes["nodes"]):
             part["digest"] = file["digest"][rank]
