@@ -203,8 +203,7 @@ class ContactProblem(ProblemStates):
         self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x)
-        self._unseen.check(self.u.x.array, dict(zip(self.contacts, self._stiffness)))
-        self._unseen.check_wear(self.contacts, self._stiffness)
+        self._unseen.check(self.body, self.contacts, self._stiffness, self.u.x.array, done.counts)
         warn_of_rounding(done, self.tol)
         return done
 

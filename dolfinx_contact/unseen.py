@@ -1,6 +1,7 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps.
+"""What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps,
+contacts that are nowhere near their surface.
 
 Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
 nodes miss is an error of their forces of about ``kappa`` times that length.
@@ -18,6 +19,7 @@ from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.error import NodalStiffness
+from dolfinx_contact.results.record import Counts
 
 # What is missed, over the largest ``r_n / kappa``, above which the user is told.
 SHARE = 1.0
@@ -30,6 +32,9 @@ CLEAR = 1e-6
 
 # Part of a hollow between nodes that these may be open and still count as touching.
 TOUCHING = 0.1
+
+# Smallest gap over the size of the body, and cosine between facets and a plane, from which on nothing is likely to touch.
+FAR, STEEP = 0.25, 0.1
 
 # How often points of a facet are taken about the deepest one, and by how much nearer to each other.
 CLOSER, FACTOR = 3, 0.25
@@ -70,15 +75,29 @@ class Unseen:
         }
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.plane.varies]
-        self._leaps = True
+        self._leaps = self._apart = True  # to be looked at
 
-    def check(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
-        """Warn, of each kind once, of what the nodes do not see in the present state.  Collective.
+    def check(
+        self, body, contacts, stiffness: list[NodalStiffness], u: np.ndarray, counts: Counts
+    ) -> None:
+        """Warn, of each kind once, of what is not seen in the present state.  Collective.
 
         Args:
+            body: The body.
+            contacts: All contacts.
+            stiffness: Of their nodes.
             u: Displacement, degrees of freedom of this rank with those of ghosts.
-            stiffness: Of the nodes of each contact.
+            counts: Nodes of all contacts by status.
         """
+        if self._facets:
+            self._check_facets(u, dict(zip(contacts, stiffness)))
+        self._check_wear(contacts, stiffness)
+        self._apart = self._apart and counts.stick + counts.slip == 0
+        if self._apart and counts.open:
+            self._apart = not _check_apart(body, contacts)
+
+    def _check_facets(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
+        """What nodes of facets do not see.  Collective."""
         for looked_at, look in ((self._straight, self._off_straight), (self._between, _between)):
             for contact in looked_at:
                 lengths = contact.reaction[:, -1] / stiffness[contact].normal
@@ -89,17 +108,13 @@ class Unseen:
                 missed = max(contact.comm.allgather(missed))
                 if missed.length > max(SHARE * pushed, CLEAR * missed.size):
                     said = _of_straight if look == self._off_straight else _of_between
-                    warnings.warn(said(contact, missed, pushed), stacklevel=3)
                     looked_at.clear()
+                    self._apart = self._apart and pushed > 0.0  # nothing touches, and that is why
+                    warnings.warn(said(contact, missed, pushed), stacklevel=4)
                     break
 
-    def check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
-        """Warn once of a step that wears off so much that the next one is unloaded by more than it carries.  Collective.
-
-        Args:
-            contacts: All contacts.
-            stiffness: Of their nodes.
-        """
+    def _check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
+        """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
         for contact, of in zip(contacts, stiffness):
             if not self._leaps or contact.wear is None:
                 continue
@@ -110,7 +125,7 @@ class Unseen:
                     f"the depth of {depth:.2g} that this step wears off at the node at {_said(where)} takes {times:.2g} times its "
                     "reaction from it: wear opens gaps only after a step, and so runs ahead of the pressure that makes it. Divide "
                     f"steps like this one into {int(np.ceil(times))} or more.",
-                    stacklevel=3,
+                    stacklevel=4,
                 )
 
     def _is_straight(self, contact) -> bool:
@@ -139,6 +154,35 @@ class Unseen:
             near = _distances(contact, x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
+
+
+def _check_apart(body, contacts) -> bool:
+    """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
+    smallest = -max(body.highest(-contact.gap) for contact in contacts)
+    if smallest > FAR * body.extent:
+        warnings.warn(
+            f"no node touches: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}. If that is not meant, "
+            "check place and units of the surface, the direction of loads and the facets.",
+            stacklevel=4,
+        )
+        return True
+    flat = [contact for contact in contacts if not contact.plane.curved]
+    facing = [
+        body.highest(
+            np.concatenate(
+                [[-1.0], *(-of.outwards @ contact.frame[-1] for of in facets_of(contact))]
+            )
+        )
+        for contact in flat
+    ]
+    if len(flat) < len(contacts) or max(facing) > STEEP:
+        return False
+    warnings.warn(
+        f"no node touches, and no facet of the contact faces {flat[0].plane!r}: of all the normals are across the plane's or "
+        "along it. Check the normal, which shows from the plane into the body, and the facets.",
+        stacklevel=4,
+    )
+    return True
 
 
 def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:

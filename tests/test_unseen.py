@@ -31,7 +31,6 @@ def test_a_ball_smaller_than_a_facet_is_told_with_its_depth(d, radius):
     """Pressed into the middle of a facet a ball meets no node: 0 N, and the depth that is told is the approach."""
     middle = np.append(np.full(d - 1, 0.25), -radius)
     scene = block(dc.RigidSphere(middle, radius), cells=[2] * d)
-    scene.step(*np.zeros(d))
     with pytest.warns(UserWarning, match=r"goes 0\.0011 into the body between its nodes, near \(0\.25,.* no node feels it"):  # fmt: skip
         scene.step(*np.zeros(d - 1), -0.0011)
     assert scene.contact.force() == pytest.approx(np.zeros(d), abs=1e-12)
@@ -169,3 +168,28 @@ def test_wear_in_leaps_is_told_with_the_number_of_steps(d):
     with pytest.warns(UserWarning, match="times its reaction.*Divide steps like this one into 2 or more"):  # fmt: skip
         assert worn(1, d) > 1.9
     assert worn(16, d) == pytest.approx(1 - np.exp(-2), rel=0.05)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_surface_that_is_nowhere_near_is_told_once(d):
+    """In another unit of length, with the smallest gap; near ones, and those that something touched, are not spoken of."""
+    for surface in (
+        dc.RigidPlane(-0.5 * np.eye(d)[-1], np.eye(d)[-1]),
+        dc.RigidSphere(-1.5 * np.eye(d)[-1], 1.0),
+    ):
+        scene = block(surface, cells=[2] * d)
+        with pytest.warns(UserWarning, match="no node touches: the smallest gap is 0.5, in a body of size 1"):  # fmt: skip
+            scene.step(*np.zeros(d))
+        scene.step(*np.zeros(d))
+    scene = block(dc.RigidPlane(np.zeros(d), np.eye(d)[-1]), cells=[2] * d)
+    for way in (0.09, -0.01, 0.5):
+        scene.step(*np.zeros(d - 1), way)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_normal_along_the_facets_is_told(d):
+    """A plane whose normal is sideways: gaps along the foot, from zero on, and nothing that could close them."""
+    scene = block(dc.RigidPlane(-0.5 * np.eye(d)[0], np.eye(d)[0]), cells=[2] * d)
+    with pytest.warns(UserWarning, match="no node touches, and no facet of the contact faces RigidPlane"):  # fmt: skip
+        scene.step(*np.zeros(d - 1), -0.01)
+    scene.step(*np.zeros(d - 1), -0.02)

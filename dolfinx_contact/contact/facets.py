@@ -34,6 +34,7 @@ class Facets(NamedTuple):
     bend: np.ndarray  # (n_b - n_a) . (x_b - x_a) of normals and positions of vertices, (m, v, v)
     sharp: np.ndarray  # whether a vertex is on a sharp edge, (m,)
     size: np.ndarray  # diameters, (m,)
+    outwards: np.ndarray  # unit normals, (m, gdim)
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
         """Shape functions at points of the unit square or interval, ``shape=(..., dim)``: ``(..., k)``."""
@@ -51,7 +52,7 @@ class Facets(NamedTuple):
 
     def some(self, which: np.ndarray) -> Facets:
         """Those of them that a mask, ``shape=(m,)``, names."""
-        rows = ("nodes", "bend", "sharp", "size")
+        rows = ("nodes", "bend", "sharp", "size", "outwards")
         return self._replace(**{name: getattr(self, name)[which] for name in rows})
 
     def _local(self, at: np.ndarray) -> np.ndarray:
@@ -128,6 +129,7 @@ def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
                 ((n[:, None] - n[:, :, None]) * apart).sum(axis=-1),
                 (np.einsum("mi,mvi->mv", own, n) < SHARP).any(axis=1),
                 np.linalg.norm(apart, axis=-1).max(axis=(1, 2)),
+                own,
             )
         )  # fmt: skip
     return found
