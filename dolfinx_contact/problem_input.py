@@ -11,6 +11,7 @@ import numpy as np
 
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
+from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.checks import positive
 from dolfinx_contact.collective import from_first, raised_together
 from dolfinx_contact.contact.contact import Contact
@@ -19,6 +20,7 @@ from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.solvers.base import Solver
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
+STRAINED = 0.5  # mean strain above which linear elasticity says nothing
 LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
 
 # What to do where a motion of a body that contact alone holds is undetermined.
@@ -285,15 +287,32 @@ def check_step(u, comm, contacts) -> None:
             )
 
 
-def check_size(body, x: np.ndarray) -> bool:
-    """Warn of a displacement far larger than the body; whether it was.  Collective."""
+def check_size(body, x: np.ndarray, u: np.ndarray) -> bool:
+    """Warn of a displacement far larger than the body, or of strains that are not small; whether it did.  Collective.
+
+    Args:
+        body: The body.
+        x: Displacement, owned degrees of freedom.
+        u: The same with those of ghosts.
+    """
     largest = body.farthest(x)
-    if largest <= LARGE * body.extent:
+    if largest <= STRAINED * body.thickness:
+        return False
+    linear = "" if body.nonlinear else " (Elasticity is linear here.)"
+    if largest > LARGE * body.extent:
+        warnings.warn(
+            f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
+            f"{body.extent:.3g}: check the units of lengths, loads and moduli." + linear,
+            stacklevel=3,
+        )
+        return True
+    strain = 0.0 if body.nonlinear else mean_strain(body.displacements, u)
+    if strain <= STRAINED:
         return False
     warnings.warn(
-        f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
-        f"{body.extent:.3g}: check the units of lengths, loads and moduli."
-        + ("" if body.nonlinear else " (Elasticity is linear here.)"),
+        f"the body is strained by {strain:.0%} (root mean square of the largest principal strain): F is linear in u, which "
+        "holds for strains of some per cent. Check loads, moduli and how far supports and surfaces move, or write F for large "
+        "strains.",
         stacklevel=3,
     )
     return True

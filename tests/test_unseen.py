@@ -193,3 +193,36 @@ def test_a_normal_along_the_facets_is_told(d):
     with pytest.warns(UserWarning, match="no node touches, and no facet of the contact faces RigidPlane"):  # fmt: skip
         scene.step(*np.zeros(d - 1), -0.01)
     scene.step(*np.zeros(d - 1), -0.02)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("order", [1, 2])
+def test_strains_that_are_not_small_are_told_once(d, order):
+    """A block squeezed by 95 % in one step is strained by 95 %; moved as far without strain, or by a few per cent, it is not."""
+    plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
+    scene = block(plane, cells=[2] * d, order=order)
+    scene.step(*0.95 * np.eye(d)[0])
+    scene.step(*np.zeros(d - 1), -0.05)
+    with pytest.warns(UserWarning, match="the body is strained by 95%"):
+        scene.step(*np.zeros(d - 1), -0.95)
+    scene.step(*np.zeros(d - 1), -0.96)
+
+
+def test_a_beam_bent_by_many_times_its_thickness_is_not_strained_much():
+    """Strains are those of the cells, not displacements over the thickness of the body; of a nonlinear body nothing is said."""
+    domain = mesh.create_rectangle(COMM, [np.zeros(2), np.array([1.0, 0.02])], [16, 2], mesh.CellType.quadrilateral)  # fmt: skip
+    V = functionspace(domain, ("Lagrange", 2, (2,)))
+    foot, end = (
+        mesh.locate_entities_boundary(domain, 1, where)
+        for where in (lambda x: np.isclose(x[1], 0.0) & (x[0] > 0.8), lambda x: np.isclose(x[0], 0))
+    )
+    plane = dc.RigidPlane((0, 0), (0, 1))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    bcs = [fem.dirichletbc(np.zeros(2), fem.locate_dofs_topological(V, 1, end), V)]
+    contact = dc.Contact(V, foot, plane, 0.0)
+    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+    plane.displacement = (0, 0.1)
+    problem.solve()
+    assert problem.body.largest(np.abs(u.x.array)) > 4 * 0.02
+    squeezed = block(dc.RigidPlane((0, 0), (0, 1)), nonlinear=True)
+    squeezed.step(0, -0.6)

@@ -64,7 +64,7 @@ class ElasticBody(Unknowns, OverRanks):
         self._coupling = self._lift = self._lifted = self._right = self._left = None
         self.closed = self._said = False
         self.known: FreeState | None = None  # the last one
-        self.extent = rigid_motion.extent(self.displacements)
+        self.extent, self.thickness = rigid_motion.extents(self.displacements)
 
     def refresh(self, x=None) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.

@@ -92,12 +92,34 @@ def free_modes(body) -> np.ndarray:
     return np.linalg.solve(lower, modes.T).T
 
 
-def extent(displacements) -> float:
-    """Largest edge of the box around the body.  Collective."""
+def extents(displacements) -> tuple[float, float]:
+    """Largest and smallest edge of the box around the body.  Collective."""
     x, comm = displacements.x, displacements.V.mesh.comm
     edges = np.concatenate((x.max(axis=0, initial=-np.inf), (-x).max(axis=0, initial=-np.inf)))
     comm.Allreduce(MPI.IN_PLACE, edges, op=MPI.MAX)
-    return float((edges[:3] + edges[3:]).max())
+    edges = edges[:3] + edges[3:]
+    return float(edges.max()), float(edges[: displacements.dim].min())
+
+
+def mean_strain(displacements, u: np.ndarray) -> float:
+    """Root mean square over the cells of the largest principal strain, of either sign.  Collective.
+
+    Args:
+        displacements: ``Displacements``.
+        u: Their degrees of freedom on this rank, those of ghosts included.
+    """
+    of, mesh = displacements, displacements.V.mesh
+    nodes = compat.cell_nodes(of.V)[: mesh.topology.index_map(mesh.topology.dim).size_local]
+    x, moved = of.x[nodes][..., : of.dim], u[of.dofs(nodes.ravel())].reshape(*nodes.shape, of.dim)
+    x, moved = (values - values.mean(axis=1, keepdims=True) for values in (x, moved))
+    across = x.transpose(0, 2, 1)
+    inertia = across @ x
+    slopes = np.linalg.solve(inertia, across @ moved)
+    strains = np.linalg.eigvalsh(0.5 * (slopes + slopes.transpose(0, 2, 1)))
+    volume = np.sqrt(np.linalg.det(inertia))  # of cells alike, but for a factor
+    parts = np.array([volume @ np.abs(strains).max(axis=1) ** 2, volume.sum()])
+    mesh.comm.Allreduce(MPI.IN_PLACE, parts, op=MPI.SUM)
+    return float(np.sqrt(parts[0] / parts[1]))
 
 
 def _connected_parts(V, comm) -> tuple[np.ndarray, int]:
