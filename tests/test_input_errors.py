@@ -237,6 +237,16 @@ def test_a_number_is_isotropic_friction(scene):
     assert dc.bipotential_gap([[0.3, 0, 1]], [0], [[-0.01, 0]], 0.3) == pytest.approx([0.0])
 
 
+def test_friction_in_per_cent_is_told(scene):
+    """30 is hardly a coefficient; what is, and what is meant to stick whatever comes, is not spoken of."""
+    for mu in (0.0, 1.5, 5.0, 1e3, 1e10):
+        contact = dc.Contact(scene.V, scene.facets, plane(), mu)
+    with pytest.warns(UserWarning, match="a coefficient of friction of 30: it is force over force"):
+        dc.Contact(scene.V, scene.facets, plane(), dc.Friction((30.0, 0.3)))
+    with pytest.warns(UserWarning, match="a coefficient of friction of 30"):
+        contact.friction = 30
+
+
 def test_orthotropic_friction_needs_an_axis(scene):
     """Without an axis an orthotropic law has no directions; an isotropic one needs none."""
     bare = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1))

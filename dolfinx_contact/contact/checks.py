@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from dolfinx_contact import compat
@@ -11,6 +13,9 @@ from dolfinx_contact.contact.displacements import displacement_part
 from dolfinx_contact.contact.surface import Surface
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
+
+# Coefficients of friction between these are hardly meant.
+PERCENT = 10.0, 1000.0
 
 
 def check_space(V) -> None:
@@ -80,6 +85,17 @@ def check_law(plane, friction, gdim: int, directed: bool = False) -> None:
         raise ValueError(
             f"plane.axis is None, but {friction} depends on the direction: give {type(plane).__name__} the "
             "first principal friction direction, axis=(...)."
+        )
+
+
+def warn_of_percent(friction) -> None:
+    """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
+    largest = friction.mu.max() if friction.mu.ndim == 1 else 0.0  # not per node
+    if PERCENT[0] < largest < PERCENT[1]:
+        warnings.warn(
+            f"a coefficient of friction of {largest:g}: it is force over force, so that 30 % is 0.3 and an angle of 30 degrees is "
+            f"tan(30 degrees) = 0.577. For what never slips take {PERCENT[1]:g} or more.",
+            stacklevel=4,
         )
 
 

@@ -9,7 +9,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from dolfinx_contact.collective import raised_together
-from dolfinx_contact.contact.checks import check_coefficients, check_law, check_wear
+from dolfinx_contact.contact.checks import (
+    check_coefficients,
+    check_law,
+    check_wear,
+    warn_of_percent,
+)
 from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
 from dolfinx_contact.law.friction import Friction, as_friction, is_field
@@ -38,6 +43,7 @@ class ContactLaws(ContactHistory):
             friction = self._evaluated(field, empty="_present" not in self.__dict__)
         else:
             check_law(self.plane, friction, gdim)
+            warn_of_percent(friction)
         self._field, self._begun, self._rested = field, None, None
         self._take_law(friction)
 
