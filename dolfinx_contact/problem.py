@@ -203,7 +203,9 @@ class ContactProblem(ProblemStates):
         self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x, self.u.x.array)
-        self._unseen.check(self.body, self.contacts, self._stiffness, self.u.x.array, done.counts)
+        self._unseen.check(
+            self.body, self.contacts, self._stiffness, self.u.x.array, done.counts, self._large
+        )
         warn_of_rounding(done, self.tol)
         return done
 

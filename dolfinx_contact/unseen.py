@@ -78,7 +78,13 @@ class Unseen:
         self._leaps = self._apart = True  # to be looked at
 
     def check(
-        self, body, contacts, stiffness: list[NodalStiffness], u: np.ndarray, counts: Counts
+        self,
+        body,
+        contacts,
+        stiffness: list[NodalStiffness],
+        u: np.ndarray,
+        counts: Counts,
+        large: bool,
     ) -> None:
         """Warn, of each kind once, of what is not seen in the present state.  Collective.
 
@@ -88,11 +94,12 @@ class Unseen:
             stiffness: Of their nodes.
             u: Displacement, degrees of freedom of this rank with those of ghosts.
             counts: Nodes of all contacts by status.
+            large: Whether a displacement was too large, and the user told.
         """
         if self._facets:
             self._check_facets(u, dict(zip(contacts, stiffness)))
         self._check_wear(contacts, stiffness)
-        self._apart = self._apart and counts.stick + counts.slip == 0
+        self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
 
