@@ -13,6 +13,7 @@
 .PHONY: punch study stress report docs test test-rest test-wheel test-all format stubs clean
 
 TWO = -n 2 --dist loadfile # processes of pytest on one rank
+RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/test_*.py)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
@@ -33,18 +34,18 @@ docs: .venv/ready
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --once $(TWO) $(ARGS)
-	tools/mpitest .venv 2 -m "ranks and not slow" --once $(ARGS)
+	tools/mpitest .venv 2 $(RANKS) --once $(ARGS)
 	tools/ctest example
 
 # the other parameters of these tests
 test-rest: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --rest $(TWO)
-	tools/mpitest .venv 2 -m "ranks and not slow" --rest
+	tools/mpitest .venv 2 $(RANKS) --rest
 
 # the newest DOLFINx on PyPI
 test-wheel: .venv-wheel/ready
 	tools/mpitest .venv-wheel 1 -m "not slow" --once $(TWO)
-	tools/mpitest .venv-wheel 2 -m "ranks and not slow" --once
+	tools/mpitest .venv-wheel 2 $(RANKS) --once
 
 test-all:
 	tools/test-all
