@@ -1,8 +1,8 @@
 # make punch    the paper's punch: the table, a picture and ParaView files in results/punch
 # make study    six cycles of cases A, B, C: all figures on one page, results/study/study.html;
 #               EXPLORE=1 also computes what the paper leaves open
-# make test     a test of every feature: each Python test that is not marked slow with its first parameters, those marked
-#               ranks on 2 MPI ranks, too, and the kernel without Python
+# make test     a test of every feature: each Python test that is not marked slow with its first parameters, a few on
+#               2 MPI ranks, too, and the kernel without Python
 # make test-all everything, before a release: hours
 # make stress   every solver on some 840 scenes, each answer judged from the mechanics in NumPy; resumable
 # make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
@@ -14,6 +14,7 @@
 
 TWO = -n 2 --dist loadfile # processes of pytest on one rank
 RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/test_*.py)
+CORE = $(patsubst %,tests/test_%.py,force history multigrid problem)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
 
@@ -34,13 +35,13 @@ docs: .venv/ready
 
 test: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --once $(TWO) $(ARGS)
-	tools/mpitest .venv 2 $(RANKS) --once $(ARGS)
+	tools/mpitest .venv 2 -m "not slow" --once $(CORE) $(ARGS)
 	tools/ctest example
 
-# the other parameters of these tests
+# what .ci/run has beside it: the other parameters of these tests, and all that are marked ranks on 2 ranks
 test-rest: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --rest $(TWO)
-	tools/mpitest .venv 2 $(RANKS) --rest
+	tools/mpitest .venv 2 $(RANKS)
 
 # the newest DOLFINx on PyPI
 test-wheel: .venv-wheel/ready
