@@ -14,6 +14,7 @@ from dolfinx import mesh
 import dolfinx_contact as dc
 from dolfinx_contact import collective
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 LAST = COMM.rank == COMM.size - 1
 

@@ -8,6 +8,7 @@ import scenes
 
 import dolfinx_contact as dc
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 OPTIONAL = ("digest", "load", "free", "rough", "stiffness", "version", "past", "past_tied", "contact0_law_of_last_step")  # fmt: skip
 

@@ -13,6 +13,7 @@ from test_force import E, free_block
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
+pytestmark = pytest.mark.ranks
 SPRINGS = {
     "by name": (("n", "t1"), {"n": 0.5 * E, "t1": 0.1 * E}),
     "by name in another order": (("t1", "n"), {"n": 0.5 * E, "t1": 0.1 * E}),

@@ -15,6 +15,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.error import contact_defects
 
+pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
 SOLVERS = {
     "condensed": dc.CondensedNewton(),
