@@ -1,5 +1,6 @@
 """What contact at nodes cannot see is told, once, and where it does not matter nothing is said."""
 
+import re
 import warnings
 from types import SimpleNamespace
 
@@ -99,9 +100,11 @@ def test_a_height_that_only_nodes_have_is_taken_as_it_is():
     assert scene.contact.force()[1] > 0.0
 
 
-def ring(order, curved, interference, cells=(2, 12)):
+def ring(order, curved, interference, cells=(2, 12), uneven=0.0):
     """Half a ring held outside, on a shaft that is too large; its problem and the pressure of Lamé."""
     domain = mesh.create_rectangle(COMM, [np.zeros(2), np.ones(2)], cells, mesh.CellType.quadrilateral)  # fmt: skip
+    x = domain.geometry.x
+    x[:, 1] += uneven * np.sin(2 * np.pi * x[:, 1])
     domain = second_order(domain) if curved else domain
     V = functionspace(domain, ("Lagrange", order, (2,)))
     inside = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
@@ -123,13 +126,42 @@ def mean_pressure(contact):
     return force / area
 
 
-def test_a_round_body_of_second_order_on_straight_cells_is_told():
+@pytest.mark.parametrize("uneven", [0.0, 0.05])
+def test_a_round_body_of_second_order_on_straight_cells_is_told(uneven):
     """Nodes amid the edges stand h^2 / 8R inside a bore, more than the interference: its pressure is far from Lamé's."""
-    scene, chord = ring(2, False, 1e-3), np.pi / 12 * INNER
-    with pytest.warns(UserWarning, match=rf"stand {chord**2 / (8 * INNER):.2g} off the round"):
+    scene, t = ring(2, False, 1e-3, uneven=uneven), np.linspace(0, 1, 13)
+    chord = (
+        np.pi * INNER * np.diff(t + uneven * np.sin(2 * np.pi * t))[1:-1].max()
+    )  # not those at the ends
+    with pytest.warns(UserWarning, match=r"second order on straight-sided") as told:
         scene.problem.solve()
+    stand = float(re.search(r"stand ([0-9.e-]+) off the round", str(told[0].message)).group(1))
+    assert stand == pytest.approx(chord**2 / (8 * INNER), rel=0.03)
     assert mean_pressure(scene.contact) > 2 * scene.pressure
     scene.problem.solve()  # told once
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_blunt_edge_is_not_round(d):
+    """A roof of 10 degrees pressed on its ridge and a face: straight cells of second order are what it is made of."""
+    create, kind = ((mesh.create_rectangle, mesh.CellType.triangle), (mesh.create_box, mesh.CellType.hexahedron))[d - 2]  # fmt: skip
+    domain = create(COMM, [np.zeros(d), np.ones(d)], [4, 2, 2][:d], kind)
+    foot, top = (
+        mesh.locate_entities_boundary(domain, d - 1, lambda x, z=z: np.isclose(x[d - 1], z))
+        for z in (0, 1)
+    )
+    x = domain.geometry.x
+    x[:, d - 1] += np.tan(np.deg2rad(10)) * np.abs(x[:, 0] - 0.5) * (1 - x[:, d - 1])
+    V = functionspace(domain, ("Lagrange", 2, (d,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    held = fem.Constant(domain, -1e-5 * np.eye(d)[-1])
+    bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)]
+    for normal in (np.eye(d)[-1], np.array([np.sin(np.deg2rad(10)), *np.zeros(d - 2), np.cos(np.deg2rad(10))])):  # fmt: skip
+        plane = dc.RigidPlane(0.5 * np.eye(d)[0], normal)
+        contact = dc.Contact(V, foot, plane, 0.0)
+        problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+        problem.solve()
+        assert np.linalg.norm(contact.force()) > 0.0
 
 
 @pytest.mark.parametrize("order, curved", [(1, False), (2, True)])

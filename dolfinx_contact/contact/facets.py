@@ -32,6 +32,9 @@ class Facets(NamedTuple):
     inverse: np.ndarray  # of the matrix of monomials at the nodes, (k, k)
     at_nodes: np.ndarray  # linear shape functions of the vertices at the nodes, (k, v)
     bend: np.ndarray  # (n_b - n_a) . (x_b - x_a) of normals and positions of vertices, (m, v, v)
+    curve: (
+        np.ndarray
+    )  # twice the smaller one of both parts of it, where they have one sign: none beside an edge
     sharp: np.ndarray  # whether a vertex is on a sharp edge, (m,)
     size: np.ndarray  # diameters, (m,)
     outwards: np.ndarray  # unit normals, (m, gdim)
@@ -47,12 +50,13 @@ class Facets(NamedTuple):
         return _monomials(self._local(at), len(corners), 1) @ inverse
 
     def sag_at_nodes(self) -> np.ndarray:
-        """The same at the nodes, ``shape=(m, k)``; none beside sharp edges."""
-        return self.sag(self.at_nodes) * ~self.sharp[:, None]
+        """The same at the nodes, ``shape=(m, k)``, of what is round; not beside edges, blunt or sharp."""
+        hats = self.at_nodes
+        return 0.25 * ((hats @ self.curve) * hats).sum(axis=-1) * ~self.sharp[:, None]
 
     def some(self, which: np.ndarray) -> Facets:
         """Those of them that a mask, ``shape=(m,)``, names."""
-        rows = ("nodes", "bend", "sharp", "size", "outwards")
+        rows = ("nodes", "bend", "curve", "sharp", "size", "outwards")
         return self._replace(**{name: getattr(self, name)[which] for name in rows})
 
     def _local(self, at: np.ndarray) -> np.ndarray:
@@ -107,8 +111,13 @@ def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
     normals, total = [], fem.Function(V)
     sums = total.x.array.reshape(-1, fdim + 1)
     for corners, _, nodes, middle in groups:
-        outwards = _outwards(x[nodes[:, corners]], middle)
+        at = x[nodes[:, corners]]
+        outwards = _outwards(at, middle)
+        outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
         normals.append(outwards)
+        outwards = (
+            outwards / _diameters(at)[:, None]
+        )  # normals on arcs are nearer to that of the shorter chord
         for corner in corners:
             np.add.at(sums, nodes[:, corner], outwards)
     compat.add_to_owners(total.x)
@@ -118,21 +127,26 @@ def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
     found, degree = [], compat.lagrange_degree(V)
     for (corners, local, nodes, _), own in zip(groups, normals):
         at, n = x[nodes[:, corners]], smooth[nodes[:, corners]]
-        own = own / np.linalg.norm(own, axis=1, keepdims=True)
-        apart = at[:, None] - at[:, :, None]
+        ends = (n[:, None] * (at[:, None] - at[:, :, None])).sum(axis=-1)
+        other = ends.transpose(0, 2, 1)
+        both = np.where(ends * other > 0.0, np.minimum(np.abs(ends), np.abs(other)), 0.0)
         flat = _monomials(_corners(fdim, len(corners)), len(corners), 1)
         found.append(
             Facets(
                 nodes, corners, fdim, degree,
                 np.linalg.inv(_monomials(local, len(corners), degree)),
                 _monomials(local, len(corners), 1) @ np.linalg.inv(flat),
-                ((n[:, None] - n[:, :, None]) * apart).sum(axis=-1),
+                ends + other, 2.0 * np.sign(ends) * both,
                 (np.einsum("mi,mvi->mv", own, n) < SHARP).any(axis=1),
-                np.linalg.norm(apart, axis=-1).max(axis=(1, 2)),
+                _diameters(at),
                 own,
             )
         )  # fmt: skip
     return found
+
+
+def _diameters(corners: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(corners[:, None] - corners[:, :, None], axis=-1).max(axis=(1, 2))
 
 
 def _outwards(corners: np.ndarray, middle: np.ndarray) -> np.ndarray:
