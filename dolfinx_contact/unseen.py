@@ -137,10 +137,10 @@ class Unseen:
 
     def _is_straight(self, contact) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
-        x, most = contact.displacements.x[:, : contact.displacements.dim], 0.0
+        most = 0.0
         for facets in self._facets[contact]:
-            flat = np.einsum("kv,mvi->mki", facets.at_nodes, x[facets.nodes[:, facets.vertices]])
-            off = np.linalg.norm(x[facets.nodes] - flat, axis=-1) / facets.size[:, None]
+            flat = facets.at_nodes @ facets.x[:, facets.vertices]
+            off = np.linalg.norm(facets.x - flat, axis=-1) / facets.size[:, None]
             sag = np.abs(facets.sag_at_nodes()) / facets.size[:, None]
             most = max(most, float(np.where(off < CLEAR, sag, 0.0).max(initial=0.0)))
         return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
@@ -151,7 +151,7 @@ class Unseen:
         """How far nodes amid straight edges stand off a round body, where it touches."""
         missed = Missed()
         for facets in of:
-            x = _positions(contact, facets.nodes, u)
+            x = _positions(contact, facets, u)
             sag = facets.sag_at_nodes()
             if (
                 pushed == 0.0
@@ -196,7 +196,7 @@ def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
     """How far the surface goes into facets between nodes, or recedes between nodes that touch."""
     missed = Missed()
     for facets in of:
-        x = _positions(contact, facets.nodes, u)
+        x = _positions(contact, facets, u)
         gaps = _distances(contact, x)
         opened = gaps if worn is None else gaps + worn[facets.nodes]
         near = opened.min(axis=1) < facets.size
@@ -262,10 +262,9 @@ def _said(where) -> str:
     return f"({', '.join(f'{x:.3g}' for x in where)})"
 
 
-def _positions(contact, nodes: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Where nodes, ``shape=(...)``, now stand: ``(..., gdim)``."""
-    of = contact.displacements
-    return of.x[nodes][..., : of.dim] + u[of.dofs(nodes.ravel())].reshape(*nodes.shape, of.dim)
+def _positions(contact, facets: Facets, u: np.ndarray) -> np.ndarray:
+    """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
+    return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
 
 
 def _distances(contact, x: np.ndarray) -> np.ndarray:

@@ -26,7 +26,8 @@ class Facets(NamedTuple):
     """Facets of one shape that this rank owns."""
 
     nodes: np.ndarray  # local nodes of each, (m, k)
-    vertices: np.ndarray  # which of these are vertices, (v,)
+    x: np.ndarray  # where these are, (m, k, gdim)
+    vertices: np.ndarray  # which of them are vertices, (v,)
     dim: int  # of a facet
     degree: int  # of the shape functions
     inverse: np.ndarray  # of the matrix of monomials at the nodes, (k, k)
@@ -56,7 +57,7 @@ class Facets(NamedTuple):
 
     def some(self, which: np.ndarray) -> Facets:
         """Those of them that a mask, ``shape=(m,)``, names."""
-        rows = ("nodes", "bend", "curve", "sharp", "size", "outwards")
+        rows = ("nodes", "x", "bend", "curve", "sharp", "size", "outwards")
         return self._replace(**{name: getattr(self, name)[which] for name in rows})
 
     def _local(self, at: np.ndarray) -> np.ndarray:
@@ -133,7 +134,7 @@ def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
         flat = _monomials(_corners(fdim, len(corners)), len(corners), 1)
         found.append(
             Facets(
-                nodes, corners, fdim, degree,
+                nodes, x[nodes], corners, fdim, degree,
                 np.linalg.inv(_monomials(local, len(corners), degree)),
                 _monomials(local, len(corners), 1) @ np.linalg.inv(flat),
                 ends + other, 2.0 * np.sign(ends) * both,
