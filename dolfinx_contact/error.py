@@ -56,11 +56,16 @@ class Errors(NamedTuple):
     change: float = np.inf
     acts: bool = True  # forces above rounding do
     scale: float = 0.0  # S, in the unit of force of the sums
+    share: float = 1.0  # |r| / S, of the reactions in the forces that act
 
     @property
     def largest(self) -> float:
         """The larger one of both errors; NaN if either is."""
         return float(np.maximum(self.error, self.slip_error))
+
+    def of_contact(self, forward: float) -> float:
+        """The largest of all errors over the reactions in place of all forces that act; 0 without reactions."""
+        return max(self.largest, forward) / self.share if self.share > 0.0 else 0.0
 
     @property
     def blind(self) -> bool:
@@ -140,4 +145,5 @@ def as_errors(sums: np.ndarray) -> Errors:
     error, slip_error, rounding, change = map(float, left)
     if np.isnan([equilibrium, law, penetration]).any():
         error = np.nan
-    return Errors(error, slip_error, rounding, change, acts, float(acting))
+    share = float(r / acting) if acts else 0.0
+    return Errors(error, slip_error, rounding, change, acts, float(acting), share)

@@ -40,6 +40,7 @@ from dolfinx_contact.results.record import (
     converged,
     counts,
     record,
+    warn_of_contact,
     warn_of_rounding,
 )
 from dolfinx_contact.settle import found_for, refusal, with_friction
@@ -207,6 +208,7 @@ class ContactProblem(ProblemStates):
             self.body, self.contacts, self._stiffness, self.u.x.array, done.counts, self._large
         )
         warn_of_rounding(done, self.tol)
+        warn_of_contact(done, self.tol)
         return done
 
     def _step(self, start: float) -> tuple[Step, SolverResult]:

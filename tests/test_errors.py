@@ -224,3 +224,56 @@ def test_supports_that_are_not_where_they_should_be_are_an_error():
     with pytest.raises(dc.NotConverged) as caught:
         scene.problem.solve()
     assert caught.value.step.error > 0.1
+
+
+def heated(tol, solver, shorter=0.0, heat=1e4, gdim=3):
+    """A cube between walls across, heated along x without lateral contraction, pressed by 0.01: N = 10, thermal forces ``heat`` times that."""
+    made = mesh.create_unit_cube if gdim == 3 else mesh.create_unit_square
+    cell = mesh.CellType.hexahedron if gdim == 3 else mesh.CellType.quadrilateral
+    domain = made(MPI.COMM_WORLD, *[3] * gdim, cell)
+    V, up = functionspace(domain, ("Lagrange", 1, (gdim,))), gdim - 1
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    stress = fem.Constant(domain, 10.0 * heat)
+    F = (1e3 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.grad(v)) - stress * v[0].dx(0)) * ufl.dx
+    foot, head, *walls = (
+        mesh.locate_entities_boundary(domain, up, lambda x, k=k, at=at: np.isclose(x[k], at))
+        for k, at in ((up, 0), (up, 1), (0, 0), (0, 1))
+    )
+    bcs = [
+        fem.dirichletbc(
+            fem.Constant(domain, value), fem.locate_dofs_topological(V.sub(k), up, facets), V.sub(k)
+        )
+        for k, facets, value in [(up, head, shorter - 0.01)]
+        + [(k, facets, 0.0) for k in range(up) for facets in walls]
+    ]
+    plane = dc.RigidPlane(np.zeros(gdim), np.eye(gdim)[up])
+    contact = dc.Contact(V, foot, plane, dc.Friction(0.3))
+    return dc.ContactProblem(F, u, contact, bcs=bcs, tol=tol, solver=solver)
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+@pytest.mark.parametrize("solver", [dc.FixedPoint(), dc.FixedPoint(newton=False)])
+def test_reactions_beside_large_loads(solver, gdim):
+    """The reactions are within ``contact_error`` of the exact ones; where that is a thousand tolerances, a warning has the tolerance that helps."""
+    problem = heated(1e-4, solver, gdim=gdim)
+    with pytest.warns(UserWarning, match="contact carries .* set problem.tol to"):
+        step = problem.solve()
+    assert step.error <= 1e-4 and step.contact_error > 0.1
+    off = abs(problem.contacts[0].force()[-1] / 10.0 - 1.0)
+    assert off <= step.contact_error
+    problem.reset()
+    problem.tol = 1e-4**2 / step.contact_error
+    step = problem.solve()
+    assert (
+        abs(problem.contacts[0].force()[-1] / 10.0 - 1.0) <= max(step.contact_error, 1e-10) <= 0.1
+    )
+
+
+def test_the_error_of_contact_without_other_forces():
+    """Where contact carries what acts it is the largest of the other errors; without reactions it is none."""
+    step = (problem := heated(1e-8, None, heat=0.0)).solve()
+    largest = max(step.error, step.slip_error, step.forward_error)
+    share = step.contact_error / largest if largest else 1.0
+    assert 1.0 <= share < 2.0
+    assert heated(1e-8, None, shorter=0.02).solve().contact_error == 0.0
+    assert problem.contacts[0].force()[-1] == pytest.approx(10.0)

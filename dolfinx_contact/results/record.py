@@ -11,6 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.checks import RoundingWarning
+from dolfinx_contact.error import ROUNDED
+
+# Times the tolerance that errors over the reactions alone may have without a word.
+WORSE = 1e3
 
 
 class Counts(NamedTuple):
@@ -37,6 +41,8 @@ class Step:
         rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
         forward_error: How far the reactions may still be from the exact ones, over the same forces: an
             estimate from the solver's last correction.
+        contact_error: The largest of error, slip error and forward error, over the reactions alone: where they are small beside loads
+            and supports, forces of the contact are as accurate as this says; 0 without reactions.
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
         penetration: Largest penetration, >= 0, length.
         iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
@@ -63,6 +69,7 @@ class Step:
     counts: Counts
     solver: str
     tried: tuple[Any, ...] = ()
+    contact_error: float = 0.0
 
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
@@ -131,6 +138,7 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         counts=counts(body, contacts),
         solver=found.chosen,
         tried=found.tried,
+        contact_error=errors.of_contact(found.forward_error),
     )
 
 
@@ -146,5 +154,16 @@ def warn_of_rounding(step: Step, tol: float) -> None:
         warnings.warn(
             f"double precision allows no smaller error here than at present, tol is {tol:.1e}: {step}.",
             RoundingWarning,
+            stacklevel=3,
+        )
+
+
+def warn_of_contact(step: Step, tol: float) -> None:
+    """Warn, in the name of who called ``solve``, of reactions far less accurate than the tolerance, if a smaller one would help."""
+    left = max(step.error, step.slip_error, step.forward_error)
+    if step.contact_error > WORSE * tol and left > ROUNDED * step.rounding:
+        warnings.warn(
+            f"contact carries {left / step.contact_error:.1e} of the forces that act: its own may be off by {step.contact_error:.1e}, "
+            f"more than {WORSE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",
             stacklevel=3,
         )
