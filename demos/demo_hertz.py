@@ -58,13 +58,14 @@
 # ## Code
 #
 # `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves on one mesh. The
-# pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$. The radius is
+# pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$, which the contact
+# knows by its `weight`. The radius is
 # found twice: as the place of the last node that touches, which cannot be better than the mesh, and from the second
 # moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.compat import assemble_into, functionspace
+from dolfinx_contact.compat import functionspace
 
 # isort: split
 import numpy as np
@@ -110,7 +111,7 @@ def ball(domain, face, far, order: int = 1, point_force: float = FORCE) -> dc.Co
     on_axis = fem.dirichletbc(zero, fem.locate_dofs_topological(radial, 1, axis), radial)
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far)), on_axis]
     plane = dc.RigidPlane(point=(0, 0), normal=(0, 1))
-    contact = dc.Contact(V, face, plane, dc.Friction(mu=0.0))
+    contact = dc.Contact(V, face, plane, dc.Friction(mu=0.0), weight=2 * np.pi * r)
     return dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10)
 
 
@@ -126,10 +127,7 @@ def compare(contact: dc.Contact) -> dict:
 
     With them the pressure itself, over that in the middle, against r over a.
     """
-    rings, r = fem.Function(contact.V), ufl.SpatialCoordinate(contact.V.mesh)[0]
-    assemble_into(rings.x, fem.form(2 * np.pi * r * ufl.TestFunction(contact.V)[1] * ufl.ds))
-    rings = rings.x.array.reshape(-1, 2)[contact.nodes, 1]
-    x, area, force = along_face(contact, rings, contact.reaction[:, 1])
+    x, area, force = along_face(contact, contact.area, contact.reaction[:, 1])
     pressure, expected = force / area, P0 * np.sqrt(np.maximum(1 - (x / A) ** 2, 0))
     edge = np.searchsorted(x, A * (1 - 1e-9))
     return {

@@ -18,6 +18,7 @@ from scipy.spatial import KDTree
 from dolfinx_contact import compat
 from dolfinx_contact.checks import finite, positive
 from dolfinx_contact.collective import agree, raised_together
+from dolfinx_contact.contact.fields import per_area
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
@@ -174,7 +175,7 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
     """
     sums, area = np.zeros((2, 2)), 0.0
     for contact, better in zip(problem.contacts, reference.contacts):
-        own, other = interpolated(contact, better), better.reaction / better.area[:, None]
+        own, other = interpolated(contact, better), per_area(better.reaction, better.area)
         area += better.area.sum()
         for row, of in zip(sums, (own, other - own)):
             row += better.area @ of[:, -1] ** 2, better.area @ (of[:, :-1] ** 2).sum(axis=1)
@@ -188,7 +189,7 @@ def interpolated(contact, better) -> np.ndarray:
 
     On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.
     """
-    tractions, dim = contact.reaction / contact.area[:, None], contact.reaction.shape[1]
+    tractions, dim = per_area(contact.reaction, contact.area), contact.reaction.shape[1]
     if contact.V.mesh is better.V.mesh:
         here, there = (fem.Function(of.displacements.V) for of in (contact, better))
         here.x.array.reshape(-1, dim)[contact.nodes] = tractions

@@ -25,6 +25,7 @@ from dolfinx_contact.problem_input import (
     check_planes,
     check_size,
     check_step,
+    check_weights,
     checked_conditions,
     checked_contacts,
     checked_options,
@@ -137,6 +138,7 @@ class ContactProblem(ProblemStates):
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of, entity_maps)  # fmt: skip
         hold(self.contacts, self.body)
         check_planes(self.contacts, self.body)
+        check_weights(F, self.contacts)
         self._points = [contact.points for contact in self.contacts]
         self._unseen = Unseen(self.contacts)
         self._large = False  # whether a displacement was, and the user told

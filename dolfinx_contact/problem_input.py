@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
+from ufl.classes import Indexed, Product, SpatialCoordinate
 
 from dolfinx_contact import compat
 from dolfinx_contact.attributes import Guarded
@@ -15,6 +16,7 @@ from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.checks import positive
 from dolfinx_contact.collective import from_first, raised_together
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.drive import SQUARE
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.solvers.base import Solver
@@ -203,6 +205,45 @@ def check_planes(contacts, body) -> None:
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
 
 
+def check_weights(F, contacts) -> None:
+    """Warn of a volume form that is multiplied by the radius while contacts have no weight: areas are those of plane strain."""
+    if not contacts or contacts[0].points.dim == 3 or all(c.weighted for c in contacts):
+        return
+    cells = [part.integrand() for part in F.integrals() if part.integral_type() == "cell"]
+    if any(_has_radius(integrand) for integrand in cells):
+        warnings.warn(
+            "F is multiplied by the first coordinate, as with axial symmetry, and a contact has no weight: its pressures, worn depths "
+            "and friction that follows the pressure are those of a body of unit thickness. Give dc.Contact(..., weight=2 * ufl.pi * r), "
+            "or whatever F has.",
+            stacklevel=3,
+        )
+
+
+def _has_radius(integrand) -> bool:
+    """Whether a factor of an integrand is the first coordinate itself."""
+    factors = [integrand]
+    for factor in factors:
+        if isinstance(factor, Product):
+            factors.extend(factor.ufl_operands)
+    of = [f.ufl_operands for f in factors if isinstance(f, Indexed)]
+    return any(isinstance(a, SpatialCoordinate) and int(i[0]) == 0 for a, i in of)
+
+
+def check_axial(contacts) -> None:
+    """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
+    for contact in contacts:
+        plane = contact.plane
+        turns = plane.spins or plane.rotation.any()
+        radial = any(not motion.turns and abs(motion.axis[0]) > SQUARE for motion in plane.motions)
+        if (turns or radial) and contact.axial:
+            what = "turn" if turns else "be driven by force along the radius"
+            raise ValueError(
+                f"the contact has a weight in proportion to the first coordinate, so bodies are those of revolution, and {plane} cannot "
+                f"{what}: rotations in the plane and resultants along the radius have no meaning there. Prescribe the motion, or "
+                "drive the axial one."
+            )
+
+
 class ProblemOptions(Guarded):
     """Solver and tolerance of a ``ContactProblem``, which may be exchanged between steps; the rest stays."""
 
@@ -275,6 +316,7 @@ def check_alive(problem, body, contacts) -> None:
 
 def check_step(u, comm, contacts) -> None:
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
+    check_axial(contacts)
     first = from_first(comm, [contact.described() for contact in contacts])
     with raised_together(comm):
         for contact, described in zip(contacts, first):

@@ -302,6 +302,38 @@ def test_sub_space_or_whole():
         dc.ContactProblem(scene.F, scene.w, dc.Contact(alone, facets, plane, law), [])
 
 
+@pytest.mark.parametrize("simplex", [False, True])
+def test_which_field_is_the_displacement(simplex):
+    """A Cosserat body has rotations beside displacements: nobody guesses; on the sub-space that is named the foot carries E A u / h."""
+    kind = mesh.CellType.triangle if simplex else mesh.CellType.quadrilateral
+    body = mesh.create_rectangle(COMM, [[0, 0], [1, 1]], [3, 3], kind)
+    W = mixed_functionspace(body, [("Lagrange", 1, (2,)), ("Lagrange", 1, (2,))])
+    w = fem.Function(W)
+    (p, u), (q, v) = ufl.split(w), ufl.split(ufl.TestFunction(W))
+
+    def spun(p, u):  # rotations against those of the material: none in even compression
+        return (u[1].dx(0) - u[0].dx(1)) / 2 - p[0] - p[1]
+
+    F = (
+        1000 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.grad(v))
+        + 10 * ufl.inner(ufl.grad(p), ufl.grad(q))
+    ) * ufl.dx
+    F += (100 * spun(p, u) * spun(q, v) + ufl.inner(p, q)) * ufl.dx
+    foot, head = (
+        mesh.locate_entities_boundary(body, 1, lambda x, z=z: np.isclose(x[1], z)) for z in (0, 1)
+    )
+    D = W.sub(1).collapse()[0]
+    down = fem.Function(D)
+    down.x.array[1::2] = -0.01
+    bc = fem.dirichletbc(down, fem.locate_dofs_topological((W.sub(1), D), 1, head), W.sub(1))
+    plane = dc.RigidPlane((0, 0), (0, 1))
+    with pytest.raises(ValueError, match=r"several sub-spaces .* \[0, 1\], .*V.sub"):
+        dc.Contact(W, foot, plane, dc.Friction(0.3))
+    contact = dc.Contact(W.sub(1), foot, plane, dc.Friction(0.3))
+    dc.ContactProblem(F, w, [contact], bcs=[bc]).solve()
+    assert contact.force() == pytest.approx([0, 10.0], rel=1e-8, abs=1e-8)
+
+
 def test_mixed_spaces_without_displacements_are_refused():
     """A mixed space needs displacements, every field has to act on them, and what has no meaning is refused."""
     scene = block(n=2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import weakref
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -22,7 +23,7 @@ from dolfinx_contact.contact.checks import (
     checked_facets,
 )
 from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.contact.fields import contact_nodes
+from dolfinx_contact.contact.fields import contact_nodes, weight_on
 from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.interface import add_to
 from dolfinx_contact.contact.kinematics import ContactKinematics
@@ -52,6 +53,9 @@ class Contact(ContactKinematics):
         friction: The friction law, or a number, its isotropic coefficient, the same on all ranks; or on all of them one with coefficients
             per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
         wear: Archard's law, if worn depth is to open the gap; None costs nothing.
+        weight: Of the surface measure, where the forms have one: ``2 * pi * r`` with axial symmetry, a thickness.  A number, a UFL
+            expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and so pressures, worn depths and friction that
+            follows the pressure; reactions have it from the forms.
 
     Raises:
         ValueError: on all ranks, for facets that are not boundary facets of the mesh, a space that
@@ -76,7 +80,7 @@ class Contact(ContactKinematics):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction | float, wear: Wear | None = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction | float, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh, friction = V.mesh, as_friction(friction)
@@ -91,7 +95,9 @@ class Contact(ContactKinematics):
             check_wear(wear)
         self.V, self.comm, self.plane = V, mesh.comm, plane
         self.displacements = Displacements(V)
-        self.nodes = frozen(contact_nodes(self.displacements.V, facets))
+        with raised_together(mesh.comm):
+            self._weight = weight_on(self.displacements.V, weight)
+        self.nodes = frozen(contact_nodes(self.displacements.V, facets, self._weight))
         self.x = frozen(self.displacements.x[self.nodes])
         with raised_together(mesh.comm):
             plane.check_at(plane.relative(self._at))

@@ -18,16 +18,26 @@ def displacement_part(V):
         V: Any function space.
 
     Raises:
-        ValueError: a mixed space none of whose sub-spaces is continuous Lagrange with a component per dimension.
+        ValueError: a mixed space none of whose sub-spaces is continuous Lagrange with a component per dimension, or more than one.
     """
     gdim = V.mesh.geometry.dim
     if compat.is_part(V) and compat.value_size(V) == gdim and V.dofmap.index_map_bs == 1:
         return V
     if V.dofmap.index_map_bs > 1 or V.element.num_sub_elements < 2:
         return None
-    for part in (V.sub(i) for i in range(V.element.num_sub_elements)):
-        if compat.value_size(part) == gdim and compat.lagrange_degree(part) is not None:
-            return part
+    parts = {i: V.sub(i) for i in range(V.element.num_sub_elements)}
+    able = [
+        i
+        for i, part in parts.items()
+        if compat.value_size(part) == gdim and compat.lagrange_degree(part) is not None
+    ]
+    if len(able) == 1:
+        return parts[able[0]]
+    if able:
+        raise ValueError(
+            f"V is a mixed space with several sub-spaces of {gdim} continuous Lagrange components, {able}, such as displacements and "
+            f"rotations or velocities: give the one of the displacements, dc.Contact(V.sub({able[0]}), ...)."
+        )
     raise ValueError(
         f"V is a mixed space, but none of its sub-spaces is continuous Lagrange with {gdim} components: contact needs "
         "displacements."

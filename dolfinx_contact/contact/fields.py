@@ -13,41 +13,115 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import compat
+from dolfinx_contact.checks import finite
 from dolfinx_contact.collective import raised_together
 
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
 ZERO = 1e-10
 
+# By which Cauchy's inequality may miss equality.
+SQUARE = 1e-10
+
 # What an even pressure may make at a node that is left out, over the largest at others, before a user is told.
 UNEVEN = 0.01
 
 
-def areas(V, facets: np.ndarray, reference: bool = False) -> np.ndarray:
+def weight_on(V, weight):
+    """The weight of the surface measure as UFL takes it: a number, an expression, or a callable of ``x``, interpolated.  Collective."""
+    if weight is None or isinstance(weight, ufl.core.expr.Expr):
+        return weight
+    if not callable(weight):
+        return ufl.as_ufl(float(finite("weight", weight)))
+    scalars = V.sub(0).collapse()[0]
+    values = fem.Function(scalars)
+    x = scalars.tabulate_dof_coordinates()
+    values.x.array[:] = np.broadcast_to(finite("what weight gives", weight(x.T.copy())), len(x))
+    return values
+
+
+def _assembled(density, V, facets: np.ndarray, weight) -> np.ndarray:
+    """A density with a test function of ``V``, integrated over facets with a weight.  Collective."""
+    mesh, fdim = V.mesh, V.mesh.topology.dim - 1
+    mine = np.unique(facets[facets < mesh.topology.index_map(fdim).size_local])
+    tags = meshtags(mesh, fdim, mine, np.ones(mine.size, dtype=np.int32))
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(1)
+    work = fem.Function(V)
+    compat.assemble_into(work.x, fem.form((density if weight is None else density * weight) * ds))
+    return work.x.array.copy()
+
+
+def areas(V, facets: np.ndarray, reference: bool = False, weight=None) -> np.ndarray:
     """Integral of each shape function over facets, in the first component of an array on ``V``.  Collective.
 
     Args:
         V: The space.
         facets: Local indices.
         reference: Whether all facets count as large as the reference facet.
+        weight: Of the surface measure, as ``weight_on`` returns it.
     """
-    mesh, fdim = V.mesh, V.mesh.topology.dim - 1
-    mine = np.unique(facets[facets < mesh.topology.index_map(fdim).size_local])
-    tags = meshtags(mesh, fdim, mine, np.ones(mine.size, dtype=np.int32))
-    ds = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(1)
-    work, shape = fem.Function(V), ufl.TestFunction(V)[0]
+    shape = ufl.TestFunction(V)[0]
     if reference:
-        shape = shape / abs(ufl.classes.FacetJacobianDeterminant(mesh))
-    compat.assemble_into(work.x, fem.form(shape * ds))
-    return work.x.array.copy()
+        shape = shape / abs(ufl.classes.FacetJacobianDeterminant(V.mesh))
+    return _assembled(shape, V, facets, weight)
 
 
-def contact_nodes(V, facets: np.ndarray) -> np.ndarray:
+def facing_areas(contact, weight) -> np.ndarray:
+    r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
+
+    On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that an even pressure p makes the
+    reactions ``p A_i``.  On a curved surface, whose normals will be others when the body has moved, facets count by their own area
+    where they face it, :math:`n_f \cdot n < 0`.
+
+    Args:
+        contact: The contact.
+        weight: Of the surface measure, as ``weight_on`` returns it.
+    """
+    V, plane = contact.displacements.V, contact.plane
+    dim = V.mesh.geometry.dim
+    towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
+    at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)
+    x = V.tabulate_dof_coordinates()[at, :dim]
+    frames = plane.frames(plane.relative(x) if plane.curved else x)
+    towards.x.array.reshape(-1, dim)[at] = frames[..., -1, :]
+    density = -ufl.inner(n_f, v) if not plane.curved else v[0]
+    faces = ufl.conditional(ufl.lt(ufl.inner(n_f, towards), 0.0), density, 0.0)
+    rows = _assembled(faces, V, contact.facets, weight).reshape(-1, dim)[contact.nodes]
+    found = rows[:, 0].copy() if plane.curved else rows @ frames[-1]
+    largest = contact.comm.allreduce(np.abs(found).max(initial=0.0), op=MPI.MAX)
+    with raised_together(contact.comm):
+        if not np.isfinite(found).all() or (found < -ZERO * largest).any():
+            node = int(np.argmin(np.nan_to_num(found, nan=-np.inf)))
+            raise ValueError(
+                f"the area of the contact node at {contact.x[node].tolist()} is {found[node]:.3g}: weight must be positive "
+                "on the facets, or zero on an axis."
+            )
+    found[found <= ZERO * largest] = 0.0
+    return found
+
+
+def per_area(forces: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Nodal forces, ``shape=(n, ...)``, over areas; zero where a node has none."""
+    area = area.reshape(-1, *[1] * (forces.ndim - 1))
+    return np.divide(forces, area, out=np.zeros_like(forces), where=area > 0.0)
+
+
+def grows_with_radius(V, weight) -> bool:
+    """Whether a weight is in proportion to the first coordinate all over the mesh, as in axial symmetry.  Collective."""
+    r = ufl.SpatialCoordinate(V.mesh)[0]
+    terms = (weight * weight, weight * r, r * r)
+    here = [fem.assemble_scalar(fem.form(term * ufl.dx(V.mesh))) for term in terms]
+    squares = V.mesh.comm.allreduce(np.array(here, dtype=float))
+    return bool(squares[1] ** 2 >= (1 - SQUARE) * squares[0] * squares[2] > 0.0)
+
+
+def contact_nodes(V, facets: np.ndarray, weight=None) -> np.ndarray:
     """Owned nodes of facets that carry a part of an even pressure.  Collective.
 
     An even pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
     and with second order on quadrilaterals and on edges, all are positive. Those of the vertices of triangles of second
     order are zero, and the middles of their edges are the points of a rule that integrates quadratic functions exactly: the
-    vertices are left out. It is the element that decides, on the reference facet, so that a curved one cannot change it.
+    vertices are left out. It is the element that decides, on the reference facet, so that a curved one cannot change it; and a weight
+    of the surface measure: on the axis of symmetry a node of second order carries nothing, either.
 
     Raises:
         ValueError: on all ranks, if an integral is negative: such a node would have to pull.
@@ -56,7 +130,8 @@ def contact_nodes(V, facets: np.ndarray) -> np.ndarray:
     nodes = np.unique(nodes[nodes < V.dofmap.index_map.size_local])
     if compat.lagrange_degree(V) == 1:
         return nodes
-    comm, weights = V.mesh.comm, areas(V, facets, reference=True)[V.mesh.geometry.dim * nodes]
+    comm = V.mesh.comm
+    weights = areas(V, facets, weight is None, weight)[V.mesh.geometry.dim * nodes]
     zero = ZERO * comm.allreduce(np.abs(weights).max(initial=0.0), op=MPI.MAX)
     with raised_together(comm):
         if (weights < -zero).any():
@@ -67,16 +142,18 @@ def contact_nodes(V, facets: np.ndarray) -> np.ndarray:
                 "it would have to pull, which contact cannot. Take degree 1 or 2."
             )
     kept = weights > zero
-    _warn_of_curved_edges(V, facets, nodes[kept], nodes[~kept])
+    _warn_of_curved_edges(V, facets, nodes[kept], nodes[~kept], weight)
     return nodes[kept]
 
 
-def _warn_of_curved_edges(V, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray) -> None:
+def _warn_of_curved_edges(
+    V, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray, weight
+) -> None:
     """Tell that an even pressure acts on nodes that are left out.  Collective."""
     comm, dim = V.mesh.comm, V.mesh.geometry.dim
     if comm.allreduce(left_out.size) == 0:
         return
-    acting = np.abs(areas(V, facets))
+    acting = np.abs(areas(V, facets, weight=weight))
     most = [acting[dim * of].max(initial=0.0) for of in (left_out, kept)]
     missed, largest = (comm.allreduce(float(of), op=MPI.MAX) for of in most)
     if missed > UNEVEN * largest:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
 from numpy.typing import ArrayLike
@@ -18,6 +20,8 @@ class ContactResults(ContactLaws):
     """Results of the present state of a ``Contact``, which has laws, frame and nodes."""
 
     _area: np.ndarray | None = None
+    _axial: bool | None = None
+    _weight: Any = None
 
     @property
     def load_function(self) -> np.ndarray:
@@ -51,7 +55,10 @@ class ContactResults(ContactLaws):
         return np.where(bound, slip + slips * length * against, 0.0)
 
     def force(self) -> np.ndarray:
-        """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective."""
+        """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective.
+
+        With axial symmetry its axial component alone is a force; the other one is the sum of radial forces, which balance.
+        """
         if self.plane.curved:
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
@@ -72,21 +79,33 @@ class ContactResults(ContactLaws):
 
     @property
     def area(self) -> np.ndarray:
-        """Area of the contact surface that belongs to each node, ``shape=(n,)``, reference state.
+        """Area of the contact surface that belongs to each node, ``shape=(n,)``, undeformed state, see ``facing_areas``.
 
-        The integral of the node's shape function over the facets; a length in two dimensions.
-        Collective at the first call.
+        The integral of the node's shape function, times ``weight``, over the facets as the surface sees them: facets that are turned away from
+        it have none.  Without a weight a length in two dimensions.  Collective at the first call.
         """
         if self._area is None:
-            V = self.displacements.V
-            areas = fields.areas(V, self.facets)
-            self._area = frozen(areas[self.displacements.dim * self.nodes])
+            self._area = frozen(fields.facing_areas(self, self._weight))
         return self._area
 
     @property
     def pressure(self) -> np.ndarray:
-        """Normal reaction over nodal area, ``shape=(n,)``, force per area.  Collective at first."""
-        return self.reaction[:, -1] / self.area
+        """Normal reaction over nodal area, ``shape=(n,)``, force per area; zero where a node has none.  Collective at first."""
+        return fields.per_area(self.reaction[:, -1], self.area)
+
+    @property
+    def weighted(self) -> bool:
+        """Whether the surface measure has a weight."""
+        return self._weight is not None
+
+    @property
+    def axial(self) -> bool:
+        """Whether ``weight`` is in proportion to the first coordinate, in two dimensions: axial symmetry.  Collective at first."""
+        if self._axial is None:
+            V = self.displacements.V
+            plain = self._weight is None or V.mesh.geometry.dim == 3
+            self._axial = not plain and fields.grows_with_radius(V, self._weight)
+        return self._axial
 
     def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
         """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""

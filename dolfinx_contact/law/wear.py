@@ -44,8 +44,9 @@ class Wear(Guarded):
         self._made = True
 
     def depth(self, work: np.ndarray, area: np.ndarray) -> np.ndarray:
-        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length."""
-        return (self.coefficient * work).sum(axis=1) / area
+        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length.  None where there is no area."""
+        volume = (self.coefficient * work).sum(axis=1)
+        return np.divide(volume, area, out=np.zeros_like(volume), where=area > 0.0)
 
     def __repr__(self) -> str:
         return f"Wear({self.coefficient.tolist()})"

@@ -1,0 +1,215 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Areas: pressures, worn depths and friction that follows the pressure are those of the surface that touches."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from scenes import elasticity
+
+import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
+
+COMM = MPI.COMM_WORLD
+E, NU = 210e3, 0.3
+
+
+def boundary(body, where):
+    return mesh.locate_entities_boundary(body, body.topology.dim - 1, where)
+
+
+def cube(order=1, simplex=False, whole=False, friction=None, wear=None, surface=None):
+    """A unit cube of modulus 1000 whose head is held, its contact of the foot, or of all faces but the head."""
+    kind = mesh.CellType.tetrahedron if simplex else mesh.CellType.hexahedron
+    body = mesh.create_box(COMM, [[0, 0, 0], [1, 1, 1]], [3, 3, 3], kind)
+    V = functionspace(body, ("Lagrange", order, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = elasticity(u, v, 1000.0, 0.0)
+    held = fem.Constant(body, np.zeros(3))
+    head = boundary(body, lambda x: np.isclose(x[2], 1))
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, head), V)
+
+    def given(x):
+        low = x[2] < 0.7  # the upper third is held
+        sides = np.isclose(np.abs(x[:2] - 0.5).max(axis=0), 0.5)
+        return np.isclose(x[2], 0) | (whole & sides & low)
+
+    surface = surface or dc.RigidPlane((0, 0, 0), (0, 0, 1))
+    contact = dc.Contact(V, boundary(body, given), surface, friction or dc.Friction(0.3), wear=wear)
+    return dc.ContactProblem(F, u, [contact], bcs=[bc]), contact, held
+
+
+@pytest.mark.parametrize("order, simplex", [(1, False), (1, True), (2, False), (2, True)])
+def test_facets_that_cannot_touch_have_no_part_in_pressures(order, simplex):
+    """Foot alone, or with the sides: the same pressures, friction that follows them, and wear."""
+    found = []
+    for whole in (False, True):
+        friction = dc.Friction(lambda x, pressure: 0.3 / (1 + pressure / 5))
+        problem, contact, held = cube(order, simplex, whole, friction, dc.Wear(1e-4))
+        held.value = (0, 0, -0.01)
+        problem.solve()
+        foot = np.isclose(contact.x[:, 2], 0)
+        pressure = contact.pressure[foot]
+        assert np.isfinite(contact.pressure).all() and not contact.pressure[~foot].any()
+        held.value = (0.5, 0, -0.01)
+        problem.solve()
+        sums = (
+            contact.wear_depth[foot].sum(),
+            contact.pressure[foot].sum(),
+            contact.area[foot].sum(),
+        )
+        assert not contact.wear_depth[~foot].any()
+        found.append([*contact.force(), *COMM.allreduce(np.array([pressure.sum(), *sums]))])
+    assert found[1] == pytest.approx(found[0], rel=1e-7, abs=1e-7)
+    assert found[1][-1] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_slanted_foot_counts_as_the_plane_sees_it():
+    """A wedge on a plane along its slanted face, tilted by 30 degrees: projected areas make an even pressure even."""
+    body = mesh.create_rectangle(COMM, [[0, 0], [1, 1]], [6, 6], mesh.CellType.quadrilateral)
+    body.geometry.x[:, 1] += 0.1 * body.geometry.x[:, 0] * (1 - body.geometry.x[:, 1])
+    V = functionspace(body, ("Lagrange", 1, (2,)))
+    foot = boundary(body, lambda x: np.isclose(x[1], 0.1 * x[0]))
+    contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
+    assert COMM.allreduce(contact.area.sum()) == pytest.approx(1.0, rel=1e-12)  # not sqrt(1.01)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_sides_do_not_count_on_a_ball_either(whole):
+    """A flat foot on a ball, with and without the sides: the same areas, the whole foot."""
+    _, contact, _ = cube(whole=whole, surface=dc.RigidSphere((0.5, 0.5, -0.4), 0.4))
+    assert COMM.allreduce(contact.area.sum()) == pytest.approx(1.0, rel=1e-12)
+
+
+def ring(order, weight=None, closed=True, **options):
+    """A ring 20 < r < 30 in the plane (r, z), pressed outwards at its bore by a plane that expands; ends ``closed``, or held outside."""
+    body = mesh.create_rectangle(
+        COMM, [[20.0, 0.0], [30.0, 4.0]], [16, 3], mesh.CellType.quadrilateral
+    )
+    V = functionspace(body, ("Lagrange", order, (2,)))
+    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(body)[0]
+
+    def strain(w):
+        g = ufl.sym(ufl.grad(w))
+        return ufl.as_tensor([[g[0, 0], g[0, 1], 0], [g[0, 1], g[1, 1], 0], [0, 0, w[0] / r]])
+
+    volume = NU / (1 - 2 * NU) * ufl.tr(strain(u)) * ufl.tr(strain(v))
+    F = E / (1 + NU) * (ufl.inner(strain(u), strain(v)) + volume) * 2 * np.pi * r * ufl.dx
+    ends = boundary(
+        body,
+        lambda x: np.isclose(x[1], 0) | np.isclose(x[1], 4) if closed else np.isclose(x[0], 30),
+    )
+    bc = fem.dirichletbc(
+        fem.Constant(body, 0.0), fem.locate_dofs_topological(V.sub(1), 1, ends), V.sub(1)
+    )
+    bore = boundary(body, lambda x: np.isclose(x[0], 20))
+    weight = {"ufl": 2 * np.pi * r, "callable": lambda x: 2 * np.pi * x[0], None: None}[weight]
+    contact = dc.Contact(
+        V, bore, dc.RigidPlane((20, 0), (1, 0)), dc.Friction(0.1), weight=weight, **options
+    )
+    return contact, dc.ContactProblem, (F, u, [contact]), dict(bcs=[bc])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("weight", ["ufl", "callable"])
+def test_an_expanded_ring_has_the_pressure_of_lame(order, weight):
+    """A ring in plane strain along its axis, expanded at the bore: Lame's pressure, Archard's depth, 2 pi r h p in all."""
+    contact, make, given, options = ring(order, weight, wear=dc.Wear(1e-9))
+    problem = make(*given, **options)
+    a, b, way = 20.0, 30.0, 0.0025
+    G, lame = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
+    # u = A r + B / r with no traction at b; pressure at a
+    ratio = 2 * (G + lame) * b**2 / (2 * G)  # B / A
+    A = way / (a + ratio / a)
+    p = 2 * G * A * ratio / a**2 - 2 * (G + lame) * A
+    contact.plane.displacement = (way, 0)
+    problem.solve()
+    assert contact.pressure == pytest.approx(
+        np.full(contact.nodes.size, p), rel=0.02 if order == 1 else 1e-3
+    )
+    assert contact.force()[0] == pytest.approx(p * 2 * np.pi * a * 4, rel=2e-3)
+    pressed = contact.pressure
+    contact.plane.displacement = (way, -1.0)
+    problem.solve()
+    assert contact.force()[1] == pytest.approx(-0.1 * contact.force()[0], rel=1e-8)
+    mean = (pressed + contact.pressure) / 2  # of both ends of the step, as its work is taken
+    assert contact.wear_depth == pytest.approx(1e-9 * 0.1 * mean, rel=1e-3)
+
+
+def test_areas_without_a_weight_are_warned_of():
+    """A form times r without a weight; silent with one, and where r is in a load or a modulus alone."""
+    _, make, given, options = ring(1)
+    with pytest.warns(UserWarning, match="no weight"):
+        make(*given, **options)
+    _, make, given, options = ring(1, "ufl")
+    make(*given, **options)
+
+
+@pytest.mark.parametrize("wrong", ["turned", "free to turn", "driven along r"])
+def test_motions_that_no_body_of_revolution_makes_are_refused(wrong):
+    """Rotations in the plane and forces along the radius have no meaning with axial symmetry; axial forces have."""
+    contact, make, given, options = ring(1, "callable", closed=False)
+    problem, plane = make(*given, **options), contact.plane
+    if wrong == "turned":
+        plane.rotation = 0.01
+    elif wrong == "free to turn":
+        plane.free, plane.moment = ("r",), 1.0
+    else:
+        plane.free, plane.force = ("n",), (100.0, 0)
+    with pytest.raises(ValueError, match="bodies are those of revolution"):
+        problem.solve()
+    plane.rotation, plane.free, plane.force = 0.0, (), None
+    plane.displacement = (0.0025, 0)
+    problem.solve()
+    plane.free, plane.force = ("t",), (0, 1.0)
+    problem.solve()
+    assert contact.force()[1] == pytest.approx(1.0, rel=1e-8)
+
+
+def test_a_thickness_is_no_axial_symmetry():
+    """Plane strain of thickness t: forces t times as large, the same pressures; the surface may turn."""
+    forces = []
+    for t in (1.0, 3.0):
+        body = mesh.create_unit_square(COMM, 4, 4, mesh.CellType.quadrilateral)
+        V = functionspace(body, ("Lagrange", 1, (2,)))
+        u, v = fem.Function(V), ufl.TestFunction(V)
+        F = t * 1000 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.grad(v)) * ufl.dx
+        foot, head = (boundary(body, lambda x, z=z: np.isclose(x[1], z)) for z in (0, 1))
+        held = fem.Constant(body, np.array([0.0, -0.01]))
+        bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, head), V)
+        contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.3), weight=t)
+        problem = dc.ContactProblem(F, u, [contact], bcs=[bc])
+        problem.solve()
+        contact.plane.rotation = 1e-4
+        problem.solve()
+        mean = COMM.allreduce(contact.pressure @ contact.area) / COMM.allreduce(contact.area.sum())
+        forces.append([contact.force()[1] / t, mean])
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9)
+
+
+def test_the_axis_carries_nothing_in_second_order():
+    """A disc on a plane: second-order nodes on the axis have no area and are left out; an even pressure stays even."""
+    body = mesh.create_rectangle(
+        COMM, [[0.0, 0.0], [1.0, 1.0]], [4, 4], mesh.CellType.quadrilateral
+    )
+    V = functionspace(body, ("Lagrange", 2, (2,)))
+    foot = boundary(body, lambda x: np.isclose(x[1], 0))
+    r = ufl.SpatialCoordinate(body)[0]
+    contact = dc.Contact(
+        V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0), weight=2 * ufl.pi * r
+    )
+    assert COMM.allreduce(contact.nodes.size) == 8
+    assert contact.x[:, 0].min(initial=1.0) > 0.1
+    assert COMM.allreduce(contact.area.sum()) == pytest.approx(np.pi, rel=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, lambda x: x[0] - 0.5, lambda x: np.nan * x[0]])
+def test_weights_that_are_not_positive_are_refused(wrong):
+    """A measure below zero, or none at all."""
+    body = mesh.create_unit_square(COMM, 4, 4, mesh.CellType.quadrilateral)
+    V = functionspace(body, ("Lagrange", 1, (2,)))
+    foot = boundary(body, lambda x: np.isclose(x[1], 0))
+    with pytest.raises(ValueError, match="weight"):
+        dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0), weight=wrong).area  # noqa: B018
