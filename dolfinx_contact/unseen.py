@@ -243,7 +243,7 @@ def _of_between(contact, missed: Missed, pushed: float) -> str:
     return (
         f"{contact.plane!r} {does}, {felt}: contact is asked for at nodes alone, and facets of size {missed.size:.2g} "
         f"there do not see the surface, so that forces may be off by as much as they are large. Take facets of about "
-        f"{missed.needed:.1g} there."
+        f"{missed.needed:.1g} there, unless this is but a first touch that later steps leave behind."
     )
 
 
