@@ -61,6 +61,7 @@ def test_problems_leave_nothing_behind(end, solver):
     scene.move_top(0.001, 0.0, -0.01)
 
     def once():
+        scene.contact.reset()  # its history is that of the problem before
         problem = dc.ContactProblem(scene.F, scene.u, scene.contact, bcs=scene.bcs, solver=solver)
         problem.solve()
         if end == "closed":
