@@ -89,11 +89,24 @@ def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...
         ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
     """
     projected, _ = contact.law.bipotential_map(
-        contact.reaction, contact.gap, contact.slip_increment, stiffness.normal
+        contact.reaction, contact.gap, _felt(contact), stiffness.normal
     )
     penetration = stiffness.normal * np.maximum(-contact.gap, 0.0)
     slip = np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_residual)
     return contact.reaction - projected, penetration, slip
+
+
+def _felt(contact) -> np.ndarray:
+    """Slips as the law's residual has them, ``shape=(n, gdim - 1)``: of nodes that stick over mu, where it exceeds 1.
+
+    The residual has ``kappa mu |Delta u_t|``.  Where the law asks for no slip, what there is counts by the force that it makes,
+    not mu times.
+    """
+    slip, mu = contact.slip_increment, contact.friction.mu.max(axis=-1, initial=0.0)
+    if not (mu > 1.0).any():
+        return slip
+    sticks = contact.status == int(Status.STICK)
+    return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
 
 
 def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
@@ -122,6 +135,10 @@ def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.nd
     """
     normal, tangential = contact.motion_rounding(u)
     stiff = np.abs(stiffness.tangential).sum(axis=2)
+    mu = contact.friction.mu[..., : tangential.shape[1]]
+    if (mu > 1.0).any():  # the law's residual has mu times the slip
+        slips = contact.status == int(Status.SLIP)
+        normal = normal + slips * (mu * tangential).sum(axis=1)
     return np.column_stack((stiff * tangential, stiffness.normal * normal))
 
 

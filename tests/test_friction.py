@@ -113,7 +113,7 @@ def test_immutable_and_unchanged_by_a_pickle():
     [
         (dict(mu=-0.1), ("mu", "-0.1")),
         (dict(mu=(0.3, np.nan)), ("mu", "nan")),
-        (dict(mu=np.inf), ("mu", "inf")),
+        (dict(mu=-np.inf), ("mu", "inf")),
         (dict(mu=0.3 + 0.1j), ("mu", "0.1j")),
         (dict(mu=True), ("mu", "True")),
         (dict(mu=(True, 0.2)), ("mu", "True")),

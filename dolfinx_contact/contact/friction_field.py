@@ -11,7 +11,7 @@ from dolfinx import fem
 
 from dolfinx_contact import compat
 from dolfinx_contact.checks import finite
-from dolfinx_contact.law.friction import Friction, is_field
+from dolfinx_contact.law.friction import Friction, is_field, rough
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -137,7 +137,9 @@ def _values(contact, name: str, given, state, at=None) -> np.ndarray:
         return _of_function(contact, name, given)
     n = contact.nodes.size
     at = contact.x if at is None else at
-    values = finite(f"what {name} gives", given(at.T.copy(), **state))
+    values = given(at.T.copy(), **state)
+    finite(f"what {name} gives", rough(values) if name == "mu" else values)
+    values = np.asarray(values, dtype=np.float64)  # infinite ones are for the law
     return np.zeros((2, 0)) if n == 0 else values
 
 

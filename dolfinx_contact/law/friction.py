@@ -26,10 +26,24 @@ OWNERS = ("body", "surface")  # of a texture
 
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
+# What stands for infinity: nodes slide only where their normal reaction is less than a millionth of the tangential one.
+ROUGH = 1e6
+
+
+def rough(mu):
+    """Coefficients with ``ROUGH`` where they are infinite; all others as they were given."""
+    try:
+        infinite = np.isposinf(mu)
+    except (TypeError, ValueError):  # no real numbers: others say so
+        return mu
+    return mu if np.ma.is_masked(mu) or not np.any(infinite) else np.where(infinite, ROUGH, mu)
+
 
 def _cone(given: ArrayLike) -> np.ndarray:
     """``mu``, checked, ``shape=(2,)`` or ``(n, 2)``."""
-    mu = _coefficients("mu", given)
+    mu = _coefficients("mu", rough(given))
+    if mu.ndim and (one := np.isposinf(given)).any(axis=-1).sum() != one.all(axis=-1).sum():
+        raise ValueError(f"mu must be infinite in both directions or in none, not {given!r}")
     if np.any(mu < 0):
         raise ValueError(f"mu must not be negative, but is {given!r}")
     if mu.ndim == 0:
@@ -67,7 +81,7 @@ class Friction(Guarded):
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
             ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
-            frictionless. Or a field, see below.
+            frictionless, infinity perfectly rough: what touches sticks. Or a field, see below.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
