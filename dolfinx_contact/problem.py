@@ -18,6 +18,7 @@ from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.driven import approach, check_driven, freedom
+from dolfinx_contact.contact.held_planes import HeldPlanes, held_planes
 from dolfinx_contact.nonlinear_step import NonlinearStep
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
@@ -230,10 +231,13 @@ class ContactProblem(ProblemStates):
         self._variables.advance(self.u)
         return done, found
 
-    def load_step(self) -> LoadStep:
+    def load_step(self, holding: HeldPlanes | None = None) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.
 
         For solvers of one's own and for measurements; ``solve`` makes it for itself.
+
+        Args:
+            holding: Planes that held nodes hold, or cannot hold, if that is known.
         """
         body = self.body
         assembled = body.refresh(self._states[0])
@@ -248,10 +252,17 @@ class ContactProblem(ProblemStates):
         b, external = body.load()
         last, before = self._states
         starts = [body.taken(self.u.x.array), 2 * last - before]
+        if holding is None and any(contact.plane.free for contact in self.contacts):
+            holding = held_planes(body, self.contacts, last, b)
+        if freedom(self.contacts) != self._freedom:
+            self._unbind()
+            self._freedom = freedom(self.contacts)
         kind = NonlinearStep if body.nonlinear else LoadStep
-        return kind(
+        step = kind(
             body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
         )  # fmt: skip
+        step.holding = holding
+        return step
 
     def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solver.py``.  Collective."""
@@ -267,12 +278,20 @@ class ContactProblem(ProblemStates):
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """A displacement that the solver takes for the solution, and the step that has judged it."""
         step = self.load_step()
+        found = self._found(step)
+        if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
+            for contact in self.contacts:
+                contact.restore()
+            step = self.load_step(step.holding)
+            found = self._found(step)
+        return step, found
 
+    def _found(self, step: LoadStep) -> SolverResult:
         def search() -> SolverResult:
             arguments = self.body, self.contacts, step, self._states[0], self.undetermined
             return found_for(*arguments, self._solved)
 
-        return step, with_friction(self.contacts, step, search, self._renew_laws, self._memory)
+        return with_friction(self.contacts, step, search, self._renew_laws, self._memory)
 
     def _solved(self, step: LoadStep) -> SolverResult:
         with stage("contact: iterations"):
@@ -304,9 +323,6 @@ class ContactProblem(ProblemStates):
             if renew is None or not renew():
                 self._unbind()
             self._laws = laws
-        if freedom(self.contacts) != self._freedom:
-            self._unbind()
-            self._freedom = freedom(self.contacts)
 
     def _present_laws(self) -> list:
         return [contact.friction for contact in self.contacts]

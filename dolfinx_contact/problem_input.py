@@ -232,10 +232,12 @@ def _has_radius(integrand) -> bool:
 def check_axial(contacts) -> None:
     """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
     for contact in contacts:
+        if not contact.axial:
+            continue
         plane = contact.plane
         turns = plane.spins or plane.rotation.any()
         radial = any(not motion.turns and abs(motion.axis[0]) > SQUARE for motion in plane.motions)
-        if (turns or radial) and contact.axial:
+        if turns or radial:
             what = "turn" if turns else "be driven by force along the radius"
             raise ValueError(
                 f"the contact has a weight in proportion to the first coordinate, so bodies are those of revolution, and {plane} cannot "

@@ -53,6 +53,7 @@ class LoadStep:
 
     Attributes:
         planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
+        holding: ``HeldPlanes``, None where held nodes hold none of them.
         statics: ``Statics`` of a body that contact alone holds, else None.
         alone: The displacement without reactions, None where it was not asked for or not found exactly.
     """
@@ -62,7 +63,7 @@ class LoadStep:
         self.b, self.external, self.tol = b, external, tol
         self.planes = driven_planes(body, contacts)
         self._shared = shared_nodes(contacts, stiffness, body.fixed)
-        self.statics = self.alone = None
+        self.statics = self.alone = self.holding = None
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before, self._told = None, 0  # reactions of the state judged before, states told
         self._known = None  # a displacement, and the forces b - K x that it leaves
@@ -260,6 +261,8 @@ class LoadStep:
         self._balance_planes(x, forces, maps)
         for contact, map in zip(self._asked(x, forces), maps):
             contact.respond(x, map)
+        if self.holding is not None:
+            self.holding.share()
 
     def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
         self._respond(x, forces, maps)

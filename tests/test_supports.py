@@ -309,3 +309,134 @@ def test_a_bar_held_along_a_roll_rubs_along_it(by):
         < 1e-4 * contact.force()[2]
     )
     assert contact.force()[1] < -0.299 * total(contact.reaction[:, -1])
+
+
+def pressed_square(free, held="all", solver=None, mu=0.3):
+    """A square below a fixed ceiling, on a plane that force drives; its nodes, or those of a side, held along it."""
+    domain = mesh.create_unit_square(COMM, 4, 4, mesh.CellType.quadrilateral)
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = scenes.elasticity(u, v, 1e3, 0.3)
+    foot, face, top = (
+        mesh.locate_entities_boundary(domain, 1, lambda x, i=i, at=at: np.isclose(x[i], at))
+        for i, at in ((1, 0.0), (0, 0.0), (1, 1.0))
+    )
+    push = fem.Constant(domain, 0.0)
+    if held == "all":
+        along = fem.locate_dofs_geometrical((V.sub(0), V.sub(0).collapse()[0]), lambda x: x[0] < 9)[0]  # fmt: skip
+    else:
+        along = fem.locate_dofs_topological(V.sub(0), 1, face)
+    ceiling = fem.dirichletbc(
+        fem.Constant(domain, 0.0), fem.locate_dofs_topological(V.sub(1), 1, top), V.sub(1)
+    )
+    plane = dc.RigidPlane((0, 0), (0, 1))
+    plane.free = free
+    contact = dc.Contact(V, foot, plane, dc.Friction(mu))
+    bcs = [fem.dirichletbc(push, along, V.sub(0)), ceiling]
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=1e-10), contact, push, plane  # fmt: skip
+
+
+DRIVEN = {"condensed": dc.CondensedNewton(), "fixed point": dc.FixedPoint()}
+
+
+@pytest.mark.parametrize("solver", DRIVEN)
+def test_held_nodes_share_what_drives_a_plane(solver):
+    """All nodes held, the plane pulled: friction in proportion to mu r_n, in balance with the force, whatever the sign."""
+    problem, contact, push, plane = pressed_square(
+        ("t", "n"), solver=DRIVEN[solver], mu=lambda x: 0.2 + 0.2 * x[0]
+    )
+    plane.force = (0.0, 1.0)
+    problem.solve()
+    assert np.abs(contact.reaction[:, 0]).max(initial=0.0) < 1e-12
+    most = total(contact.friction.mu[:, 0] * contact.reaction[:, 1])
+    for pulled in (-0.2, 0.1, 0.99 * most):
+        plane.force = (pulled, 1.0)
+        step = problem.solve()
+        r = contact.reaction
+        share = contact.friction.mu[:, 0] * r[:, 1] * pulled / most
+        assert np.abs(contact.force() - (pulled, 1.0)).max() < 1e-9
+        assert np.abs(r[:, 0] - share).max(initial=0.0) < 1e-9
+        assert step.counts.slip == 0 and abs(plane.displacement[0]) < 1e-15
+        assert total(contact.dissipation) == 0.0
+    push.value = 0.1  # nodes carry the plane along
+    problem.solve()
+    assert abs(plane.displacement[0] - 0.1) < 1e-12
+    assert np.abs(contact.force() - (0.99 * most, 1.0)).max() < 1e-9
+    plane.force = (1.01 * most, 1.0)
+    with pytest.raises(dc.NotConverged, match="slides away"):
+        problem.solve()
+
+
+@pytest.mark.parametrize("solver", DRIVEN)
+def test_a_plane_on_a_spring_slides_past_held_nodes(solver):
+    """Stick until the spring pulls with mu N, then its end runs ahead by mu N / k; its work is mu N a way."""
+    problem, contact, _, plane = pressed_square(("t", "n"), solver=DRIVEN[solver])
+    plane.force, plane.stiffness = (0.0, 1.0), {"t": 10.0}
+    at, worked = 0.0, 0.0
+    for end in (0.02, 0.03, 0.05, 0.1, 0.1, 0.06, 0.0):
+        plane.drive = (end, 0.0)
+        step = problem.solve()
+        before, at = at, np.clip(at, end - 0.03, end + 0.03)
+        worked += 0.3 * abs(at - before)
+        assert abs(plane.displacement[0] - at) < 1e-9
+        assert np.abs(contact.force() - (10 * (end - at), 1.0)).max() < 1e-8
+        assert np.abs(contact.slip_increment + (at - before)).max(initial=0.0) < 1e-9
+        assert abs(total(contact.dissipation) - worked) < 1e-9 and step.error < 1e-9
+
+
+def test_a_plane_slides_past_the_nodes_of_a_held_side():
+    """Nodes of a side held, others elastic: both solvers agree, and the same motion of the plane makes the same reactions."""
+    found = []
+    for solver in DRIVEN:
+        problem, contact, _, plane = pressed_square(("t", "n"), "side", DRIVEN[solver])
+        plane.force = (0.0, 1.0)
+        problem.solve()
+        for pulled in (-0.2, -0.28, 0.1):
+            plane.force = (pulled, 1.0)
+            problem.solve()
+            assert np.abs(contact.force() - (pulled, 1.0)).max() < 1e-8
+            if pulled == -0.2:
+                way, driven = plane.displacement[0], scenes.gathered(contact)[1]
+        found.append(scenes.gathered(contact)[1])
+    assert np.abs(found[0] - found[1]).max() < 1e-8
+    problem, contact, push, plane = pressed_square(("n",), "side")
+    plane.force = (0.0, 1.0)
+    problem.solve()
+    plane.displacement = plane.displacement + (way, 0.0)
+    problem.solve()
+    assert way < 0.0 and np.abs(scenes.gathered(contact)[1] - driven).max() < 1e-8
+
+
+@pytest.mark.parametrize(
+    "free, force", [(("t1", "n"), (0.7, 0.0)), (("t1", "t2", "n"), (0.5, -0.3))]
+)
+def test_held_nodes_in_space_share_along_one_or_two_directions(free, force):
+    """A foot held as a whole carries what drives the plane, in the cone, each node in proportion to its normal force."""
+    axis = (0.6, 0.8, 0.0)
+    problem, contact, head, _ = block(dc.CondensedNewton(), axis, held="all")
+    plane = contact.plane
+    turned = np.array([axis, (-0.8, 0.6, 0.0)])
+    plane.free, plane.force = free, (0.0, 0.0, 10.0)
+    problem.solve()
+    plane.force = (*(np.array(force) @ turned)[:2], 10.0)
+    step = problem.solve()
+    assert np.abs(contact.force() - plane.force).max() < 1e-8
+    assert (contact.load_function <= 1e-9).all() and step.counts.slip == 0
+    ratio = contact.reaction[:, :2] / contact.reaction[:, 2:]
+    mean = np.array([total(contact.reaction[:, k]) for k in (0, 1)]) / 10.0
+    assert np.abs(ratio - mean).max(initial=0.0) < 1e-9
+    plane.force = (*(10 * np.array(force) @ turned)[:2], 10.0)
+    with pytest.raises((dc.NotConverged, ValueError), match="slides"):
+        problem.solve()
+
+
+def test_how_guided_nodes_hold_a_driven_plane_is_not_known():
+    """Nodes free in another direction, and a plane of symmetry across a free motion: refused, and left out it is solved."""
+    problem, contact, head, _ = block(dc.CondensedNewton())
+    drive(head, 0.0, 0.0, -0.01)
+    contact.plane.free, contact.plane.force = ("t1", "n"), (0.0, 0.0, 10.0)
+    with pytest.raises(ValueError, match="Leave these motions out"):
+        problem.solve()
+    contact.plane.free, contact.plane.force = ("t2", "n"), (0.0, 0.1, 10.0)
+    problem.solve()
+    assert np.abs(contact.force()[1:] - (0.1, 10.0)).max() < 1e-8

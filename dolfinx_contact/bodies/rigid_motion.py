@@ -91,8 +91,12 @@ def free_modes(body) -> np.ndarray:
     x = of.x[: of.count, : of.dim]
     modes = of.vectors(rigid_modes(x, np.ones(len(x), dtype=bool), body.comm))
     modes[body.fixed] = 0.0
-    lower = np.linalg.cholesky(body.total(modes.T @ modes))
-    return np.linalg.solve(lower, modes.T).T
+    products = body.total(modes.T @ modes)
+    values, vectors = np.linalg.eigh(products)
+    left = values > ROUNDING * values[-1]
+    if not left.all():  # conditions fix a component of all nodes
+        return modes @ vectors[:, left] / np.sqrt(values[left])
+    return np.linalg.solve(np.linalg.cholesky(products), modes.T).T
 
 
 def extents(displacements) -> tuple[float, float]:

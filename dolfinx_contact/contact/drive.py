@@ -56,6 +56,8 @@ class Drive(Guarded):
         self._rotation = frozen(np.zeros(3 if size == 3 else 1))
         self._drive = frozen(np.zeros(size))
         self._free: tuple[str, ...] = ()
+        self._held: tuple[str, ...] = ()
+        self._past_held = 0.0
         self._ever_free = False  # or said that it is not, although a force is given
         self._force: np.ndarray | None = None
         self._moment: np.ndarray | None = None
@@ -186,14 +188,24 @@ class Drive(Guarded):
         """Turn within a step, for which frames stay those of its start."""
         self._spin = angle
 
+    def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
+        """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held_planes.py``."""
+        self._held, self._past_held = names, past
+
+    @property
+    def past_held(self) -> float:
+        """The sign of a plane's motion past nodes that cannot hold it; zero if there is none."""
+        return self._past_held
+
     @property
     def motions(self) -> list[Motion]:
-        """The free motions, rotations first."""
+        """The free motions that no contact nodes hold, rotations first."""
         if not self._free:
             return []
         axes = self.drive_axes
         about = np.ones((1, 1)) if self.point.size == 2 else axes
         springs = dict(zip(self._free, self.springs.tolist()))
+        springs = {name: k for name, k in springs.items() if name not in self._held}
         turns = [
             Motion(name, axis, True, springs[name])
             for name, axis in zip(self.turnings, about)

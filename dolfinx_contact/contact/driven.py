@@ -25,19 +25,24 @@ APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
 def driven_planes(body, contacts) -> DrivenPlanes | None:
     """The planes that force drives, None where there are none."""
-    return DrivenPlanes(body, contacts) if any(c.plane.free for c in contacts) else None
+    return DrivenPlanes(body, contacts) if any(c.plane.motions for c in contacts) else None
 
 
 def freedom(contacts) -> list[tuple]:
     """Free motions and springs of each contact's plane, which what solvers set up depends on."""
-    planes = [contact.plane for contact in contacts]
-    return [(p.free, p.springs.tolist(), p.guides.tolist()) for p in planes]
+    found = []
+    for contact in contacts:
+        plane = contact.plane
+        motions = [(motion.name, motion.spring) for motion in plane.motions]
+        found.append((motions, plane.guides.tolist(), plane.past_held))
+    return found
 
 
 def check_driven(body, contacts) -> None:
     """Raise a ``ValueError`` on all ranks if what drives a plane makes no sense.  Collective."""
     with raised_together(body.comm):
         for contact in contacts:
+            contact.plane.hold()
             contact.plane.check_drive()
 
 
@@ -64,7 +69,8 @@ class DrivenPlanes:
 
     Attributes:
         count: Number ``m`` of free motions.
-        axes: ``D`` of each contact, ``shape=(n, gdim, m)``, zero for directions in which supports hold a node.
+        axes: ``D`` of each contact, ``shape=(n, gdim, m)``, zero for directions in which supports hold a node, but for nodes
+            that the surface is known to drag along these.
         springs: Stiffness of each motion's spring, ``shape=(m,)``, force per length.
         moved: The motions, ``shape=(m,)``, length units, the same on all ranks.
         plain: Whether all surfaces are planes that do not turn.
@@ -73,7 +79,7 @@ class DrivenPlanes:
 
     def __init__(self, body, contacts):
         self._body, self._contacts = body, contacts
-        self.planes = list({id(c.plane): c.plane for c in contacts if c.plane.free}.values())
+        self.planes = list({id(c.plane): c.plane for c in contacts if c.plane.motions}.values())
         self._home = [plane.displacement for plane in self.planes]
         self._motions = [plane.motions for plane in self.planes]
         ends = np.cumsum([0] + [len(motions) for motions in self._motions])
@@ -97,7 +103,11 @@ class DrivenPlanes:
             if one is plane:
                 for k, motion in enumerate(motions, start=part.start):
                     axes[:, :, k] = contact.carried_by(motion.axis, motion.turns)
+        whole = axes[:, :-1].copy()
         points.without_held(axes[:, :-1])
+        if contact.dragged is not None:
+            rows = contact.dragged.any(axis=1)
+            axes[rows, :-1] = whole[rows]
         axes[points.closed] = 0.0
         return axes
 

@@ -46,6 +46,7 @@ class ContactKinematics(ContactResults):
 
     _placed: Any = None  # ``Placed``
     _free_friction: Any = None  # with what it was made of
+    _dragged: Any = None
     _known: Any = (
         None  # slip that supports prescribe in the present state, None where there is none
     )
@@ -213,6 +214,15 @@ class ContactKinematics(ContactResults):
         return np.zeros_like(self.slip_increment) if self._known is None else self._known
 
     @property
+    def dragged(self) -> np.ndarray | None:
+        """Slip of held nodes past which force drives the surface, ``shape=(n, gdim - 1)``, a direction; None is nowhere."""
+        return self._dragged
+
+    def drag(self, slip: np.ndarray | None) -> None:
+        """From now on held nodes with such a slip have the friction against it, whatever the present one is."""
+        self._dragged = slip
+
+    @property
     def free_friction(self) -> Friction:
         """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
         along = self.points.along
@@ -239,6 +249,8 @@ class ContactKinematics(ContactResults):
         at[at == points.supported.size] = 0
         mine = points.supported[at] == rows
         known, last = self.known_slip[rows], self.last.reaction[rows, :-1]
+        if self.dragged is not None:
+            known = np.where(self.dragged[rows] != 0.0, self.dragged[rows], known)
         friction = self.friction if isinstance(nodes, slice) else self.friction.at(rows)
         return supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
 

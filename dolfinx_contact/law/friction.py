@@ -264,6 +264,10 @@ class Friction(Guarded):
         mu = np.broadcast_to(self.mu[..., : t.shape[1]], t.shape)
         return np.divide(self.along_axes(t), mu, out=np.zeros_like(t), where=mu > 0)
 
+    def along_radii(self, t: np.ndarray) -> np.ndarray:
+        """``M t`` in the local frame, ``shape=(n, T)``."""
+        return self._from_axes(self.mu[..., : t.shape[1]] * self.along_axes(t))
+
     def _resisted(self, slip: np.ndarray, along: np.ndarray) -> tuple:
         """``mu``, ``M^-1 P^2 along`` over the length of ``M^-1 P^2 slip``, and the latter's unit vector: principal directions."""
         T = slip.shape[1]

@@ -145,6 +145,7 @@ class _Answer:
         self.by_predictor[rest] = (guided & ~slips)[rest]
         self.by_R[rest] = (slips * np.sign(tau) * most)[rest]
         self.slips = moved | (guided & slips)
+        self.share = np.where(moved[:, None], -d, 0.0)
 
     def _slipped(self, rows, R, tau, known) -> np.ndarray:
         """``w`` with ``rho w + R f.d(known + w f) + tau = 0``, which grows with w: Newton's steps within an interval."""
@@ -185,7 +186,7 @@ class _Answer:
         f, T = self._f, self._f.shape[1]
         by_reaction = np.zeros((len(nodes), T + 1, T + 1))
         by_reaction[:, :T, :T] = self.by_predictor[:, None, None] * f[:, :, None] * f[:, None, :]
-        by_reaction[:, :T, T] = self.by_R[:, None] * f
+        by_reaction[:, :T, T] = np.where(f.any(axis=1)[:, None], self.by_R[:, None] * f, self.share)
         by_reaction[:, T, T] = 1.0
         by_reaction[~touches] = 0.0
         rates = np.column_stack((np.repeat(self._rho[:, None], T, axis=1), normal))

@@ -30,11 +30,12 @@ class CondensedPlanes:
         self.tied, self._planes = 0, planes
         if planes is None:
             return
-        local = np.einsum("nij,njm->nim", turns, np.concatenate(planes.axes))
-        parts = body.comm.allgather(local.reshape(-1, planes.count))
         self._stiff = planes.springs > stiffness.max()
-        self._stiffest = float(stiffness.max())
-        self._axes, self._springs = np.concatenate(parts), planes.springs
+        self._stiffest, self._springs = float(stiffness.max()), planes.springs
+        both = [_past_held(contact, axes) for contact, axes in zip(contacts, planes.axes)]
+        self._axes, self._pulled = (
+            np.concatenate(body.comm.allgather(_turned(turns, part))) for part in zip(*both)
+        )
         self.tied = int((~self._stiff).sum())
 
     def border(self, W: np.ndarray, nodal: int) -> np.ndarray:
@@ -47,11 +48,11 @@ class CondensedPlanes:
         if self._planes is None:
             return W
         stiff, loose, size = self._stiff, ~self._stiff, len(W)
-        W[:nodal, :nodal] += self._axes[:, stiff] / self._springs[stiff] @ self._axes[:, stiff].T
+        W[:nodal, :nodal] += self._axes[:, stiff] / self._springs[stiff] @ self._pulled[:, stiff].T
         bordered = np.zeros((size + self.tied,) * 2)
         bordered[:size, :size] = W
         bordered[:nodal, size:] = -self._axes[:, loose]
-        bordered[size:, :nodal] = -self._axes[:, loose].T
+        bordered[size:, :nodal] = -self._pulled[:, loose].T
         bordered[size:, size:] = -np.diag(self._springs[loose])
         return bordered
 
@@ -73,7 +74,7 @@ class CondensedPlanes:
             moved, stiff = np.zeros(step.planes.count), self._stiff
             moved[~stiff] = force[len(force) - self.tied :]
             reactions = force[: len(self._axes)]
-            moved[stiff] = -(reactions @ self._axes[:, stiff]) / self._springs[stiff]
+            moved[stiff] = -(reactions @ self._pulled[:, stiff]) / self._springs[stiff]
             step.planes.move_to(self._at_first + moved)
 
     def distances(self, others: list[np.ndarray], q: np.ndarray) -> np.ndarray:
@@ -88,3 +89,19 @@ class CondensedPlanes:
     def driving(self, step) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
         return np.zeros(0) if step.planes is None else step.planes.driving()[~self._stiff]
+
+
+def _turned(turns: np.ndarray, axes) -> np.ndarray:
+    rows = np.einsum("nij,njm->nim", turns, np.concatenate(axes))
+    return rows.reshape(-1, rows.shape[2])
+
+
+def _past_held(contact, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``D``, and what of it the reactions without those along held directions pull by: friction there goes with the normal one."""
+    if contact.dragged is None:
+        return axes, axes
+    moved, rows = axes.copy(), contact.dragged.any(axis=1)
+    moved[rows, :-1] = 0.0
+    pulled, drag = moved.copy(), contact.friction.drag(contact.dragged)
+    pulled[:, -1] -= np.einsum("nt,ntm->nm", drag, axes[:, :-1])
+    return moved, pulled

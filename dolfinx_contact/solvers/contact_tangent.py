@@ -145,7 +145,7 @@ class OnTangent:
     """A solver on the tangent of one body, bound; keeps its ordering."""
 
     def __init__(self, options, body, contacts):
-        if any(contact.plane.free for contact in contacts):
+        if any(contact.plane.motions for contact in contacts):
             raise ValueError(
                 f"{type(options).__name__}() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "
                 "dc.FixedPoint()."

@@ -39,7 +39,7 @@ class ContactPreconditioner:
             self._softened = False
             self.stiffened = body.stiffened(A, S)
         self._A = A
-        followed = body.loose is not None or any(contact.plane.free for contact in contacts)
+        followed = body.loose is not None or any(contact.plane.motions for contact in contacts)
         self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)
         S.destroy()
 
