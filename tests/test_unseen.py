@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem, mesh
 from ring_scenes import INNER, bend, clamp
 from scenes import COMM, elasticity
-from test_surfaces import block
+from test_surfaces import block, by_distance
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace, second_order
@@ -26,12 +26,15 @@ def all_others_are_errors():
         yield
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("radius", [0.003, 0.1])
-def test_a_ball_smaller_than_a_facet_is_told_with_its_depth(d, radius):
+@pytest.mark.parametrize("d, radius, made", [(2, 0.003, "ball"), (3, 0.003, "ball"), (2, 0.1, "ball"), (3, 0.1, "function"), (2, 0.1, "driven")])  # fmt: skip
+def test_a_ball_smaller_than_a_facet_is_told_with_its_depth(d, radius, made):
     """Pressed into the middle of a facet a ball meets no node: 0 N, and the depth that is told is the approach."""
-    middle = np.append(np.full(d - 1, 0.25), -radius)
-    scene = block(dc.RigidSphere(middle, radius), cells=[2] * d)
+    ball = dc.RigidSphere(np.append(np.full(d - 1, 0.25), -radius), radius)
+    scene = block(by_distance(ball) if made == "function" else ball, cells=[2] * d)
+    if (
+        made == "driven"
+    ):  # on a spring along what it may move, which it does not: nothing pushes back
+        ball.free, ball.stiffness = ("y",), 10.0
     with pytest.warns(UserWarning, match=r"goes 0\.0011 into the body between its nodes, near \(0\.25,.* no node feels it"):  # fmt: skip
         scene.step(*np.zeros(d - 1), -0.0011)
     assert scene.contact.force() == pytest.approx(np.zeros(d), abs=1e-12)
