@@ -39,6 +39,9 @@ FAR, STEEP = 0.25, 0.1
 # How often points of a facet are taken about the deepest one, and by how much nearer to each other.
 CLOSER, FACTOR = 3, 0.25
 
+# In how many facets of a rank points are moved: the surface may be slow to ask for distances.
+DEEPEST = 64
+
 
 class Missed(NamedTuple):
     """A length that the nodes of a facet miss; of two the larger one is the larger tuple."""
@@ -208,9 +211,10 @@ def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
 
 def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
     """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
-    rows, half, touch = np.arange(len(x)), 0.5, opened.max(axis=1)[:, None]
-    centre, rule = np.full((len(x), 1, facets.dim), 0.5), 2.0 * gauss(facets.dim) - 1.0
+    half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
+    rule = 2.0 * gauss(facets.dim) - 1.0
     for _ in range(CLOSER):
+        rows, touch = np.arange(len(x)), opened.max(axis=1)[:, None]
         at = np.clip(centre + half * rule, 0.0, 1.0)
         shapes = facets.shapes(at)
         points = shapes @ x
@@ -228,8 +232,10 @@ def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
         needed = facets.size * np.sqrt(part) / 8
         receding = hollow[rows, k] > sunk[rows, k]
         missed = missed.or_more(lengths, points[rows, k], facets.size, needed, receding)
-        deepest = (bulge - above).argmax(axis=1)
-        centre, half = at[rows, deepest][:, None], half * FACTOR
+        depth = bulge - above
+        some = np.argsort(-depth.max(axis=1), kind="stable")[:DEEPEST]
+        centre, half = at[some, depth[some].argmax(axis=1)][:, None], half * FACTOR
+        facets, x, gaps, opened = facets.some(some), x[some], gaps[some], opened[some]
     return missed
 
 

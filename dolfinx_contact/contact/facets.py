@@ -56,7 +56,7 @@ class Facets(NamedTuple):
         return 0.25 * ((hats @ self.curve) * hats).sum(axis=-1) * ~self.sharp[:, None]
 
     def some(self, which: np.ndarray) -> Facets:
-        """Those of them that a mask, ``shape=(m,)``, names."""
+        """Those of them that a mask or indices name."""
         rows = ("nodes", "x", "bend", "curve", "sharp", "size", "outwards")
         return self._replace(**{name: getattr(self, name)[which] for name in rows})
 
