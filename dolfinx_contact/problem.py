@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from itertools import count
 from time import perf_counter
 from typing import Any
 
@@ -22,6 +21,7 @@ from dolfinx_contact.contact.held_planes import HeldPlanes, held_planes
 from dolfinx_contact.nonlinear_step import NonlinearStep
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
+    NUMBERS,
     check_alive,
     check_planes,
     check_size,
@@ -52,7 +52,6 @@ from dolfinx_contact.step import LoadStep, nodal_stiffness
 from dolfinx_contact.unseen import Unseen
 
 LOG = logging.getLogger("dolfinx_contact")
-NUMBERS = count(1)  # of problems, in the order in which they are made: the same on all ranks
 
 
 class ContactProblem(ProblemStates):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 from ufl.classes import Indexed, Product, SpatialCoordinate
@@ -27,6 +28,10 @@ LARGE = 10.0  # a displacement of so many times the size of a body is one in oth
 
 # What to do where a motion of a body that contact alone holds is undetermined.
 UNDETERMINED = ("refused", "nearest")
+
+NUMBERS = count(
+    1
+)  # of problems as they are made, and of times at which surfaces are driven: each larger than the last
 
 
 def checked_contacts(contacts, u) -> tuple[Contact, ...]:
@@ -313,7 +318,7 @@ def check_alive(problem, body, contacts) -> None:
             "go on with that one, or make a Contact for each."
         )
     for plane in {id(contact.plane): contact.plane for contact in contacts}.values():
-        plane.take(problem.number)
+        plane.take(problem.number, next(NUMBERS))
 
 
 def check_step(u, comm, contacts) -> None:

@@ -61,12 +61,39 @@ def test_a_driven_surface_belongs_to_one_problem():
     later = dc.ContactProblem(scene.F, scene.u, [contact], bcs=scene.bcs)
     later.solve()
     for verb in (scene.problem.solve, scene.problem.reset):
-        with pytest.raises(ValueError, match="driven by force in a ContactProblem made later"):
+        with pytest.raises(ValueError, match="driven by force in another ContactProblem"):
             verb()
     later.solve()
     scene.plane.free = ()  # where it stands is still what the later problem has found
     with pytest.raises(ValueError, match="make a surface"):
         scene.problem.solve()
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_surface_that_another_problem_has_driven_since_is_refused(closed):
+    """Two problems made at once, one run after the other: the later one would begin with the shear that the first one found.
+
+    A problem made when the first one has ended begins where it left the surface, with the forces of a surface of its own.
+    """
+
+    first, other = (free_block(("n",), mu=0.3, p=None) for _ in range(2))
+
+    def on_its_surface():
+        contact = dc.Contact(other.V, other.facets, first.plane, dc.Friction(0.3))
+        return contact, dc.ContactProblem(other.F, other.u, [contact], bcs=other.bcs)
+
+    _, made_before = on_its_surface()
+    first.push(0, 0, 1e-3 * E)
+    first.plane.free = ("t1", "n")
+    first.push(2.5e-4 * E, 0, 1e-3 * E)
+    if closed:
+        first.problem.close()
+    first.plane.free = ("n",)
+    with pytest.raises(ValueError, match="driven by force in another ContactProblem"):
+        made_before.solve()
+    contact, made_after = on_its_surface()
+    made_after.solve()
+    assert np.allclose(contact.force(), [0, 0, 1e-3 * E], rtol=0, atol=1e-9 * E)
 
 
 def test_a_surface_driven_by_displacement_may_be_shared():

@@ -63,24 +63,25 @@ class Drive(Guarded):
         self._moment: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
         self._spin: np.ndarray | None = None
-        self._taken = 0
+        self._taken = self._since = 0  # the problem that drove it last, and when
 
-    def take(self, problem: int) -> None:
-        """Let a problem step with the surface: what force has moved belongs to one problem, the one that was made last.
+    def take(self, problem: int, now: int) -> None:
+        """Let a problem step with the surface: what force has moved belongs to the problem that drove it last.
 
         Args:
-            problem: Its number; later ones have larger numbers.
+            problem: Its number; problems made later have larger ones.
+            now: A number larger than that of any problem so far.
 
         Raises:
-            ValueError: a problem that was made later steps with it.
+            ValueError: another problem has driven it since this one was made.
         """
-        if problem < self._taken:
+        if problem != self._taken and problem < self._since:
             raise ValueError(
-                f"{self} is driven by force in a ContactProblem made later, whose motion this one would take for its own: "
+                f"{self} is driven by force in another ContactProblem, whose motion this one would take for its own: "
                 "make a surface and a Contact for each problem."
             )
         if self._free or self._taken:
-            self._taken = problem
+            self._taken, self._since = problem, now
 
     @property
     def directions(self) -> tuple[str, ...]:
