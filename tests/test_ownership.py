@@ -183,6 +183,33 @@ def test_reset_returns_surfaces_to_where_the_problem_found_them(moved_before):
     assert np.allclose(runs[1], runs[0], rtol=0, atol=1e-9 * E)
 
 
+@pytest.mark.parametrize("moved", ["before the contact", "before the problem", "after it"])
+@pytest.mark.parametrize("surface", ["plane", "ball"])
+def test_slip_counts_from_where_the_problem_found_the_surface(surface, moved, monkeypatch):
+    """A surface put aside by far more than sticks: no friction if it was there when the problem was made, mu N if it moved later."""
+    made = dc.RigidPlane((0, 0, 0), (0, 0, 1)) if surface == "plane" else dc.RigidSphere((0, 0, -5000), 5000)  # fmt: skip
+
+    def aside():
+        made.displacement = (0.02, 0, 0.001)
+
+    if moved == "before the contact":
+        aside()
+    problem_of = dc.ContactProblem
+    if moved == "before the problem":
+        monkeypatch.setattr(dc, "ContactProblem", lambda *a, **k: aside() or problem_of(*a, **k))
+    contact, problem, _ = slab(made, dc.Friction(0.3))
+    if moved == "after it":
+        aside()
+    problem.solve()
+    force = contact.force()
+    assert force[2] > 0
+    wanted = 0.3 if moved == "after it" else 0.0
+    uneven = (
+        0.0 if surface == "plane" else 0.02 / 5000 * 0.1 / (4 * 0.001)
+    )  # G of half the slope, over E d / h
+    assert force[0] / force[2] == pytest.approx(wanted, abs=2 * uneven + 1e-7)
+
+
 def slab(surface, friction, centre=(0.0, 0.0), width=0.2, height=0.1):
     """A slab of bricks above z = 0 whose head is moved, its contact and problem."""
     low = [centre[0] - width / 2, centre[1] - width / 2, 0.0]
