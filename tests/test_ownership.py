@@ -286,6 +286,25 @@ def test_grooves_of_a_body_on_a_ball(axis):
     assert force == pytest.approx([0, (0.4 - tilt) / (1 + 0.4 * tilt), 1], abs=0.002)
 
 
+@pytest.mark.parametrize("of", ["body", "surface"])
+def test_grooves_along_a_roll_that_turns_and_shifts(of):
+    """Slip (R w, d) across and along the grooves: friction is P^2 e / |P e| times N for the associated rule, whoever has them."""
+    roll, across, along = dc.RigidCylinder((0, 0, -5000), (0, 1, 0), 5000), 0.005, 0.02
+
+    def grooves(x):
+        return np.stack((0 * x[0], 1 + 0 * x[0], 0 * x[0]))
+
+    contact, problem, held = slab(roll, dc.Friction((0.1, 0.4), axes=grooves, of=of))
+    held.value = (0, 0, -1e-3)
+    for k in range(3):
+        roll.displacement, roll.rotation = (0, along * k, 0), (0, across / 5000 * k, 0)
+        problem.solve()
+    force = contact.force()
+    P2e = np.array([0.16 * across, 0.01 * along])
+    right = P2e / np.hypot(0.4 * across, 0.1 * along)
+    assert force[:2] / force[2] == pytest.approx(right, rel=0.005)
+
+
 def test_grooves_assigned_before_or_after_the_surface_turned():
     """What a field of axes means does not depend on when it was given."""
     forces = []
