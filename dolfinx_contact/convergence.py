@@ -152,7 +152,7 @@ def _checked(compute, accuracy, meshes, halvings) -> float:
         raise ValueError(
             f"compute must be a function of a mesh and a number of parts, got {compute!r}."
         )
-    if len(meshes) < 2:
+    if not hasattr(meshes, "__getitem__") or len(meshes) < 2:
         raise ValueError(f"meshes must be at least two, from the coarsest on, got {meshes!r}.")
     if not isinstance(halvings, (int, np.integer)) or halvings < 0:
         raise ValueError(f"halvings must be a whole number, 0 or more, got {halvings!r}.")

@@ -138,6 +138,8 @@ def test_the_same_mesh_again_is_no_finer_one(meshes):
         dc.converge(lambda n, parts: 1.0, 0.1, meshes)
     with pytest.raises(ValueError, match="not lists or arrays"):
         dc.converge(lambda n, parts: 1.0, 0.1, [[1, 1], [2, 2]])
+    with pytest.raises(ValueError, match="at least two"):
+        dc.converge(lambda n, parts: 1.0, 0.1, (n for n in (1, 2)))
 
 
 def test_runs_that_do_not_differ_are_told_of():

@@ -44,9 +44,9 @@ def test_what_touches_a_rough_plane_is_glued(cells, solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_large_coefficients_are_as_good_as_infinite_ones(solver):
-    """From 1e3 to 1e30, and with infinity, reactions of a block that is sheared until half of it lifts are the same; no more is asked than rounding allows."""
+    """From 1e3 over 1e7, for which sweeps once took minutes, to 1e30, and with infinity, reactions of a block that is sheared until half of it lifts are the same; no more is asked than rounding allows."""
     found = []
-    for mu in (1e3, 1e10, 1e30, INF, (INF, INF)):
+    for mu in (1e3, 1e7, 1e30, INF, (INF, INF)):
         scene = scenes.block(cells=(2, 2, 1), mu=mu, p=None, solver=solver, tol=1e-10)
         for x, z in ((0.0, -0.01), (0.02, -0.001)):
             step = moved(scene, x, z)

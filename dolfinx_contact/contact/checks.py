@@ -94,7 +94,7 @@ def warn_of_percent(friction) -> None:
     if PERCENT[0] < largest < PERCENT[1]:
         warnings.warn(
             f"a coefficient of friction of {largest:g}: it is force over force, so that 30 % is 0.3 and an angle of 30 degrees is "
-            f"tan(30 degrees) = 0.577. For what never slips take {PERCENT[1]:g} or more.",
+            f"tan(30 degrees) = 0.577. For what never slips take inf.",
             stacklevel=4,
         )
 

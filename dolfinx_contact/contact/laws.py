@@ -17,7 +17,7 @@ from dolfinx_contact.contact.checks import (
 )
 from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
 from dolfinx_contact.contact.history import ContactHistory
-from dolfinx_contact.law.friction import Friction, as_friction, is_field
+from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.law.wear import Wear
 
 
@@ -44,6 +44,7 @@ class ContactLaws(ContactHistory):
         else:
             check_law(self.plane, friction, gdim)
             warn_of_percent(friction)
+            friction = at_most_rough(friction)
         self._field, self._begun, self._rested = field, None, None
         self._take_law(friction)
 
@@ -53,7 +54,7 @@ class ContactLaws(ContactHistory):
         with raised_together(self.comm):
             friction = on_nodes(self, field, state, axes)
             check_law(self.plane, friction, gdim, directed(field, gdim))
-        return friction
+        return at_most_rough(friction)
 
     @property
     def textured(self) -> bool:

@@ -81,7 +81,7 @@ class Friction(Guarded):
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
             ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
-            frictionless, infinity perfectly rough: what touches sticks. Or a field, see below.
+            frictionless, infinity perfectly rough: what touches sticks; a contact takes 1e6 for all that is larger. Or a field, see below.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
@@ -314,6 +314,15 @@ class Friction(Guarded):
             p = None if self.associated else np.where(self.mu > 0, self.p, 1.0)
             self._laws[dim] = _kernel.make_law(mu, p, dim, self.axes)
         return self._laws[dim]
+
+
+def at_most_rough(friction: Friction) -> Friction:
+    """The law with ``ROUGH`` for coefficients beyond it, which are as rough, but beside which rounding of slips is large."""
+    if not (friction.mu > ROUGH).any():
+        return friction
+    mu = np.minimum(friction.mu, ROUGH)
+    p = None if friction.associated else np.where(mu > 0, friction.p, 1.0)
+    return Friction(mu, p, axes=friction.axes)
 
 
 def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
