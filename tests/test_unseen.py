@@ -62,7 +62,7 @@ def on_waves(cells, crests, part=0.25):
     height, length, sign = 1e-3, 0.5, 1.0 if crests else -1.0
     plane = dc.RigidPlane((0, 0), (0, 1), height=lambda y: height * (sign * np.cos(2 * np.pi * y[0] / length) - 1))  # fmt: skip
     corners = [np.array([-0.5, 0.0]), np.array([0.5, 1.0])]
-    domain = mesh.create_rectangle(COMM, corners, [cells, cells // 2 or 1], mesh.CellType.quadrilateral)  # fmt: skip
+    domain = mesh.create_rectangle(COMM, corners, [cells, max(cells // 2, 2)], mesh.CellType.quadrilateral)  # fmt: skip
     V = functionspace(domain, ("Lagrange", 1, (2,)))
     u, v = fem.Function(V), ufl.TestFunction(V)
     foot, top = (
