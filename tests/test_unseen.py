@@ -26,10 +26,11 @@ def all_others_are_errors():
         yield
 
 
-@pytest.mark.parametrize("d, radius, made", [(2, 0.003, "ball"), (3, 0.003, "ball"), (2, 0.1, "ball"), (3, 0.1, "function"), (2, 0.1, "driven")])  # fmt: skip
+@pytest.mark.parametrize("d, radius, made", [(2, 0.003, "ball"), (3, 0.003, "ball"), (2, 0.1, "ball"), (3, 0.1, "function"), (2, 0.1, "driven"), (3, 0.1, "roll")])  # fmt: skip
 def test_a_ball_smaller_than_a_facet_is_told_with_its_depth(d, radius, made):
     """Pressed into the middle of a facet a ball meets no node: 0 N, and the depth that is told is the approach."""
-    ball = dc.RigidSphere(np.append(np.full(d - 1, 0.25), -radius), radius)
+    middle = np.append(np.full(d - 1, 0.25), -radius)
+    ball = dc.RigidCylinder(middle, (0, 1, 0), radius) if made == "roll" else dc.RigidSphere(middle, radius)  # fmt: skip
     scene = block(by_distance(ball) if made == "function" else ball, cells=[2] * d)
     if (
         made == "driven"
