@@ -16,7 +16,8 @@ TWO = -n 2 --dist loadfile # processes of pytest on one rank
 RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/test_*.py)
 CORE = $(patsubst %,tests/test_%.py,force history multigrid problem)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
-	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h)
+	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h \
+	cpp/include/dolfinx_contact/*/*.h)
 
 punch: .venv/ready
 	.venv/bin/python -m demos.demo_punch --output results/punch $(ARGS)

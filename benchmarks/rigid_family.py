@@ -163,7 +163,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--smallest", type=int, default=1)
-    parser.add_argument("--largest", type=int, default=1000)
+    parser.add_argument("--largest", type=int, default=300)
     options = parser.parse_args()
     warnings.simplefilter("ignore", dc.RoundingWarning)
     failed = 0

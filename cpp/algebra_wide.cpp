@@ -4,7 +4,7 @@
 // The linear algebra of the condensed solver once more, compiled for processors with more
 // instructions. A module of its own for each set of them: in one with another, the linker would
 // merge inline functions of both.
-#include <dolfinx_contact/condensed_algebra_eigen.h>
+#include <dolfinx_contact/algebra/eigen.h>
 #include <pybind11/pybind11.h>
 
 PYBIND11_MODULE(MODULE, m) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The condensed contact problem on NumPy arrays. The GIL is released while it is solved.
-#include <dolfinx_contact/condensed_solution.h>
+#include <dolfinx_contact/condensed/problem.h>
 
 #include <chrono>
 #include <memory>
@@ -18,7 +18,6 @@ using namespace dolfinx_contact::condensed;
 
 namespace {
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Places = py::array_t<int, py::array::c_style | py::array::forcecast>;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 VectorXd vector(const Array &array, Index size, const char *name) {
@@ -63,26 +62,6 @@ std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied,
 }
 
 /// Of W by columns, the rows of each in order, as SciPy's csc_array has them.
-std::unique_ptr<Operator> make_sparse_operator(const Array &data, const Places &rows,
-                                               const Places &columns, int dim,
-                                               const Algebra &algebra) {
-    const Index size = columns.size() - 1;
-    check_size(size, size, dim, 0);
-    bool good = rows.size() == data.size() && columns.at(0) == 0 && columns.at(size) == data.size();
-    for (Index j = 0; good && j < size; ++j) {
-        const int first = columns.at(j), last = columns.at(j + 1);
-        good = first <= last && last <= rows.size();
-        for (Index k = first; good && k < last; ++k)
-            good =
-                rows.at(k) >= 0 && rows.at(k) < size && (k == first || rows.at(k - 1) < rows.at(k));
-    }
-    if (!good)
-        throw py::value_error("W must be given by columns, with the rows of each in order");
-    return checked_operator(Sparse(Eigen::Map<const Sparse>(size, size, data.size(), columns.data(),
-                                                            rows.data(), data.data())),
-                            dim, 0, algebra);
-}
-
 VectorXd optional(const std::optional<Array> &array) {
     return array ? Eigen::Map<const VectorXd>(array->data(), array->size()) : VectorXd();
 }
@@ -181,11 +160,6 @@ void bind_condensed(py::module_ &m) {
         .def_property_readonly(
             "rounding", [](const Solution &s) { return std::max(s.rounding, s.slip_rounding); })
         .def_readonly("change", &Solution::change)
-        .def_readonly("unsolvable", &Solution::unsolvable)
-        .def_property_readonly("closing",
-                               [](const Solution &s) {
-                                   return py::array_t<double>(s.closing.size(), s.closing.data());
-                               })
         .def_readonly("iterations", &Solution::iterations)
         .def_readonly("seconds", &Solution::seconds)
         .def_readonly("converged", &Solution::converged)
@@ -194,8 +168,6 @@ void bind_condensed(py::module_ &m) {
     py::class_<Operator>(m, "CondensedOperator")
         .def(py::init(&make_operator), py::arg("W"), py::arg("dim"), py::arg("tied") = 0,
              py::arg("algebra") = py::none())
-        .def_static("by_columns", &make_sparse_operator, py::arg("data"), py::arg("rows"),
-                    py::arg("columns"), py::arg("dim"), py::arg("algebra") = py::none())
         .def_property_readonly("dim", &Operator::dim)
         .def_property_readonly("nodes", &Operator::nodes)
         .def_property_readonly("tied", &Operator::tied)

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The linear algebra of the condensed solver, compiled for what every processor can run.
-#include <dolfinx_contact/condensed_algebra_eigen.h>
+#include <dolfinx_contact/algebra/eigen.h>
 
 namespace dolfinx_contact::condensed {
 template const LinearAlgebra &linear_algebra<>();

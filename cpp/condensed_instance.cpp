@@ -3,7 +3,7 @@
 //
 // The condensed solver for TANGENTS tangential directions. Its compilation takes a minute: CMake
 // compiles this file once for each number of directions, at the same time.
-#include <dolfinx_contact/condensed_cascade.h>
+#include <dolfinx_contact/condensed/search.h>
 
 namespace dolfinx_contact::condensed {
 template Solution solve<TANGENTS>(const Operator &, const AnyLaw<TANGENTS> &, const VectorXd &,

@@ -203,28 +203,19 @@ def semismooth() -> None:
 
 def fallbacks() -> None:
     """Ways to a solution, each in the plane of two unknowns."""
-    figure, four = plt.subplots(1, 4, figsize=(8.4, 2.3), layout="constrained")
-    names = "interior point", "continuation", "sweeps", "proximal points"
-    for axes, name in zip(four, names):
+    figure, three = plt.subplots(1, 3, figsize=(6.4, 2.3), layout="constrained")
+    for axes, name in zip(three, ("interior point", "proximal points", "homotopy")):
         axes.set_title(name, color=INK, fontsize=10)
         axes.plot(1, 0.5, "*", color=FORCE, ms=11, zorder=3)
         blank(axes, (-0.15, 1.25), (-0.15, 1.25))
     way = np.linspace(0, 1, 9)
-    inside, path, sweeps, proximal = four
+    inside, proximal, path = three
     inside.fill([0, 1, 1.1, 0], [0, 0.5, 1.2, 1.2], color=CONE, alpha=0.18, lw=0)
     inside.plot([0, 1.2], [0, 0.6], color=CONE)
     inside.plot(0.25 + 0.75 * way, 1.0 - 0.5 * way**2.5, ".-", color=SLIP)
     path.plot(way, 0.1 + 0.9 * way - 0.5 * way**2, ".-", color=SLIP)
     path.text(0.02, -0.1, "easier problem", color=INK, fontsize=9)
     a, b = np.array([[1.0, 0.75], [0.75, 1.0]]), np.array([1.375, 1.25])  # solved by (1, 0.5)
-    x, corners = np.array([0.0, 0.1]), [np.array([0.0, 0.1])]
-    for _ in range(6):
-        for k in (0, 1):
-            x = x.copy()
-            x[k] = (b[k] - a[k, 1 - k] * x[1 - k]) / a[k, k]
-            corners.append(x)
-    sweeps.plot(*np.array(corners).T, ".-", color=SLIP)
-    sweeps.set(xlim=(-0.15, 1.5))
     x, centres = np.array([0.0, 1.1]), [np.array([0.0, 1.1])]
     for _ in range(7):
         x = np.linalg.solve(a + 0.35 * np.eye(2), b + 0.35 * x)

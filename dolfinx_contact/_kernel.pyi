@@ -299,8 +299,6 @@ class CondensedSolution:
     @property
     def change(self) -> float: ...
     @property
-    def closing(self) -> numpy.typing.NDArray[numpy.float64]: ...
-    @property
     def converged(self) -> bool: ...
     @property
     def displacement(self) -> numpy.typing.NDArray[numpy.float64]: ...
@@ -324,18 +322,8 @@ class CondensedSolution:
     def tied(self) -> numpy.typing.NDArray[numpy.float64]: ...
     @property
     def tried(self) -> list[CondensedAttempt]: ...
-    @property
-    def unsolvable(self) -> bool: ...
 
 class CondensedOperator:
-    @staticmethod
-    def by_columns(
-        data: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        columns: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        dim: typing.SupportsInt | typing.SupportsIndex,
-        algebra: typing_extensions.CapsuleType | None = None,
-    ) -> CondensedOperator: ...
     def __init__(
         self,
         W: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],

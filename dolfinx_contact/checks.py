@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 
@@ -51,3 +52,11 @@ def positive(name: str, value, whole: bool = False, finite: bool = False) -> flo
         kind = "whole " if whole else ""
         raise ValueError(f"{name} must be a positive {kind}number, got {value!r}.")
     return number
+
+
+def free_memory() -> float:
+    """Bytes of memory that this machine has free; infinite where it does not say."""
+    try:
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return np.inf

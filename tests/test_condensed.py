@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The condensed operator of a body, and CondensedNewton as solver of a ContactProblem."""
 
+import contextlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -75,7 +77,7 @@ def test_default_falls_back(monkeypatch):
 
 def test_memory_is_estimated_before_it_is_taken(monkeypatch):
     """An operator that would not fit is refused with the alternative named; the default avoids it."""
-    monkeypatch.setattr(compliance, "_available", lambda: 1000.0)
+    monkeypatch.setattr(compliance, "free_memory", lambda: 1000.0)
     with pytest.raises(MemoryError, match="FixedPoint"):
         run(solver=dc.CondensedNewton())
     _, steps = run()
@@ -274,3 +276,22 @@ def test_where_the_second_solver_starts(end, given):
     step.measure = lambda x: Errors(step.error, 0.0, 0.0)
     bound.solve(step)
     assert starts[0] is None and (starts[1] is x if given else starts[1] is None)
+
+
+def test_one_budget_for_all_searches_of_a_step(monkeypatch):
+    """All searches of a step have ``max_seconds`` together: what each may take is what is left, not the whole again."""
+    given, own = [], dc.CondensedNewton.solve_condensed
+
+    def watched(self, *arguments, **options):
+        given.append(self.max_seconds)
+        found = own(self, *arguments, **options)
+        return replace(found, change=1.0)  # the step searches again
+
+    monkeypatch.setattr(dc.CondensedNewton, "solve_condensed", watched)
+    scene = scenes.block(solver=dc.CondensedNewton(max_seconds=25))
+    scene.move_top(0.001, 0.0005, -0.01)
+    with contextlib.suppress(dc.NotConverged):
+        scene.problem.solve()
+    if scene.mesh.comm.rank == 0:
+        assert len(given) > 1
+        assert 25 > given[0] and (np.diff(given) < 0).all()

@@ -4,9 +4,10 @@
 // Each operation of the linear algebra gives what its formula gives, entry by entry in long double,
 // whatever part of the matrix is stored; entries that are not stored are not read.
 #include "random_states.h"
-#include <dolfinx_contact/condensed_matrix.h>
+#include <dolfinx_contact/algebra/square.h>
 #include <gtest/gtest.h>
 #include <limits>
+#include <stdexcept>
 
 using namespace dolfinx_contact::condensed;
 using dolfinx_contact::testing::Random;
@@ -67,28 +68,6 @@ TEST(CondensedAlgebra, Products) {
         }
 }
 
-TEST(CondensedAlgebra, RectangularProductsAndTriangularSolves) {
-    Random random(2);
-    const LinearAlgebra &algebra = linear_algebra();
-    for (const Index size : sizes) {
-        const MatrixXd A = random.matrix(size + 3, size), B = random.matrix(size, 4),
-                       C = random.matrix(size + 3, 4);
-        const VectorXd x = random.vector(size);
-        VectorXd y(size + 3);
-        algebra.multiply(view(A), view(x), result(y));
-        EXPECT_LE(difference(y.cast<Real>(), A.cast<Real>() * x.cast<Real>()), 1e-13);
-        MatrixXd found = C;
-        algebra.subtract_product(result(found), view(A), view(B));
-        EXPECT_LE((found - (C - A * B)).norm(), 1e-12 * (1.0 + C.norm()));
-        const MatrixXd U = MatrixXd::Identity(size, size) * static_cast<double>(size + 1) +
-                           random.matrix(size, size);
-        found = B;
-        algebra.solve_triangular(view(only(U, Part::upper)), result(found));
-        EXPECT_LE((MatrixXd(U.triangularView<Eigen::Upper>()) * found - B).norm(),
-                  1e-13 * (1.0 + B.norm()));
-    }
-}
-
 TEST(CondensedAlgebra, Inverses) {
     Random random(3);
     const LinearAlgebra &algebra = linear_algebra();
@@ -115,7 +94,8 @@ TEST(CondensedAlgebra, Inverses) {
 TEST(CondensedAlgebra, SolutionsOfRegularAndSingularSystems) {
     Random random(4);
     for (const Index size : {1, 3, 40, 127, 128, 200}) { // in single precision from 128 on
-        const auto solver = linear_algebra().solver();
+        const Poll poll;
+        const auto solver = linear_algebra().solver(poll);
         MatrixXd J = random.matrix(size, size) + 10.0 * MatrixXd::Identity(size, size);
         const VectorXd rhs = random.vector(size);
         VectorXd y;
@@ -135,8 +115,28 @@ TEST(CondensedAlgebra, SolutionsOfRegularAndSingularSystems) {
             null.head(2) << 1.0, -1.0;
             EXPECT_LE((J.transpose() * (J * y - rhs)).norm(), 1e-9 * J.norm() * rhs.norm());
             EXPECT_LE(std::abs(null.dot(y)), 1e-12 * y.norm());
-            linear_algebra().least_squares(view(J), view(rhs), result(shortest));
+            shortest = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(J).solve(rhs);
             EXPECT_LE((shortest - y).norm(), 1e-10 * y.norm());
         }
     }
+}
+
+// A factorisation asks again and again whether to go on, ends at once if not, and is right if so.
+TEST(CondensedAlgebra, FactorisationsCanBeEnded) {
+    Random random(5);
+    const MatrixXd J = random.matrix(700, 700);
+    int asked = 0, most = 1'000'000;
+    const Poll poll = [&] {
+        if (++asked == most)
+            throw std::runtime_error("enough");
+    };
+    const auto solver = linear_algebra().solver(poll);
+    ASSERT_TRUE(solver->factor(J));
+    const int times = asked;
+    EXPECT_GE(times, 10);
+    const VectorXd b = random.vector(700);
+    EXPECT_LE((J * solver->again(b) - b).norm(), 1e-9 * b.norm());
+    most = asked + times / 2;
+    EXPECT_THROW(solver->factor(J), std::runtime_error);
+    EXPECT_EQ(asked, most);
 }

@@ -4,9 +4,9 @@
 /// extended precision, inverses with tied rows.
 #include "random_states.h"
 #include <dolfinx_contact/bipotential.h>
-#include <dolfinx_contact/condensed_exact.h>
-#include <dolfinx_contact/condensed_judge.h>
-#include <dolfinx_contact/condensed_operator.h>
+#include <dolfinx_contact/condensed/exact.h>
+#include <dolfinx_contact/condensed/judge.h>
+#include <dolfinx_contact/condensed/operator.h>
 #include <dolfinx_contact/slip_rule.h>
 #include <gtest/gtest.h>
 

@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 from petsc4py import PETSc
 
+from dolfinx_contact.checks import free_memory
 from dolfinx_contact.petsc.linear_solver import check_solved, mumps_factors
 
 UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
@@ -94,24 +93,15 @@ def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
 def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
     """Bytes that W and its inverse take, with what is needed beside them: an upper bound, docs/solvers.md.
 
-    W is copied once; with its inverse it then needs half of that, and a Jacobian with its factors, or
-    those of the fixed point among the fallbacks, the rest.  Beside W, solving for a block was measured
+    W is copied once; with its inverse it then needs a third of that, and a Jacobian with its factors the rest.  Beside W, solving for a block was measured
     to take six times what its solutions take.
     """
     return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
 
 
-def _available() -> float:
-    """Bytes of memory that this machine has free; infinite where it does not say."""
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return np.inf
-
-
 def _available_first(comm) -> float:
     """What rank 0 has free, which holds W, on all ranks.  Collective."""
-    return comm.bcast(_available() if comm.rank == 0 else None)
+    return comm.bcast(free_memory() if comm.rank == 0 else None)
 
 
 def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:

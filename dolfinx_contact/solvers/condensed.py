@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import warnings
 from collections import deque
+from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
@@ -131,6 +132,7 @@ class CondensedBody:
             step: The ``LoadStep``.
             start: Not used: reactions of earlier steps are better starts.
         """
+        self._until = perf_counter() + self._options.max_seconds  # of all searches together
         held, first, free = self._held_by.solve, self.dim * self.nodes, self._begin(step)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
         q = self._motion(step, free)
@@ -277,7 +279,8 @@ class CondensedBody:
 
     def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
-        options = type(self._options)(**vars(self._options) | limits)
+        left = {"max_seconds": max(self._until - perf_counter(), 1e-9)}
+        options = type(self._options)(**vars(self._options) | left | limits)
 
         def solve(monitor):
             try:

@@ -4,11 +4,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from dolfinx_contact.checks import finite
+from dolfinx_contact.checks import finite, free_memory
 from dolfinx_contact.law.friction import Friction, as_friction
 
 
@@ -60,16 +58,17 @@ def checked_problem(q, W, friction, r0) -> tuple:
     return q, W, friction, r0
 
 
-def checked_compliance(W) -> Any:
-    """``W`` as an array, that of the user if it is of the type; or by columns, sorted, if it is sparse."""
+def checked_compliance(W) -> np.ndarray:
+    """``W`` as an array, that of the user if it is of the type; a sparse one with its zeros."""
     if not hasattr(W, "tocsc"):
         return finite("W", W, copy=False)
-    given, W = W, W.tocsc()
-    finite("W", W.data, copy=False)
-    W = W.astype(np.float64, copy=W is given)
-    W.sum_duplicates()
-    W.eliminate_zeros()
-    return W
+    needed, free = 8 * 5 * W.shape[0] * W.shape[1], free_memory()
+    if needed > free:
+        raise MemoryError(
+            f"W is solved as a dense matrix, which takes about {needed / 1e9:.1f} GB with its factors, {free / 1e9:.1f} GB "
+            "are free: piles of thousands of rigid contacts need a solver that is made for them, as Siconos is."
+        )
+    return finite("W", W.toarray(), copy=False)
 
 
 def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:

@@ -26,11 +26,5 @@ def widest_algebra() -> Any:
 
 
 def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
-    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones.
-
-    A sparse ``W`` is by columns, sorted, and has no tied rows.
-    """
-    kernel, algebra = _kernel.CondensedOperator, widest_algebra()
-    if hasattr(W, "indptr"):
-        return kernel.by_columns(W.data, W.indices, W.indptr, dim, algebra)
-    return kernel(W, dim, tied, algebra)
+    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones."""
+    return _kernel.CondensedOperator(W, dim, tied, widest_algebra())

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.checks import RoundingWarning, positive
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.condensed_input import (
-    checked_compliance,
     checked_problem,
     principal_axes,
 )
@@ -105,7 +104,7 @@ class CondensedNewton:
         result = CondensedResult(
             found.reaction, found.displacement, found.status, found.error, found.slip_error,
             found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
-            found.tied, found.unsolvable, found.closing, found.local_error,
+            found.tied, found.local_error,
         )  # fmt: skip
         if not found.converged:
             raise CondensedNotConverged(result)
@@ -153,9 +152,8 @@ def solve_condensed(
     but below ``rounding`` is returned with a ``RoundingWarning``: double precision has no better one.
 
     Args:
-        W: Compliance, ``shape=(3n, 3n)``, length per force; dense or a SciPy sparse matrix.  May be
-            rank-deficient and slightly unsymmetric.  Of 64 contacts or more it is kept without its
-            zeros if no more than a fifth of its entries are others, however it was given.
+        W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
+            rank-deficient and slightly unsymmetric.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
         friction: A ``Friction``, or a number, of coefficients for all contacts, or ``shape=(n, 2)`` for each; or an array of one
             coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
@@ -210,7 +208,9 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     """
     cheap = solver.fallbacks and q.size <= 100
     most = min(solver.max_iterations, 100 * solver.newton_iterations)
-    finer = CondensedNewton(**vars(solver) | {"slip_tol": None, "max_iterations": most})
+    left = max(solver.max_seconds - found.seconds, 1e-3)
+    options = {"slip_tol": None, "max_iterations": most, "max_seconds": left}
+    finer = CondensedNewton(**vars(solver) | options)
 
     def again(tol, fallbacks, **limits):
         finer.fallbacks = fallbacks
@@ -241,14 +241,9 @@ def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return np.einsum("nij,nj->ni", turns, vectors)
 
 
-def _turned_matrix(W: Any, turns: np.ndarray) -> Any:
+def _turned_matrix(W: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """``W`` along the principal axes."""
     n, dim, _ = turns.shape
-    if not isinstance(W, np.ndarray):
-        from scipy.sparse import block_diag
-
-        by_contact = block_diag(list(turns), format="csc")
-        return checked_compliance(by_contact @ W @ by_contact.T)
     blocks = W.reshape(n, dim, n, dim)
     return np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
 

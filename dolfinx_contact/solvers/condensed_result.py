@@ -40,12 +40,9 @@ class CondensedResult:
             is far more than the error.  It knows nothing of other solutions.
         iterations: Of all methods tried.
         seconds: Wall time of all methods tried.
-        branch: The method of the cascade that gave the answer.
+        branch: The method that gave the answer.
         tried: All that were tried, in order.
         tied: Forces of the tied rows of a kernel operator, if it has any.
-        unsolvable: Of a failure: it is proved that there is no solution, by normal forces that move nothing while
-            contacts close against them, or by trying every state of a few contacts in two dimensions.
-        closing: Those normal forces, ``shape=(n,)``, the largest one; empty if there is no such proof.
 
     Example:
         >>> found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
@@ -65,8 +62,6 @@ class CondensedResult:
     branch: str
     tried: tuple[Attempt, ...] = field(repr=False)
     tied: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
-    unsolvable: bool = False
-    closing: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
     local_error: float = 0.0
 
 
@@ -87,20 +82,11 @@ class CondensedNotConverged(RuntimeError):
     def __init__(self, best: CondensedResult) -> None:
         self.best, self.tried = best, best.tried
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
-        proof = "none of the states of the contacts is one"
-        if closing := [str(i) for i in np.flatnonzero(best.closing > 1e-3)]:
-            which = ", ".join(closing[:6]) + (", ..." if len(closing) > 6 else "")
-            proof = f"contacts {which} close whatever the reactions are, as those of a body between planes that come together"
-        advice = (
-            f"There is no solution: {proof}."
-            if best.unsolvable
-            else "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
-            "few degrees of freedom may have no solution at all."
-        )
         super().__init__(
             f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
             f"{best.iterations} iterations and {best.seconds:.3g} s. Tried (iterations): {methods}. "
-            + advice
+            "Smaller load steps, or a start r0 near the solution, help most often; a body of too "
+            "few degrees of freedom may have no solution at all."
         )
 
     def __reduce__(self) -> tuple:

@@ -5,5 +5,5 @@
 /// compile.
 #pragma once
 
-#include "condensed_algebra_eigen.h"
-#include "condensed_cascade.h"
+#include "algebra/eigen.h"
+#include "condensed/search.h"

@@ -1,14 +1,13 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_system.h
+/// @file system.h
 /// The contact problem condensed to the contact nodes, w = q + W r, in the scaled variables in
 /// which every law is the isotropic one with unit friction, and its residual after Alart and
 /// Curnier.
 #pragma once
 
-#include "condensed_pattern.h"
-#include "condensed_rank.h"
-#include "law.h"
+#include "../law.h"
+#include "operator.h"
 
 namespace dolfinx_contact::condensed {
 /// The coefficients of friction of all nodes, (n, T); the metric of a scaled variable needs no
@@ -41,17 +40,17 @@ template <int T> struct System {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    const Square *W;                      // physical
-    const Square *inverse;                // of W, or null
-    const Pattern *pattern = nullptr;     // of W, if sparse
-    const LazyProduct *product = nullptr; // of W, where it may be of low rank
-    VectorXd q;                           // physical
+    const Square *W;       // physical
+    const Square *inverse; // of W, or null
+    const Poll *poll;      // of long factorisations
+    VectorXd q;            // physical
     VectorXd left, right;
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction
     Index nodes, tied;        // tied rows come last: w_c = 0, r_c of any sign
     bool accurate = false;    // displacements in twice the precision
-    double shift = 0.0;       // added to the diagonal of W at contacts; physical
+    VectorXd own;             // compliance of each contact to its own normal reaction; physical
+    double shift = 0.0;       // added to the diagonal of W at contacts, over `own`
 
     Index size() const { return D * nodes + tied; }
 
@@ -65,22 +64,20 @@ template <int T> struct System {
         const VectorXd forces = right.cwiseProduct(dr);
         return left.cwiseProduct(*W * forces + shifted(forces));
     }
-    VectorXd shifted(VectorXd forces) const {
-        forces *= shift;
-        forces.tail(tied).setZero();
-        return forces;
+    /// What `shift` adds to a displacement.
+    VectorXd shifted(const VectorXd &forces) const {
+        VectorXd moved = VectorXd::Zero(size());
+        for (Index i = 0; i < nodes && shift > 0.0; ++i)
+            moved.template segment<D>(D * i) = shift * own[i] * forces.template segment<D>(D * i);
+        return moved;
     }
     VectorXd change_of_reaction(const VectorXd &dw) const {
         return (*inverse * VectorXd(dw.cwiseQuotient(left))).cwiseQuotient(right);
     }
 
     /// Metric of the residual: rho_n = 10 / W_nn and rho_t = 1 / max(W_xx, W_yy). The normal and
-    /// the tangential step want their own. A contact whose coefficients are far apart slips in the
-    /// direction of the small one, which that metric hardly sees: `between` the two,
-    /// 1 / sqrt(W_xx W_yy), Newton's method converges more seldom, but where the other one does
-    /// not.
-    void set_metric(bool between = false) {
-        constexpr double normal = 10.0, tangential = 1.0, negligible = 1e-12;
+    /// the tangential step want their own.
+    void set_metric() {
         const VectorXd diagonal = left.array() * W->diagonal().array().abs() * right.array().abs();
         double mean = 0.0;
         for (Index i = 0; i < nodes; ++i)
@@ -89,20 +86,16 @@ template <int T> struct System {
         rho_t.setOnes(nodes);
         for (Index i = 0; i < nodes; ++i) {
             // a node that its own reaction does not move takes part in the others' scale
-            const double floor = negligible * (mean > 0.0 ? mean : 1.0);
-            rho_n[i] = normal / std::max(diagonal[D * i + T], floor);
+            const double floor = Tuning::negligible * (mean > 0.0 ? mean : 1.0);
+            rho_n[i] = Tuning::rho_n / std::max(diagonal[D * i + T], floor);
             if constexpr (T > 0) {
                 const auto of = [i](const VectorXd &v) {
                     return v.template segment<T>(D * i).array();
                 };
                 const double per_scale = mean / (left[D * i + T] * right[D * i + T]);
-                const double floor_t = negligible * (per_scale > 0.0 ? per_scale : 1.0) *
+                const double floor_t = Tuning::negligible * (per_scale > 0.0 ? per_scale : 1.0) *
                                        (of(left) * of(right)).maxCoeff();
-                const double smallest = of(diagonal).minCoeff(),
-                             largest = std::max(of(diagonal).maxCoeff(), floor_t);
-                rho_t[i] = tangential / (between && smallest > negligible * largest
-                                             ? std::sqrt(largest * smallest)
-                                             : largest);
+                rho_t[i] = Tuning::rho_t / std::max(of(diagonal).maxCoeff(), floor_t);
             }
         }
     }

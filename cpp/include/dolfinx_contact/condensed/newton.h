@@ -1,54 +1,14 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_newton.h
+/// @file newton.h
 /// Globalised semismooth Newton method for the condensed contact problem.
 #pragma once
 
-#include "condensed_direction.h"
-#include "condensed_solution.h"
-#include <chrono>
+#include "budget.h"
+#include "direction.h"
 #include <deque>
 
 namespace dolfinx_contact::condensed {
-/// Why an attempt ended.
-enum class End { converged, line_search, stalled, iterations, seconds, not_finite };
-
-/// Iterations and seconds that all attempts share.
-struct Budget {
-    using Clock = std::chrono::steady_clock;
-    const Options &options;
-    Clock::time_point start = Clock::now();
-    int iterations = 0;
-
-    double seconds() const { return std::chrono::duration<double>(Clock::now() - start).count(); }
-    bool late() const { return seconds() >= options.max_seconds; }
-    /// Asked in every iteration, so the place where others may end them.
-    bool spent() const {
-        if (options.heed)
-            options.heed();
-        return iterations >= options.max_iterations || late();
-    }
-
-    /// The iterate r for who wants to see it, its residual over the largest reaction or one.
-    template <int T> void tell(const State<T> &state, const VectorXd &r) const {
-        if (!options.monitor)
-            return;
-        std::array<int, 3> counts{};
-        for (const auto &point : state.points)
-            ++counts[static_cast<std::size_t>(point.branch)];
-        options.monitor(std::sqrt(2.0 * state.merit) /
-                            std::max(1.0, r.template lpNorm<Eigen::Infinity>()),
-                        counts);
-    }
-    template <int T> void tell(const System<T> &system, const VectorXd &r) const {
-        if (!options.monitor)
-            return;
-        State<T> state;
-        state.evaluate(system, r, system.displacement(r));
-        tell(state, r);
-    }
-};
-
 /// Newton's method on the residual of a System with a nonmonotone line search
 /// [L. Grippo, F. Lampariello, S. Lucidi, SIAM J. Numer. Anal. 23 (1986)].
 template <int T> class Newton {
@@ -56,9 +16,10 @@ template <int T> class Newton {
     explicit Newton(const System<T> &system) : system_(system), direction_(system) {}
 
     /// Iterates from r until certified(r) holds for the reactions that the law returns. It is asked
-    /// once the residual is below `target`, relative to the largest reaction or to one.
+    /// once the residual is below `target`, relative to the largest reaction or to one. Whether it
+    /// does; else r is the iterate of the smallest residual.
     template <class Certify>
-    End solve(VectorXd &r, double target, Budget &budget, int max_iterations, Certify certified) {
+    bool solve(VectorXd &r, double target, Budget &budget, int max_iterations, Certify certified) {
         VectorXd &w = w_;
         VectorXd best = r;
         w = system_.displacement(r);
@@ -66,37 +27,33 @@ template <int T> class Newton {
         state_.evaluate(system_, r, w);
         std::deque<double> memory{state_.merit};
         double smallest = state_.merit;
-        constexpr int patience = 12; // iterations without progress: it goes around in a circle
         for (int iteration = 0, in_vain = 0;; ++iteration, ++in_vain) {
             if (!std::isfinite(state_.merit)) {
                 r = best;
-                return End::not_finite;
+                return false;
             }
             budget.tell(state_, r);
             const double size = std::max(1.0, r.template lpNorm<Eigen::Infinity>());
             if (std::sqrt(2.0 * state_.merit) <= target * size) {
                 if (certified(state_.mapped())) {
                     at_ = r;
-                    return End::converged;
+                    return true;
                 }
                 w = system_.displacement(r); // without the rounding of steps
                 state_.evaluate(system_, r, w);
             }
-            if (iteration == max_iterations || budget.spent()) {
+            if (iteration == max_iterations || in_vain > Tuning::newton_patience ||
+                budget.spent()) {
                 r = best;
-                return iteration < max_iterations && budget.late() ? End::seconds : End::iterations;
-            }
-            if (in_vain > patience) {
-                r = best;
-                return End::stalled;
+                return false;
             }
             ++budget.iterations;
             if (!advance(r, w, *std::max_element(memory.begin(), memory.end()))) {
                 r = best;
-                return End::line_search;
+                return false;
             }
             memory.push_back(state_.merit);
-            if (memory.size() > 8)
+            if (memory.size() > Tuning::newton_memory)
                 memory.pop_front();
             if (state_.merit < smallest) {
                 smallest = state_.merit;
@@ -126,11 +83,11 @@ template <int T> class Newton {
     /// Jacobian, along which is searched.
     bool advance(VectorXd &r, VectorXd &w, double reference) {
         using Factors = typename Direction<T>::Factors;
-        constexpr double enough = 1e-2; // of the merit
-        const bool near = direction_.worth_keeping() && state_.merit <= enough * factored_at_;
+        const bool near =
+            direction_.worth_keeping() && state_.merit <= Tuning::kept_factors * factored_at_;
         VectorXd dr, dw;
         if (direction_.find(state_, r, w, dr, dw, near ? Factors::last : Factors::present)) {
-            if (try_step(r, w, dr, dw, 1.0, enough * state_.merit))
+            if (try_step(r, w, dr, dw, 1.0, Tuning::kept_factors * state_.merit))
                 return true;
             direction_.find(state_, r, w, dr, dw);
         }
@@ -152,10 +109,9 @@ template <int T> class Newton {
 
     bool line_search(VectorXd &r, VectorXd &w, const VectorXd &dr, const VectorXd &dw,
                      double reference) {
-        constexpr double decrease = 1e-4, shortest = 1e-5;
         const double slope = 2.0 * state_.merit;
-        for (double length = 1.0; length >= shortest; length *= 0.5)
-            if (try_step(r, w, dr, dw, length, reference - decrease * length * slope))
+        for (double length = 1.0; length >= Tuning::shortest_step; length *= 0.5)
+            if (try_step(r, w, dr, dw, length, reference - Tuning::decrease * length * slope))
                 return true;
         return false;
     }

@@ -1,25 +1,24 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_operator.h
+/// @file operator.h
 /// W with what is derived from it once.
 #pragma once
 
-#include "condensed_system.h"
+#include "../algebra/square.h"
+#include "../tuning.h"
 #include <algorithm>
 #include <optional>
 
 namespace dolfinx_contact::condensed {
 /// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse when
-/// that begins to pay. A sparse one is kept without its zeros. Of one that is not, if it is
-/// symmetric to the last bit, one triangle is kept, and its inverse by Cholesky in the other
-/// triangle of the same array, which has one column more; else both are whole.
+/// that begins to pay. If it is symmetric to the last bit, one triangle is kept, and its inverse by
+/// Cholesky in the other triangle of the same array, which has one column more; else both are
+/// whole.
 ///
 /// The last `tied` rows are bilateral: w_c = 0, r_c of any sign. Of them W may be indefinite or
 /// zero.
 class Operator {
   public:
-    static constexpr Index many = 64; ///< contacts from which zeros and a low rank of W pay
-
     /// W is copied; `algebra` outlives the operator; D = `dim` rows of a contact, tangential
     /// components first. D = 1 is contact without friction, of which the normal rows alone are
     /// needed.
@@ -28,20 +27,12 @@ class Operator {
              const LinearAlgebra &algebra = linear_algebra())
         : size_(W.rows()), tied_(tied), dim_(dim), exponent_(Power::to_one(W)), algebra_(algebra),
           symmetric_((W.array() == W.transpose().array()).all()) {
-        if (!zeros_pay() || !take_sparse(W))
-            take_dense(W);
-    }
-    Operator(const Sparse &W, int dim, Index tied = 0,
-             const LinearAlgebra &algebra = linear_algebra())
-        : size_(W.rows()), tied_(tied), dim_(dim), exponent_(Power::to_one(W.coeffs())),
-          algebra_(algebra), symmetric_(is_symmetric(W)), sparse_(W) {
-        if (!zeros_pay() || !is_sparse(sparse_.nonZeros())) {
-            take_dense(MatrixXd(sparse_));
-            sparse_ = {};
-        } else {
-            scale_sparse();
-            set_sparse();
-        }
+        values_.resize(size_, size_ + (symmetric_ ? 1 : 0));
+        if (symmetric_)
+            values_.rightCols(size_).template triangularView<Eigen::Upper>() = Power(exponent_)(W);
+        else
+            values_ = Power(exponent_)(W);
+        W_.emplace(square(values_.data() + (symmetric_ ? size_ : 0), Part::upper));
     }
     Operator(const Operator &) = delete; // views look into it
 
@@ -62,28 +53,10 @@ class Operator {
         for (Index c = 0; c < tied_; ++c)
             rows.push_back(dim_ * nodes() + c);
         const auto size = static_cast<Index>(rows.size());
-        if (pattern_) {
-            normal_sparse_.resize(size, size);
-            for (Index j = 0; j < size; ++j) {
-                normal_sparse_.startVec(j);
-                const auto &contacts = pattern_->moved_by(j);
-                for (std::size_t a = 0; a < contacts.size(); ++a)
-                    normal_sparse_.insertBack(contacts[a], j) =
-                        pattern_->block<1>(j, static_cast<Index>(a)).value();
-            }
-            normal_sparse_.finalize();
-            return normal_.emplace(normal_sparse_, symmetric_, algebra_);
-        }
         normal_values_ = W_->dense()(rows, rows);
         return normal_.emplace(normal_values_.data(), size, size,
                                symmetric_ ? Part::lower : Part::all, algebra_);
     }
-
-    /// W as a product, if its rank is low.
-    const LazyProduct &product() const { return *product_; }
-
-    /// Null if W is not sparse.
-    const Pattern *pattern() const { return pattern_ ? &*pattern_ : nullptr; }
 
     /// Mean magnitude of the normal compliance of a contact.
     double mean_normal() const { return W_->mean_magnitude(dim_ - 1, nodes(), dim_); }
@@ -102,10 +75,9 @@ class Operator {
     /// Inverts W, so that Newton's method may eliminate sticking nodes. For many solves.
     /// Returns whether W was regular enough, and positive definite if symmetric, but for tied rows.
     bool prepare() {
-        constexpr double smallest_rcond = 1e-12;
         if (inverse_ || size_ == 0)
             return true;
-        if (symmetric_ && !pattern_) {
+        if (symmetric_) {
             auto lower = values_.leftCols(size_);
             lower.triangularView<Eigen::Lower>() = values_.rightCols(size_).transpose();
             if (!algebra_.invert(result(lower), Part::lower, tied_))
@@ -116,53 +88,12 @@ class Operator {
             algebra_.invert(result(inverse_values_), Part::all, tied_);
             inverse_.emplace(inverse_values_.data(), size_, size_, Part::all, algebra_);
         }
-        if (!(inverse_->norm() * W_->norm() < 1.0 / smallest_rcond))
+        if (!(inverse_->norm() * W_->norm() < 1.0 / Tuning::smallest_rcond))
             inverse_.reset();
         return inverse_.has_value();
     }
 
   private:
-    /// Whether W may be stored as a sparse one: of many contacts.
-    bool zeros_pay() const { return nodes() >= many && tied_ == 0; }
-    /// Whether so few entries are not zero.
-    bool is_sparse(Index entries) const {
-        constexpr Index densest = 5;
-        return entries * densest <= size_ * size_;
-    }
-    static bool is_symmetric(const Sparse &W) {
-        const Sparse transposed = W.transpose();
-        return (W - transposed).eval().coeffs().isZero(0.0);
-    }
-    template <class Derived> void take_dense(const Eigen::MatrixBase<Derived> &W) {
-        values_.resize(size_, size_ + (symmetric_ ? 1 : 0));
-        if (symmetric_)
-            values_.rightCols(size_).template triangularView<Eigen::Upper>() = Power(exponent_)(W);
-        else
-            values_ = Power(exponent_)(W);
-        set(square(values_.data() + (symmetric_ ? size_ : 0), Part::upper));
-    }
-    /// The entries that are not zero, if they are few.
-    template <class Derived> bool take_sparse(const Eigen::MatrixBase<Derived> &W) {
-        if (!is_sparse((W.array() != 0.0).count()))
-            return false;
-        sparse_ = W.sparseView(0.0, 0.0);
-        scale_sparse();
-        set_sparse();
-        return true;
-    }
-    void scale_sparse() {
-        for (double &value : sparse_.coeffs())
-            value = Power(exponent_)(value);
-    }
-    void set_sparse() {
-        pattern_.emplace(sparse_, dim_);
-        set(Square(sparse_, symmetric_, algebra_));
-    }
-    void set(const Square &W) {
-        W_.emplace(W);
-        product_.emplace(*W_);
-    }
-
     Square square(const double *values, Part triangle) const {
         return {values, size_, size_, symmetric_ ? triangle : Part::all, algebra_};
     }
@@ -172,13 +103,9 @@ class Operator {
     const LinearAlgebra &algebra_;
     bool symmetric_;
     MatrixXd values_, inverse_values_;
-    Sparse sparse_;
     std::optional<Square> W_;
-    std::optional<LazyProduct> product_;
-    std::optional<Pattern> pattern_;
     std::optional<Square> inverse_;
     mutable MatrixXd normal_values_;
-    mutable Sparse normal_sparse_;
     mutable std::optional<Square> normal_;
 };
 

@@ -1,48 +1,43 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_interior.h
+/// @file interior_point.h
 /// Primal-dual interior point method for second-order cones: it needs no rank of W and finds its
 /// way through very many states of contacts. A start for Newton's method.
 #pragma once
 
-#include "condensed_blocks.h"
-#include "condensed_newton.h"
+#include "budget.h"
 #include <algorithm>
+#include <memory>
 
 namespace dolfinx_contact::condensed {
 /// r and y in the cone C = {|v_t| <= v_n}, orthogonal, and (y_t, y_n - |y_t|^2 / y_n) = q + W r.
 /// This is the law, since y_n = |y_t| on the boundary of C, and smooth inside. Predictor and
 /// corrector [S. Mehrotra, SIAM J. Optim. 2 (1992)] in the scaling of Y. E. Nesterov and M. J. Todd
-/// [SIAM J. Optim. 8 (1998)].
+/// [SIAM J. Optim. 8 (1998)]. Tied rows are linear equations, q + W r = 0. Of a contact without
+/// friction r_t and y_t stay zero.
 template <int T> class InteriorPoint {
   public:
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
     using Block = Eigen::Matrix<double, D, D>;
 
-    explicit InteriorPoint(const System<T> &system) : system_(system), linear_(system) {}
-
-    /// Whether there are no tied rows and no contacts without friction beside others with it.
-    static bool applies(const System<T> &system) {
-        const auto smooth = std::count(system.smooth.begin(), system.smooth.end(), true);
-        return system.tied == 0 && smooth == (T == 0 ? system.nodes : 0);
-    }
+    explicit InteriorPoint(const System<T> &system)
+        : system_(system), linear_(system.W->algebra().solver(*system.poll)) {}
 
     /// Reactions near a solution, or where steps have become too short.
     VectorXd run(Budget &budget) {
-        constexpr double accuracy = 1e-11, shortest = 1e-4, inside = 0.99;
-        constexpr int max_iterations = 50;
         const auto n = static_cast<double>(system_.nodes);
         r_ = VectorXd::Zero(system_.size());
         for (Index i = 0; i < system_.nodes; ++i)
             r_[D * i + T] = 1.0;
         y_ = r_;
-        for (int k = 0; k < max_iterations && !budget.spent(); ++k, ++budget.iterations) {
+        for (int k = 0; k < Tuning::interior_iterations && !budget.spent();
+             ++k, ++budget.iterations) {
             linearise();
             budget.tell(system_, r_);
-            const double gap = r_.dot(y_) / n, size = r_.norm();
-            if (rest_.norm() < accuracy * size &&
-                gap < accuracy * std::max(1.0, size / std::sqrt(n)))
+            const double gap = r_.dot(y_) / n, size = r_.head(D * system_.nodes).norm();
+            if (rest_.norm() < Tuning::interior_accuracy * size &&
+                gap < Tuning::interior_accuracy * std::max(1.0, size / std::sqrt(n)))
                 break;
             VectorXd dr, dy;
             if (!direction(0.0, dr, dy, dr, dy))
@@ -53,9 +48,9 @@ template <int T> class InteriorPoint {
             VectorXd first = dr, second = dy;
             direction(centre * gap, first, second, dr, dy);
             const double length =
-                std::min({1.0, inside * longest(r_, dr), inside * longest(y_, dy)});
+                std::min({1.0, Tuning::inside * longest(r_, dr), Tuning::inside * longest(y_, dy)});
             const VectorXd r = r_ + length * dr, y = y_ + length * dy;
-            if (!(length > shortest) || !interior(r) || !interior(y))
+            if (!(length > Tuning::interior_shortest) || !interior(r) || !interior(y))
                 break;
             r_ = r;
             y_ = y;
@@ -81,6 +76,7 @@ template <int T> class InteriorPoint {
         x.template head<T>() = (b.template head<T>() - x[T] * v.template head<T>()) / v[T];
         return x;
     }
+    bool smooth(Index i) const { return system_.smooth[static_cast<std::size_t>(i)]; }
     static Node at(const VectorXd &v, Index i) { return v.template segment<D>(D * i); }
     bool interior(const VectorXd &v) const {
         for (Index i = 0; i < system_.nodes; ++i)
@@ -109,7 +105,7 @@ template <int T> class InteriorPoint {
     /// y.
     void linearise() {
         const VectorXd w = system_.displacement(r_);
-        rest_.resize(w.size());
+        rest_ = w; // that of tied rows
         for (auto *blocks : {&P_, &inverse_, &E_})
             blocks->resize(static_cast<std::size_t>(system_.nodes));
         for (Index i = 0; i < system_.nodes; ++i) {
@@ -117,6 +113,8 @@ template <int T> class InteriorPoint {
             const Node r = at(r_, i), y = at(y_, i);
             const Eigen::Matrix<double, T, 1> t = y.template head<T>() / y[T];
             rest_.segment<D>(D * i) = at(w, i) - y;
+            if (smooth(i))
+                rest_.segment<T>(D * i).setZero();
             rest_[D * i + T] += y[T] * t.squaredNorm();
             E_[k].setIdentity();
             E_[k].row(T).template head<T>() = -2.0 * t.transpose();
@@ -143,7 +141,7 @@ template <int T> class InteriorPoint {
     /// above zero is of the corrector, which has the predictor's products and factors.
     bool direction(double target, const VectorXd &predicted_r, const VectorXd &predicted_y,
                    VectorXd &dr, VectorXd &dy) {
-        VectorXd c(r_.size()), rhs = -rest_;
+        VectorXd c = VectorXd::Zero(r_.size()), rhs = -rest_;
         for (Index i = 0; i < system_.nodes; ++i) {
             const auto k = static_cast<std::size_t>(i);
             const Node lambda = P_[k] * at(r_, i);
@@ -155,13 +153,15 @@ template <int T> class InteriorPoint {
             c.segment<D>(D * i) = P_[k] * quotient(lambda, b);
             rhs.segment<D>(D * i) += E_[k] * at(c, i);
         }
-        if (target == 0.0 && !factors())
-            return false;
-        dr = linear_.solve(rhs);
+        if (target == 0.0)
+            factors();
+        dr = linear_->again(rhs);
         if (!dr.allFinite())
             return false;
         dy = c;
         for (Index i = 0; i < system_.nodes; ++i) {
+            if (smooth(i)) // what stands there is the slip
+                dr.template segment<T>(D * i).setZero();
             const auto &P = P_[static_cast<std::size_t>(i)];
             dy.segment<D>(D * i) -= P * (P * at(dr, i));
         }
@@ -169,16 +169,20 @@ template <int T> class InteriorPoint {
     }
 
     /// Of W + E P^2.
-    bool factors() {
-        std::vector<Block> blocks(P_.size());
-        for (std::size_t k = 0; k < P_.size(); ++k)
-            blocks[k] = E_[k] * P_[k] * P_[k];
-        return linear_.factor(blocks);
+    void factors() {
+        MatrixXd J = system_.left.asDiagonal() * system_.W->dense() * system_.right.asDiagonal();
+        for (Index i = 0; i < system_.nodes; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            if (smooth(i))
+                J.middleCols<T>(D * i).setZero();
+            J.block<D, D>(D * i, D * i) += E_[k] * P_[k] * P_[k];
+        }
+        linear_->factor(J);
     }
 
     const System<T> &system_;
+    std::unique_ptr<LinearSolver> linear_;
     VectorXd r_, y_, rest_;
     std::vector<Block> P_, inverse_, E_;
-    BlockSolver<T> linear_;
 };
 } // namespace dolfinx_contact::condensed

@@ -1,10 +1,10 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_matrix.h
+/// @file square.h
 /// W and its inverse: a symmetric pair shares one array, a triangle each.
 #pragma once
 
-#include "condensed_algebra.h"
+#include "linear_algebra.h"
 #include <cmath>
 #include <vector>
 
@@ -35,31 +35,22 @@ class Power {
     double half_, rest_;
 };
 
-/// A square matrix of which all or, if it is symmetric, one triangle is stored, or all entries but
-/// the zeros; a view.
+/// A square matrix of which all or, if it is symmetric, one triangle is stored; a view.
 class Square {
   public:
     Square(const double *values, Index size, Index stride, Part part,
            const LinearAlgebra &algebra = linear_algebra())
         : values_(values, size, size, Eigen::OuterStride<>(stride)), part_(part),
           algebra_(&algebra) {}
-    Square(const Sparse &sparse, bool symmetric, const LinearAlgebra &algebra = linear_algebra())
-        : values_(nullptr, sparse.rows(), sparse.cols(), Eigen::OuterStride<>(sparse.rows())),
-          part_(symmetric ? Part::upper : Part::all), sparse_(&sparse), algebra_(&algebra) {}
 
     Index size() const { return values_.rows(); }
     bool symmetric() const { return part_ != Part::all; }
-    const Sparse *sparse() const { return sparse_; } ///< null if it is stored as a dense one
     const LinearAlgebra &algebra() const { return *algebra_; }
-    VectorXd diagonal() const {
-        return sparse_ != nullptr ? VectorXd(sparse_->diagonal()) : VectorXd(values_.diagonal());
-    }
+    VectorXd diagonal() const { return values_.diagonal(); }
 
     VectorXd operator*(const VectorXd &x) const {
         if (x.isZero(0.0))
             return VectorXd::Zero(size());
-        if (sparse_ != nullptr)
-            return *sparse_ * x;
         VectorXd y(size());
         algebra_->multiply(values_, part_, view(x), result(y));
         return y;
@@ -69,8 +60,6 @@ class Square {
     VectorXd magnitudes(const VectorXd &x) const {
         if (x.isZero(0.0))
             return VectorXd::Zero(size());
-        if (sparse_ != nullptr)
-            return sparse_->cwiseAbs() * x.cwiseAbs();
         VectorXd y(size());
         algebra_->magnitudes(values_, part_, view(x), result(y));
         return y;
@@ -79,24 +68,17 @@ class Square {
     /// b + A x in twice the precision; some ten times the time of a product.
     VectorXl accurate(const VectorXd &b, const VectorXd &x) const {
         VectorXd high = b, low = VectorXd::Zero(size());
-        if (sparse_ != nullptr)
-            algebra_->multiply_accurately(view(*sparse_), view(x), result(high), result(low));
-        else
-            algebra_->multiply_accurately(values_, part_, view(x), result(high), result(low));
+        algebra_->multiply_accurately(values_, part_, view(x), result(high), result(low));
         return high.cast<Real>() + low.cast<Real>();
     }
 
     double operator()(Index i, Index j) const {
-        if (sparse_ != nullptr)
-            return sparse_->coeff(i, j);
         const bool transposed = part_ == Part::lower ? i < j : part_ == Part::upper && i > j;
         return transposed ? values_(j, i) : values_(i, j);
     }
 
     /// All entries.
     MatrixXd dense() const {
-        if (sparse_ != nullptr)
-            return *sparse_;
         if (part_ == Part::lower)
             return values_.selfadjointView<Eigen::Lower>();
         if (part_ == Part::upper)
@@ -104,16 +86,13 @@ class Square {
         return values_;
     }
 
-    /// First and last + 1 of the rows of column j that are stored; works for blocks, too. Not of a
-    /// sparse one.
+    /// First and last + 1 of the rows of column j that are stored; works for blocks, too.
     std::pair<Index, Index> stored(Index j, Index rows) const {
         return condensed::stored(part_, j, rows);
     }
 
     /// The entries that couple node i to node j; of a symmetric matrix only where they are stored.
     template <int D> Eigen::Matrix<double, D, D> block(Index i, Index j) const {
-        if (sparse_ != nullptr)
-            return sparse_->block(D * i, D * j, D, D).toDense();
         Eigen::Matrix<double, D, D> found = values_.block<D, D>(D * i, D * j);
         if (i == j && part_ == Part::lower)
             found = Eigen::Matrix<double, D, D>(found.template selfadjointView<Eigen::Lower>());
@@ -131,9 +110,7 @@ class Square {
     /// Largest sum of magnitudes in a column.
     double norm() const {
         VectorXd sums = VectorXd::Zero(size());
-        if (sparse_ != nullptr)
-            sums = sparse_->cwiseAbs().transpose() * VectorXd::Ones(size());
-        for (Index j = 0; j < size() && sparse_ == nullptr; ++j) {
+        for (Index j = 0; j < size(); ++j) {
             const auto [first, last] = stored(j, size());
             const auto column = values_.col(j).segment(first, last - first).cwiseAbs();
             if (symmetric()) {
@@ -148,7 +125,6 @@ class Square {
   private:
     MatrixView values_;
     Part part_;
-    const Sparse *sparse_ = nullptr;
     const LinearAlgebra *algebra_;
 };
 } // namespace dolfinx_contact::condensed

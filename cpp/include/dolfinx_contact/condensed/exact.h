@@ -1,12 +1,12 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_exact.h
+/// @file exact.h
 /// The law of a contact in extended precision, for the judge: what it measures is to be the error
 /// of the reactions, not of the measurement. Written apart from the projection that solvers use.
 #pragma once
 
-#include "condensed_matrix.h"
-#include "friction.h"
+#include "../algebra/square.h"
+#include "../friction.h"
 
 namespace dolfinx_contact::condensed {
 /// A contact's reaction r and motion w (T tangential components, then the normal one), and what the

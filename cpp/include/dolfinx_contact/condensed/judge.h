@@ -1,12 +1,12 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_judge.h
+/// @file judge.h
 /// The errors of a state, over the forces that act in it, and the rounding below which nothing can
 /// be asked.
 #pragma once
 
-#include "condensed_exact.h"
-#include "condensed_solution.h"
+#include "exact.h"
+#include "problem.h"
 #include <stdexcept>
 
 namespace dolfinx_contact::condensed {
@@ -24,7 +24,7 @@ template <int P> class Judge {
           given_(scales.tangential.size() > 0) {
         const Index n = op.nodes();
         const VectorXd diagonal = op.W().diagonal();
-        const double floor = 1e-12 * op.mean_normal();
+        const double floor = Tuning::negligible * op.mean_normal();
         floor_ = floor > 0.0 ? floor : 1.0;
         kappa_ = checked(scales.stiffness, n, "stiffness");
         tied_ = checked(scales.tied, op.tied(), "tied_stiffness");
@@ -63,7 +63,8 @@ template <int P> class Judge {
         Left left = measure(s, w, size);
         const double contacts = s.reaction.head(D * op_.nodes()).stableNorm();
         s.acting = std::max(std::min(contacts, load_), external_);
-        s.near_rounding = eps * std::max(left.size, left.slip_size) > 1e-2 * tol_ * s.acting;
+        s.near_rounding =
+            eps * std::max(left.size, left.slip_size) > Tuning::near_rounding * tol_ * s.acting;
         if (s.near_rounding && !free) {
             w = op_.W().accurate(q_, s.reaction);
             left = measure(s, w, size);
@@ -94,51 +95,8 @@ template <int P> class Judge {
         return std::isfinite(error) && std::isfinite(rounding) && error <= std::max(tol, rounding);
     }
 
-    /// Whether normal forces y >= 0 of the contacts prove that no reactions are accepted. Accepted
-    /// ones r are below those that grow without bound, and leave gaps above -(1 + mu) error S /
-    /// kappa, with S at most the load, so that no error below `seen` hides y w_n = q y + (W' y) r <
-    /// 0. Not for tied rows.
-    bool excludes(const VectorXd &y, double tol) const {
-        constexpr double seen = 1e-6;
-        if (y.size() == 0 || op_.tied() > 0 || !y.allFinite())
-            return false;
-        VectorXd forces = VectorXd::Zero(q_.size());
-        double hidden = 0.0;
-        for (Index i = 0; i < y.size(); ++i) {
-            forces[D * i + P] = y[i];
-            hidden += y[i] / kappa_[i];
-        }
-        const double acting = std::max(load_, external_);
-        hidden *= std::max(seen, tol) * (1.0 + largest_mu()) * acting;
-        return -q_.dot(forces) > hidden + moved(forces) * acting / std::sqrt(eps);
-    }
-
   private:
     static constexpr double eps = std::numeric_limits<double>::epsilon();
-
-    /// |W' f|, summed in twice the precision.
-    double moved(const VectorXd &forces) const {
-        const VectorXd zero = VectorXd::Zero(forces.size());
-        if (op_.W().symmetric())
-            return static_cast<double>(op_.W().accurate(zero, forces).norm());
-        const MatrixXd transposed = op_.W().dense().transpose();
-        const Square W(transposed.data(), zero.size(), zero.size(), Part::all, op_.W().algebra());
-        return static_cast<double>(W.accurate(zero, forces).norm());
-    }
-
-    double largest_mu() const {
-        double largest = 0.0;
-        std::visit(
-            [&](const auto &source) {
-                for (Index i = 0; i < op_.nodes(); ++i) {
-                    const auto &law = source(static_cast<std::size_t>(i));
-                    for (int c = 0; c < std::decay_t<decltype(law)>::tangents; ++c)
-                        largest = std::max<double>(largest, law.mu(c));
-                }
-            },
-            law_);
-        return largest;
-    }
 
     /// What the law and the slip rule leave, and the size of the terms of which it is the
     /// difference; forces, Euclidean over all contacts. The largest of a contact over its own

@@ -1,27 +1,24 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_scaling.h
+/// @file scaling.h
 /// From a problem in physical variables to a System in scaled ones, and back.
 #pragma once
 
-#include "condensed_operator.h"
+#include "system.h"
 
 namespace dolfinx_contact::condensed {
-/// How the problem is put. Where coefficients of friction are far apart, another metric of the
-/// residual, between the two of a contact; and besides units of force and length of each contact.
-enum class Form { usual, metric_between, units_of_contacts };
-
 /// P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Scaling {
   public:
     static constexpr int D = T + 1;
 
-    Scaling(const Operator &op, const AnyLaw<P> &law, const VectorXd &q)
-        : op_(op), q_(q), coefficients_(law, op.nodes()) {
+    Scaling(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Poll &poll)
+        : op_(op), q_(q), poll_(poll), coefficients_(law, op.nodes()) {
         set_length(free_length());
     }
 
     Index nodes() const { return op_.nodes(); }
+    Index tied() const { return op_.tied(); }
     Index size() const { return D * op_.nodes() + op_.tied(); }
     auto contact_part(const VectorXd &v) const { return v.head(D * op_.nodes()); }
 
@@ -34,23 +31,6 @@ template <int T, int P> class Scaling {
             return r;
         set_length(length_ * largest);
         return r / largest;
-    }
-
-    /// From now on this form. None changes the law or an error.
-    void take(Form form) { form_ = form; }
-    Form form() const { return form_; }
-    /// Whether compliances that friction scales differ a hundredfold.
-    bool far_apart() const {
-        constexpr double far = 1e2;
-        const System<T> system = make();
-        const VectorXd scale = system.left.cwiseProduct(system.right);
-        double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
-        for (Index i = 0; i < op_.nodes() && T > 0; ++i)
-            if (!system.smooth[static_cast<std::size_t>(i)]) {
-                smallest = std::min(smallest, scale.template segment<T>(D * i).minCoeff());
-                largest = std::max(largest, scale.template segment<T>(D * i).maxCoeff());
-            }
-        return largest > far * smallest;
     }
 
     /// Physical reactions of P + 1 components in scaled variables.
@@ -80,8 +60,7 @@ template <int T, int P> class Scaling {
         system.tied = op_.tied();
         system.W = T == P ? &op_.W() : &op_.normal();
         system.inverse = T == P ? op_.inverse() : nullptr;
-        system.pattern = op_.pattern();
-        system.product = T == P && system.inverse == nullptr ? &op_.product() : nullptr;
+        system.poll = &poll_;
         const Index size = system.size();
         system.left.resize(size);
         system.right.resize(size);
@@ -107,32 +86,14 @@ template <int T, int P> class Scaling {
             system.left[D * op_.nodes() + c] = tied_scale(c) / length_;
             system.q[D * op_.nodes() + c] = q_[(P + 1) * op_.nodes() + c];
         }
-        if (form_ == Form::units_of_contacts)
-            set_units_of_contacts(system);
-        else if (unlike())
+        set_own(system);
+        if (unlike(system.own))
             even_out(system);
-        system.set_metric(form_ != Form::usual);
+        system.set_metric();
         return system;
     }
 
   private:
-    /// Whether normal compliances differ a hundredfold.
-    bool unlike() const {
-        constexpr double far = 1e2;
-        const auto normal = op_.W().diagonal()(Eigen::seqN(Index{P}, op_.nodes(), Index{P + 1}));
-        return op_.nodes() > 0 && normal.minCoeff() > 0.0 &&
-               normal.maxCoeff() > far * normal.minCoeff();
-    }
-    /// Units of each contact, in which all have the same normal compliance: else those that are
-    /// soft or bear little hardly count beside others.
-    void even_out(System<T> &system) const {
-        const VectorXd diagonal = op_.W().diagonal();
-        for (Index i = 0; i < op_.nodes(); ++i) {
-            const double unit = std::sqrt(op_.mean_normal() / diagonal[(P + 1) * i + P]);
-            system.left.template segment<D>(D * i) *= unit;
-            system.right.template segment<D>(D * i) *= unit;
-        }
-    }
     /// mu with its ratio to the mean of all directions to a power.
     double bent(Index i, int c, double power) const {
         const double mu = coefficients_.mu(i, c);
@@ -141,17 +102,25 @@ template <int T, int P> class Scaling {
         const double mean = std::exp(coefficients_.mu.row(i).log().mean());
         return mean * std::pow(mu / mean, power);
     }
-    /// No scaled compliance larger than the mean normal one: coefficients far above one make such.
-    void set_units_of_contacts(System<T> &system) const {
-        const VectorXd scale = system.left.cwiseProduct(system.right),
-                       compliance = scale.cwiseProduct(system.W->diagonal());
-        const double mean = scale[T] * op_.mean_normal();
+    void set_own(System<T> &system) const {
+        const double mean = op_.mean_normal(), least = Tuning::negligible * mean;
+        const VectorXd diagonal = op_.W().diagonal();
+        system.own.resize(op_.nodes());
         for (Index i = 0; i < op_.nodes(); ++i) {
-            const double largest = compliance.template segment<D>(D * i).maxCoeff();
-            if (!(largest > mean))
-                continue;
-            for (VectorXd *units : {&system.left, &system.right})
-                units->template segment<D>(D * i) *= std::sqrt(mean / largest);
+            const double own = diagonal[(P + 1) * i + P];
+            system.own[i] = own > least ? own : mean;
+        }
+    }
+    static bool unlike(const VectorXd &own) {
+        return own.size() > 0 && own.maxCoeff() > Tuning::unlike * own.minCoeff();
+    }
+    /// Units of each contact, in which all have the same normal compliance: else those that are
+    /// soft or bear little hardly count beside others.
+    void even_out(System<T> &system) const {
+        for (Index i = 0; i < op_.nodes(); ++i) {
+            const double unit = std::sqrt(op_.mean_normal() / system.own[i]);
+            system.left.template segment<D>(D * i) *= unit;
+            system.right.template segment<D>(D * i) *= unit;
         }
     }
     void set_length(double length) {
@@ -179,8 +148,8 @@ template <int T, int P> class Scaling {
 
     const Operator &op_;
     const VectorXd &q_;
+    const Poll &poll_;
     Coefficients<P> coefficients_;
     double length_ = 1.0, force_ = 1.0;
-    Form form_ = Form::usual;
 };
 } // namespace dolfinx_contact::condensed

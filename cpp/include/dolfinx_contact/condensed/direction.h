@@ -1,10 +1,10 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_direction.h
+/// @file direction.h
 /// Newton's direction: the nodes' linearised problems put together and solved.
 #pragma once
 
-#include "condensed_step.h"
+#include "node_step.h"
 
 namespace dolfinx_contact::condensed {
 template <int T> class Direction {
@@ -13,7 +13,7 @@ template <int T> class Direction {
     using Node = Eigen::Matrix<double, D, 1>;
 
     explicit Direction(const System<T> &system)
-        : system_(system), linear_(system.W->algebra().solver()) {}
+        : system_(system), linear_(system.W->algebra().solver(*system.poll)) {}
 
     /// Which factors: of the present Jacobian; of the last one, if its nodes had the same states
     /// and elimination; the same for a step that is not taken, which leaves out dw.
@@ -111,56 +111,13 @@ template <int T> class Direction {
     /// costs no more than a regular one.
     VectorXd factored(const Square &matrix, const VectorXd &left, const VectorXd &right,
                       Index unknowns, const VectorXd &rhs) {
-        constexpr double small_shift = 1e-9;
-        if (&matrix == system_.W && system_.pattern != nullptr)
-            return factored_sparse(unknowns, rhs, small_shift * mean_normal());
         for (VectorXd y;; singular_ = true) { // a second time at most
-            const double shift = singular_ ? small_shift * mean_normal() : 0.0;
-            assemble(matrix, unknowns, system_.shift + shift);
+            assemble(matrix, unknowns, system_.shift + (singular_ ? Tuning::regularisation : 0.0));
             tie(matrix, left, right);
             if (linear_->solve(J_, rhs, y, singular_) || singular_)
                 return y;
         }
     }
-    /// The same of a sparse W, always with a shift.
-    VectorXd factored_sparse(Index unknowns, const VectorXd &rhs, double shift) {
-        std::vector<Index> position(static_cast<std::size_t>(system_.nodes), -1);
-        for (std::size_t a = 0; a < active_.size(); ++a)
-            position[static_cast<std::size_t>(active_[a])] = static_cast<Index>(a);
-        VectorXd y;
-        for (int tries = 0; tries < 4; ++tries, shift *= 1e2) {
-            Eigen::SparseMatrix<double> J(unknowns, unknowns);
-            std::vector<Index> rows; // contacts that take part in column j
-            std::vector<Eigen::Matrix<double, D, D>> column;
-            for (std::size_t b = 0; b < active_.size(); ++b) {
-                const Index j = active_[b];
-                rows.clear();
-                column.clear();
-                const std::vector<Index> &contacts = system_.pattern->moved_by(j);
-                for (std::size_t c = 0; c < contacts.size(); ++c)
-                    if (const Index i = contacts[c], a = in(position, i); a >= 0) {
-                        auto block = system_.pattern->template block<D>(j, static_cast<Index>(c));
-                        if (i == j)
-                            block.diagonal().array() += system_.shift + shift;
-                        rows.push_back(i);
-                        column.emplace_back(in(to_, a) * block * from_[b]);
-                        if (i == j)
-                            column.back() += in(steps_, i).G;
-                    }
-                for (int k = 0; k < in(steps_, j).m; ++k) {
-                    J.startVec(offset(j) + k);
-                    for (std::size_t a = 0; a < rows.size(); ++a)
-                        for (int l = 0; l < in(steps_, rows[a]).m; ++l)
-                            J.insertBack(offset(rows[a]) + l, offset(j) + k) = column[a](l, k);
-                }
-            }
-            J.finalize();
-            if (linear_->solve(J, rhs, y))
-                return y;
-        }
-        return VectorXd::Zero(unknowns);
-    }
-    double mean_normal() const { return system_.W->mean_magnitude(T, system_.nodes, D); }
 
     /// Rows and columns of J of tied rows, which are the last ones.
     void tie(const Square &matrix, const VectorXd &left, const VectorXd &right) {
@@ -195,7 +152,7 @@ template <int T> class Direction {
                 Eigen::Matrix<double, D, D> block =
                     matrix.template block<D>(in(active_, a), in(active_, b));
                 if (a == b)
-                    block.diagonal().array() += shift;
+                    block.diagonal().array() += shift * system_.own[in(active_, a)];
                 couple(a, b, block);
                 if (matrix.symmetric() && a != b)
                     couple(b, a, block.transpose());

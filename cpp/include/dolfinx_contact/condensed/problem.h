@@ -1,18 +1,19 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_solution.h
+/// @file problem.h
 /// What goes into the solution of a condensed problem, and what comes out. The definition of
-/// `solve`, whose compilation takes a minute, is in condensed_cascade.h.
+/// `solve`, whose compilation takes a minute, is in search.h.
 #pragma once
 
-#include "condensed_operator.h"
+#include "../law.h"
+#include "operator.h"
 #include <array>
 #include <functional>
 #include <string>
 #include <vector>
 
 namespace dolfinx_contact::condensed {
-/// One entry of the cascade that was tried.
+/// One method that was tried.
 struct Attempt {
     std::string branch;
     bool converged;
@@ -31,9 +32,7 @@ struct Solution {
     double change = none; ///< of the reactions in Newton's next step, over `acting`
     double acting = 0.0;  ///< the force that errors are relative to
     bool near_rounding = false;
-    bool unsolvable = false; ///< proved: no state of the contacts is a solution
-    VectorXd closing; ///< normal forces that prove it, of each contact, the largest one; or none
-    Index tied = 0;   ///< how many of the reactions
+    Index tied = 0; ///< how many of the reactions
     int iterations = 0;
     double seconds = 0.0;
     bool converged = false;

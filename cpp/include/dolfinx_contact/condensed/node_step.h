@@ -1,10 +1,10 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_step.h
+/// @file node_step.h
 /// The linearised contact problem of a node, with the unknowns eliminated that it gives directly.
 #pragma once
 
-#include "condensed_system.h"
+#include "system.h"
 
 namespace dolfinx_contact::condensed {
 /// One Newton step of a node, with y the unknowns that are left. By compliance

@@ -1,12 +1,12 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_algebra.h
+/// @file linear_algebra.h
 /// The linear algebra that takes most of the solver's time, behind an interface: it alone is
 /// compiled once for each set of instructions.
 #pragma once
 
 #include <Eigen/Dense>
-#include <Eigen/Sparse>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -14,13 +14,11 @@ namespace dolfinx_contact::condensed {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Sparse = Eigen::SparseMatrix<double>;
 
 /// Arrays cross the interface as views: what is compiled for other instructions does not allocate
 /// in the same way.
 using VectorView = Eigen::Map<const VectorXd>;
 using MatrixView = Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>;
-using SparseView = Eigen::Map<const Sparse>;
 using VectorResult = Eigen::Map<VectorXd>;
 using MatrixResult = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
 
@@ -34,10 +32,9 @@ template <class Matrix> MatrixResult result(Eigen::DenseBase<Matrix> &A) {
     return {A.derived().data(), A.rows(), A.cols(),
             Eigen::OuterStride<>(A.derived().outerStride())};
 }
-/// Compressed.
-inline SparseView view(const Sparse &A) {
-    return {A.rows(), A.cols(), A.nonZeros(), A.outerIndexPtr(), A.innerIndexPtr(), A.valuePtr()};
-}
+
+/// Called every few tenths of a second; what it throws ends a factorisation.
+using Poll = std::function<void()>;
 
 /// Solves J y = rhs and keeps the factors.
 class LinearSolver {
@@ -46,23 +43,14 @@ class LinearSolver {
     LinearSolver(const LinearSolver &) = delete;
     virtual ~LinearSolver() = default;
 
-    /// Factors of J, regular, in double precision.
-    void factor(const MatrixXd &J) { take(view(J)); }
-    /// Of a sparse one, compressed; false if it is singular.
-    bool factor(const Sparse &J) { return take(view(J)); }
+    /// Factors of J in double precision; false if it is singular.
+    bool factor(const MatrixXd &J) { return take(view(J)); }
 
     /// J of few unknowns may be singular: the shortest of the solutions that fit best is taken
     /// then. Of many unknowns a singular one is refused, unless it is `regularised`.
     bool solve(const MatrixXd &J, const VectorXd &rhs, VectorXd &y, bool regularised) {
         y.resize(rhs.size());
         return solve(view(J), view(rhs), result(y), regularised);
-    }
-    /// J sparse; false if it is singular.
-    bool solve(const Sparse &J, const VectorXd &rhs, VectorXd &y) {
-        if (!factor(J))
-            return false;
-        y = again(rhs);
-        return y.allFinite();
     }
     /// With the factors of the last matrix; those in single precision are not refined.
     VectorXd again(const VectorXd &rhs) const {
@@ -71,14 +59,11 @@ class LinearSolver {
         return y;
     }
 
-    /// The entries of sparse factors over those of dense ones.
-    virtual double fill() const = 0;
-    /// Whether there are factors of many unknowns: in single precision, or sparse ones.
+    /// Whether there are factors of many unknowns, in single precision.
     virtual bool of_many() const = 0;
 
   protected:
-    virtual void take(const MatrixView &J) = 0;
-    virtual bool take(const SparseView &J) = 0;
+    virtual bool take(const MatrixView &J) = 0;
     virtual bool solve(const MatrixView &J, const VectorView &rhs, VectorResult y,
                        bool regularised) = 0;
     virtual void again(const VectorView &rhs, VectorResult y) const = 0;
@@ -98,34 +83,24 @@ class LinearAlgebra {
     LinearAlgebra(const LinearAlgebra &) = delete;
     virtual ~LinearAlgebra() = default;
 
-    virtual std::unique_ptr<LinearSolver> solver() const = 0;
+    /// `poll` outlives the solver.
+    virtual std::unique_ptr<LinearSolver> solver(const Poll &poll) const = 0;
 
-    /// y = A x.
-    virtual void multiply(const MatrixView &A, const VectorView &x, VectorResult y) const = 0;
     /// y = A x of a square matrix.
     virtual void multiply(const MatrixView &A, Part part, const VectorView &x,
                           VectorResult y) const = 0;
     /// high + low = high + A x in twice the precision.
     virtual void multiply_accurately(const MatrixView &A, Part part, const VectorView &x,
                                      VectorResult high, VectorResult low) const = 0;
-    virtual void multiply_accurately(const SparseView &A, const VectorView &x, VectorResult high,
-                                     VectorResult low) const = 0;
     /// y = |A| |x|.
     virtual void magnitudes(const MatrixView &A, Part part, const VectorView &x,
                             VectorResult y) const = 0;
-    /// C -= A B.
-    virtual void subtract_product(MatrixResult C, const MatrixView &A,
-                                  const MatrixView &B) const = 0;
-    /// X = U^-1 X, U upper triangular.
-    virtual void solve_triangular(const MatrixView &U, MatrixResult X) const = 0;
-    /// The shortest of the solutions of A y = b that fit best.
-    virtual void least_squares(const MatrixView &A, const VectorView &b, VectorResult y) const = 0;
     /// A = A^-1. Of a symmetric one the lower triangle, which is positive definite but for its last
     /// `tied` rows; false, and the triangle lost, if it is not.
     virtual bool invert(MatrixResult A, Part part, Index tied) const = 0;
 };
 
-/// By Eigen, for the instructions that all else is compiled for; condensed_algebra_eigen.h has the
-/// definition. A template, so that a program may link it instead of compiling it.
+/// By Eigen, for the instructions that all else is compiled for; eigen.h has the definition. A
+/// template, so that a program may link it instead of compiling it.
 template <class = void> const LinearAlgebra &linear_algebra();
 } // namespace dolfinx_contact::condensed

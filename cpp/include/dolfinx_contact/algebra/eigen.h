@@ -1,10 +1,11 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
-/// @file condensed_algebra_eigen.h
+/// @file eigen.h
 /// The linear algebra of the condensed solver by Eigen.
 #pragma once
 
-#include "condensed_sparse.h"
+#include "lu.h"
+#include <cmath>
 
 namespace dolfinx_contact::condensed {
 /// Sums of products of doubles, each as if in twice the precision
@@ -22,37 +23,30 @@ struct AccurateSums {
 
 class EigenSolver final : public LinearSolver {
   public:
-    double fill() const override { return sparse_.fill(); }
-    bool of_many() const override {
-        return (kind_ == Kind::in_single && single_.rows() > 0) || kind_ == Kind::sparse;
-    }
+    explicit EigenSolver(const Poll &poll) : poll_(poll) {}
+
+    bool of_many() const override { return kind_ == Kind::in_single && single_.rows() > 0; }
 
   protected:
-    void take(const MatrixView &J) override {
+    bool take(const MatrixView &J) override {
         kind_ = Kind::in_double;
-        double_.compute(J);
-    }
-    bool take(const SparseView &J) override {
-        kind_ = Kind::sparse;
-        return sparse_.factor(J);
+        double_.compute(J, poll_);
+        return double_.pivots() > Tuning::smallest_pivot;
     }
 
     bool solve(const MatrixView &J, const VectorView &rhs, VectorResult y,
                bool regularised) override {
-        constexpr double smallest_rcond = 1e-14, threshold = 1e-12;
-        constexpr Index worth_it = 128; // below, double precision costs nothing
-        kind_ = Kind::in_single;
-        if (J.rows() >= worth_it && !regularised && solve_in_single(J, rhs, y))
+        const bool many = J.rows() >= Tuning::worth_single_precision;
+        if (many && !regularised && solve_in_single(J, rhs, y))
             return true;
-        take(J);
-        if (regularised || double_.rcond() > smallest_rcond) {
+        if (take(J) || regularised) {
             y = double_.solve(rhs);
             return true;
         }
-        if (J.rows() >= worth_it)
+        if (many)
             return false;
         kind_ = Kind::orthogonal;
-        orthogonal_.setThreshold(threshold);
+        orthogonal_.setThreshold(Tuning::smallest_of_rank);
         y = orthogonal_.compute(J).solve(rhs);
         return true;
     }
@@ -60,8 +54,6 @@ class EigenSolver final : public LinearSolver {
     void again(const VectorView &rhs, VectorResult y) const override {
         if (kind_ == Kind::in_double)
             y = double_.solve(rhs);
-        else if (kind_ == Kind::sparse)
-            sparse_.solve(rhs, y);
         else if (kind_ == Kind::orthogonal)
             y = orthogonal_.solve(rhs);
         else if (const double scale = rhs.lpNorm<Eigen::Infinity>(); scale > 0.0)
@@ -74,48 +66,45 @@ class EigenSolver final : public LinearSolver {
     /// By iterative refinement; false if that does not converge, because J is too badly
     /// conditioned for it.
     bool solve_in_single(const MatrixView &J, const VectorView &rhs, VectorResult &y) {
-        constexpr double accuracy = 1e-12, contraction = 0.1;
         const double scale = rhs.lpNorm<Eigen::Infinity>();
-        single_.compute(J.cast<float>());
+        kind_ = Kind::in_single;
+        single_.compute(J.cast<float>(), poll_);
         y.setZero();
         VectorXd rest = rhs;
-        for (double size = scale; size > accuracy * scale;) {
+        for (double size = scale; size > Tuning::refined * scale;) {
             const Eigen::VectorXf unit = (rest / size).cast<float>();
             y += size * single_.solve(unit).cast<double>();
             rest = rhs;
             rest.noalias() -= J * y;
             const double after = rest.lpNorm<Eigen::Infinity>();
-            if (!(after <= contraction * size))
-                return after <= 1e2 * accuracy * scale;
+            if (!(after <= Tuning::refinement * size))
+                return after <= Tuning::refined_enough * scale;
             size = after;
         }
         return true;
     }
 
-    enum class Kind { in_single, in_double, orthogonal, sparse };
+    enum class Kind { in_single, in_double, orthogonal };
 
+    const Poll &poll_;
     Kind kind_ = Kind::in_double;
-    Eigen::PartialPivLU<Eigen::MatrixXf> single_;
-    Eigen::PartialPivLU<MatrixXd> double_;
+    LU<float> single_;
+    LU<double> double_;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal_;
-    SparseSolver sparse_;
 };
 
 class EigenAlgebra final : public LinearAlgebra {
   public:
-    std::unique_ptr<LinearSolver> solver() const override {
-        return std::make_unique<EigenSolver>();
+    std::unique_ptr<LinearSolver> solver(const Poll &poll) const override {
+        return std::make_unique<EigenSolver>(poll);
     }
 
-    void multiply(const MatrixView &A, const VectorView &x, VectorResult y) const override {
-        y.noalias() = A * x;
-    }
     void multiply(const MatrixView &A, Part part, const VectorView &x,
                   VectorResult y) const override {
-        if (part == Part::all)
-            return multiply(A, x, y);
         y.setZero();
-        if (part == Part::lower)
+        if (part == Part::all)
+            y.noalias() = A * x;
+        else if (part == Part::lower)
             y.noalias() += A.selfadjointView<Eigen::Lower>() * x;
         else
             y.noalias() += A.selfadjointView<Eigen::Upper>() * x;
@@ -132,13 +121,6 @@ class EigenAlgebra final : public LinearAlgebra {
             }
         }
     }
-    void multiply_accurately(const SparseView &A, const VectorView &x, VectorResult high,
-                             VectorResult low) const override {
-        AccurateSums sums{high, low};
-        for (Index j = 0; j < A.cols(); ++j)
-            for (SparseView::InnerIterator at(A, j); at; ++at)
-                sums.add(at.row(), at.value(), x[j]);
-    }
     void magnitudes(const MatrixView &A, Part part, const VectorView &x,
                     VectorResult y) const override {
         const VectorXd size_of_x = x.cwiseAbs();
@@ -151,15 +133,6 @@ class EigenAlgebra final : public LinearAlgebra {
             if (part != Part::all)
                 y[j] += column.dot(size_of_x.segment(first, last - first)) - diagonal;
         }
-    }
-    void subtract_product(MatrixResult C, const MatrixView &A, const MatrixView &B) const override {
-        C.noalias() -= A * B;
-    }
-    void solve_triangular(const MatrixView &U, MatrixResult X) const override {
-        U.triangularView<Eigen::Upper>().solveInPlace(X);
-    }
-    void least_squares(const MatrixView &A, const VectorView &b, VectorResult y) const override {
-        y = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
     }
     bool invert(MatrixResult A, Part part, Index tied) const override {
         if (part != Part::all)
@@ -174,7 +147,7 @@ class EigenAlgebra final : public LinearAlgebra {
     // NOLINTNEXTLINE(misc-no-recursion): as deep as the logarithm of n
     static bool invert(Eigen::Ref<MatrixXd> A) {
         const Index n = A.rows(), half = n / 2;
-        if (n <= 64) { // smaller halves save nothing
+        if (n <= Tuning::few_rows_to_invert) {
             const Eigen::LLT<MatrixXd> factors(A);
             if (factors.info() != Eigen::Success)
                 return false;

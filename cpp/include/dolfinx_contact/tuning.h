@@ -1,0 +1,76 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+/// @file tuning.h
+/// Every number of the condensed solver that somebody may want to change. None changes which states
+/// are solutions; scaled reactions and displacements are about one in size.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace dolfinx_contact::condensed {
+struct Tuning {
+    using Index = Eigen::Index;
+
+    // -- the methods in order: iterations at most ------------------------------------------------
+    static constexpr int newton_most = 60;       ///< where it converges, 5 to 20
+    static constexpr int interior_most = 120;    ///< its own and Newton's from there
+    static constexpr int proximal_most = 800;    ///< of Newton's method in all subproblems
+    static constexpr int homotopy_most = 20'000; ///< the same of all paths
+
+    // -- Newton's method -------------------------------------------------------------------------
+    static constexpr double rho_n = 10.0; ///< times compliance: the normal and the tangential step
+    static constexpr double rho_t = 1.0;  ///< want metrics of their own; measured on punches
+    static constexpr int newton_patience = 12;      ///< iterations without progress: a circle
+    static constexpr std::size_t newton_memory = 8; ///< merits of the nonmonotone line search
+    static constexpr double decrease = 1e-4;        ///< of the merit, over its slope (Armijo)
+    static constexpr double shortest_step = 1e-5;   ///< of the line search
+    static constexpr double kept_factors =
+        1e-2;                                  ///< of the merit, which a step with old ones leaves
+    static constexpr double judged_from = 1e3; ///< residual over the tolerance: the judge decides
+    static constexpr double regularisation = 1e-9; ///< shift of a singular W, over the compliance
+
+    // -- interior point --------------------------------------------------------------------------
+    static constexpr int interior_iterations = 50;
+    static constexpr double interior_accuracy = 1e-11; ///< of equations and gap: Newton's finishes
+    static constexpr double interior_shortest = 1e-4;  ///< step: it has come to its end
+    static constexpr double inside = 0.99;             ///< part of the way to the cone's boundary
+
+    // -- proximal point: alpha over the compliance of a contact ----------------------------------
+    static constexpr double first_alpha = 0.1, smallest_alpha = 1e-10, largest_alpha = 1e3;
+    static constexpr double alpha_down = 0.2, alpha_up = 5.0; ///< after success, after failure
+    static constexpr double proximal_target = 1e-9;           ///< residual of a subproblem
+    static constexpr int proximal_newton = 30;                ///< iterations of a subproblem
+    static constexpr int proximal_patience = 40; ///< subproblems that do not halve the error
+
+    // -- homotopy: s from 0, an easier problem, to 1; random starts ------------------------------
+    static constexpr int fewest_paths = 5, most_paths = 200;
+    static constexpr double path_work = 5e5; ///< paths times unknowns squared
+    static constexpr double first_part = 0.25, shortest_part = 1e-3, longest_part = 0.5; ///< of s
+    static constexpr double path_target = 1e-6;  ///< residual on the way
+    static constexpr double without_shift = 0.2; ///< part of the paths, others have a shift of
+    static constexpr double least_shift = -1.0, largest_shift = 1.5; ///< ten to this, over `own`
+    static constexpr double mean_friction = 0.7; ///< part of the paths that begin with one mu
+    static constexpr double open_at_first = 0.3; ///< part of the contacts of a start
+
+    // -- scales ----------------------------------------------------------------------------------
+    static constexpr double negligible =
+        1e-12; ///< compliance over the mean one that counts as none
+    static constexpr double unlike =
+        1e2; ///< ratio of compliances from which contacts have own units
+
+    // -- judge -----------------------------------------------------------------------------------
+    static constexpr double near_rounding = 1e-2; ///< of the tolerance: sums in twice the precision
+
+    // -- linear algebra --------------------------------------------------------------------------
+    static constexpr double smallest_rcond = 1e-12;      ///< of a W that is inverted
+    static constexpr double smallest_pivot = 1e-14;      ///< over the largest one: else singular
+    static constexpr double smallest_of_rank = 1e-12;    ///< pivot of an orthogonal decomposition
+    static constexpr Index worth_single_precision = 128; ///< unknowns: below, double costs nothing
+    static constexpr double refined = 1e-12;             ///< residual of iterative refinement
+    static constexpr double refined_enough = 1e-10;      ///< where it stops above that
+    static constexpr double refinement = 0.1;            ///< contraction of the residual
+    static constexpr Index few_columns = 16;             ///< factorised one by one
+    static constexpr Index few_rows_to_invert = 64;      ///< smaller halves save nothing
+    static constexpr Index operations_between_polls = 500'000'000; ///< some 0.1 s
+};
+} // namespace dolfinx_contact::condensed
