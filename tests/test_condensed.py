@@ -278,6 +278,7 @@ def test_where_the_second_solver_starts(end, given):
     assert starts[0] is None and (starts[1] is x if given else starts[1] is None)
 
 
+@pytest.mark.filterwarnings("ignore:contact carries:UserWarning")  # its change is made up
 def test_one_budget_for_all_searches_of_a_step(monkeypatch):
     """All searches of a step have ``max_seconds`` together: what each may take is what is left, not the whole again."""
     given, own = [], dc.CondensedNewton.solve_condensed
