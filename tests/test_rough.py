@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import scenes
+import ufl
 from dolfinx import fem, mesh
 
 import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
 
 COMM, INF = scenes.COMM, np.inf
 PROGRAMME = [(0.0, -0.01), (0.003, -0.012), (-0.002, -0.01)]
@@ -55,6 +57,21 @@ def test_large_coefficients_are_as_good_as_infinite_ones(solver):
         found.append(scenes.gathered(scene.contact)[1])
     for other in found[1:]:
         assert np.abs(other - found[0]).max() <= 1e-8 * np.abs(found[0]).max()
+
+
+def test_a_loose_block_on_a_rough_plane():
+    """Held by contact alone, pulled sideways by its weight so that its edge would lift: the plane carries both, however little presses there."""
+    edges = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.4]]
+    domain = mesh.create_box(COMM, edges, [3, 3, 2], mesh.CellType.hexahedron)
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = (1e3 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.grad(v)) - v[0] + v[2]) * ufl.dx
+    foot = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0.0))
+    contact = dc.Contact(V, foot, dc.RigidPlane((0, 0, 0), (0, 0, 1)), dc.Friction(INF))
+    step = dc.ContactProblem(F, u, contact).solve()
+    assert np.abs(contact.force() - (-0.4, 0.0, 0.4)).max() <= 1e-7
+    least = COMM.allreduce(contact.reaction[:, 2].min(initial=1.0), op=scenes.MPI.MIN)
+    assert step.counts.open == 0 and 0.0 < least < 1e-5
 
 
 def test_rough_on_one_side():
