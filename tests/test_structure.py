@@ -80,8 +80,9 @@ def test_there_is_no_import_circle():
 
 def test_the_repository_is_light():
     """All tracked files together are below 5 MB: what programs make is made, not tracked."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
-    if listed.returncode != 0:
+    if not (ROOT / ".git").exists():
         pytest.skip("no clone")
+    command = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "-z"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     files = [ROOT / name for name in listed.stdout.split("\0") if name]
     assert sum(file.stat().st_size for file in files if file.exists()) < 5e6
