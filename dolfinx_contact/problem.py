@@ -49,6 +49,7 @@ from dolfinx_contact.settle import found_for, refusal, with_friction
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.linearised import Linearised
 from dolfinx_contact.step import LoadStep, nodal_stiffness
+from dolfinx_contact.trial import unmoved
 from dolfinx_contact.unseen import Unseen
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -282,6 +283,8 @@ class ContactProblem(ProblemStates):
             for contact in self.contacts:
                 contact.restore()
             step = self.load_step(step.holding)
+            if step.holding.beyond:
+                return step, unmoved(self.body, step, self._states[0])
             found = self._found(step)
         return step, found
 

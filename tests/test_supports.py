@@ -384,6 +384,23 @@ def test_a_plane_on_a_spring_slides_past_held_nodes(solver):
         assert abs(total(contact.dissipation) - worked) < 1e-9 and step.error < 1e-9
 
 
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_a_spring_pulls_a_plane_past_held_nodes_in_one_step(nonlinear):
+    """Pulled at once, from stick, far beyond mu N: the plane stands where its spring pulls with mu N, of a nonlinear body, too."""
+    problem, contact, _ = belt(side=False, nonlinear=nonlinear, wear=None)
+    plane = contact.plane
+    plane.free, plane.force = ("t",), (0.1, 0.0)
+    problem.solve()
+    assert np.abs(contact.force() - (0.1, 1.0)).max() < 1e-8
+    plane.force = (0.4, 0.0)
+    with pytest.raises(dc.NotConverged, match="slides away"):
+        problem.solve()
+    plane.force, plane.stiffness, plane.drive = (0.0, 0.0), {"t": 10.0}, (0.1, 0.0)
+    problem.solve()
+    assert np.abs(contact.force() - (0.3, 1.0)).max() < 1e-8
+    assert abs(plane.displacement[0] - 0.07) < 1e-8
+
+
 def test_a_plane_slides_past_the_nodes_of_a_held_side():
     """Nodes of a side held, others elastic: both solvers agree, and the same motion of the plane makes the same reactions."""
     found = []

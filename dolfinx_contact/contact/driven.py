@@ -187,6 +187,10 @@ class DrivenPlanes:
             if along:
                 plane.displacement = home + ways[len(turned) :] @ np.array(along)
 
+    def moved_with(self, others: DrivenPlanes) -> None:
+        """Take over where others, made for the same planes where these had moved them, have them now."""
+        self.move_to(np.where(self.turns, 0.0, self.moved) + others.moved)
+
     def touch(self, x: np.ndarray, near: float | None = None) -> bool:
         """Move planes that no node touches at a displacement to where one node alone would carry the force.  Collective.
 

@@ -92,7 +92,7 @@ class HeldPlanes:
     """All planes that held nodes hold."""
 
     def __init__(self, body, planes: list):
-        self._body, self._planes = body, planes
+        self._body, self._planes, self._beyond = body, planes, False
 
     def share(self) -> None:
         """Give the held nodes their share of what drives the planes, with the present reactions of the others.  Collective."""
@@ -101,7 +101,13 @@ class HeldPlanes:
 
     def slide(self) -> bool:
         """Let those planes slide whose held nodes cannot hold them; whether there are any.  Collective."""
+        self._beyond = any([plane.beyond() for plane in self._planes])
         return any([plane.slide() for plane in self._planes])
+
+    @property
+    def beyond(self) -> bool:
+        """Whether a plane that slides is pushed by more than all of its nodes carry with the reactions found before."""
+        return self._beyond
 
 
 class HeldPlane:
@@ -191,6 +197,13 @@ class HeldPlane:
             reaction = contact.reaction.copy()
             reaction[rows, :-1] = part @ given
             contact.take(reaction=reaction)
+
+    def beyond(self) -> bool:
+        """Whether no spring pulls the plane, and its force along a motion is more than all nodes carry.  Collective."""
+        most = sum((c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c in self._contacts)
+        most = float(self._body.total([most])[0])
+        loose = [motion for motion in self._motions if motion.spring == 0.0]
+        return bool((np.abs(self._plane.pulled_by(loose)) > most).any())
 
     def slide(self) -> bool:
         """Let the plane slide if its held nodes cannot hold it; whether they cannot.  Collective.

@@ -10,6 +10,7 @@ tangent plane there, see docs/surfaces.md.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from copy import copy
 from typing import Any, NamedTuple
@@ -47,6 +48,9 @@ class ContactKinematics(ContactResults):
     _placed: Any = None  # ``Placed``
     _free_friction: Any = None  # with what it was made of
     _dragged: Any = None
+    _usual: tuple = (
+        None,
+    ) * 3  # friction, points and last state with which all nodes have the kernel's law
     _known: Any = (
         None  # slip that supports prescribe in the present state, None where there is none
     )
@@ -244,6 +248,10 @@ class ContactKinematics(ContactResults):
         points = self.points
         if not points.supported.size or self.friction.frictionless:
             return law
+        state = self.friction, points, self.last
+        still = self._known is None and self.dragged is None
+        if still and all(map(operator.is_, self._usual, state)):
+            return law
         rows = np.arange(points.count)[nodes]
         at = np.searchsorted(points.supported, rows)
         at[at == points.supported.size] = 0
@@ -252,7 +260,10 @@ class ContactKinematics(ContactResults):
         if self.dragged is not None:
             known = np.where(self.dragged[rows] != 0.0, self.dragged[rows], known)
         friction = self.friction if isinstance(nodes, slice) else self.friction.at(rows)
-        return supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
+        found = supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
+        if found is law and still and isinstance(nodes, slice):
+            self._usual = state
+        return found
 
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""

@@ -68,6 +68,8 @@ class CondensedBody:
     def _set_up(self) -> None:
         """``W`` and the law, as supports move nodes at present.  Collective."""
         body, contacts, stiffness = self._body, self._contacts, self._stiffness
+        guided = any(contact.points.along.any() for contact in contacts)
+        self._guided = self.dim == 3 and self.comm.allreduce(guided, op=MPI.LOR)
         self._moved = [moved_across(contact) for contact in contacts]
         self._laws = [acting(contact, moved) for contact, moved in zip(contacts, self._moved)]
         nodes, anchored = self._rows(), self._anchor_rows()
@@ -117,7 +119,7 @@ class CondensedBody:
         """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
         free = self._held_by.solve(step.b) if self._anchored else step.free_state()
         self._planes.begin(step, free)
-        if self.dim == 3:
+        if self._guided:
             for contact in self._contacts:
                 contact.move(free)
             now = map(moved_across, self._contacts)

@@ -98,6 +98,8 @@ class BoundLinearised:
             return bound.solve(linear)
         finally:
             bound.destroy()
+            if step.planes is not None:
+                step.planes.moved_with(linear.planes)
 
     def _bind(self, stiffness) -> BoundSolver:
         """The solver, bound to the present tangent; the fixed point where that is none of a body by itself.
