@@ -19,7 +19,7 @@ Euclidean over nodes: reactions, external forces, and what the supports carry.
 - ``rounding``: what double precision leaves of the above, estimated from the size of the terms that cancel in
   ``f - K u + r``, in the gaps and in the slips. No smaller error can be asked for.
 
-Where nothing acts, ``S`` is no larger than rounding. The state is then right if what is left is below rounding, and
+Where nothing acts, ``S`` is no larger than rounding, an estimate, may make of nothing. The state is then right if what is left is below rounding, and
 the numbers are relative to the terms that cancel instead.
 """
 
@@ -151,7 +151,7 @@ def as_errors(sums: np.ndarray) -> Errors:
     """
     equilibrium, law, penetration, slip, r, f, R, body, contact, change = np.sqrt(sums)
     rounding, acting = max(body, contact), max(r, f, R)
-    acts = bool(acting > rounding)
+    acts = bool(acting > ROUNDED * rounding)
     if not acts:
         acting = rounding / EPSILON
     left = np.array([max(equilibrium, law, penetration), slip, rounding, change])

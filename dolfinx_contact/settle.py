@@ -77,7 +77,7 @@ def with_friction(contacts, step, search, renew, memory) -> SolverResult:
 
 def refusal(step, contacts) -> str:
     """Why a step has not converged, as far as anything tells.  Collective."""
-    said = step.no_state() or "Smaller load steps help most often"
+    said = step.hidden() or step.no_state() or "Smaller load steps help most often"
     if any(contact.follows_pressure for contact in contacts):
         said += "; friction follows the pressure, and was that of the last iterate"
     return said

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.forms import times_volume
+from dolfinx_contact.error import BLIND, EPSILON, contact_rounding
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed_input import principal_axes
 
@@ -158,6 +159,14 @@ class Statics:
         if motion is not None:
             self.start, self.placed = self.start + self._modes @ motion, True
 
+    def share(self) -> float:
+        """What the loads are of those that the last reactions balance: these may only have to be scaled.  Collective."""
+        forces = np.zeros(self._body.size)
+        for contact in self._contacts:
+            contact.points.add_forces(contact.last.reaction, forces)
+        sums = self._body.total(self._modes.T @ forces)
+        return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
+
     def _free_motions(self, step, unfelt: float) -> np.ndarray:
         """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
 
@@ -198,8 +207,19 @@ class Statics:
             if not overcome:
                 return False
             driven = overcome[0]
-        self.said = f"The loads drive {self._body.loose.words(driven)} by more than friction carries: no static state exists"
+        if self._presses(driven):
+            return False
+        self.said = (
+            f"In the best state found the loads drive {self._body.loose.words(driven)} by more than friction carries with its "
+            "normal forces"
+        )
         return True
+
+    def _presses(self, along: np.ndarray) -> bool:
+        """Whether a motion takes nodes into their planes: normal reactions would grow until they hold it.  Collective."""
+        velocity = self._motion @ along
+        into, fastest = self._body.largest(-velocity[:, -1]), self._body.largest(np.abs(velocity))
+        return into > ROUGH * fastest
 
     def _overcome(self, along: np.ndarray, sizes: np.ndarray) -> bool:
         """Whether loads along a motion are more than present normal reactions carry with all their friction.  Collective."""
@@ -212,6 +232,23 @@ class Statics:
     def _pressures(self) -> np.ndarray:
         """Present normal reactions of all contacts."""
         return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
+
+    def hidden(self, step) -> str:
+        """Whether rounding in gaps and slips makes forces as large as the loads, in words.  Collective."""
+        total, unit = self._body.total, step.unit
+        rounding = [np.zeros(0)]
+        for contact, of in zip(self._contacts, step.stiffness):
+            contact.move(self._last)
+            rounding.append(contact_rounding(contact, of, self._last).ravel())
+        forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self._last)
+        hiding = np.sqrt(max(total(np.square(force / unit).sum()) for force in forces))
+        acting = self._body.norm(step.external / unit)
+        if not 0.0 < BLIND * acting <= hiding:
+            return ""
+        return (
+            f"Loads are {unit * acting:.1e}, and rounding of coordinates and displacements alone makes contact forces of "
+            f"{unit * hiding:.1e}: no step can tell what holds the body. Take the load off altogether, or leave a thousand times as much"
+        )
 
     def balanced(self) -> bool:
         """Whether reactions balance the loads, roughly: of a body that is lost rounding hides that they do not.  Collective.

@@ -83,6 +83,10 @@ class LoadStep:
         slides = self.planes is not None and bool(self.planes.beyond())
         return slides or (self.statics is not None and self.statics.slides(self))
 
+    def hidden(self) -> str:
+        """Whether rounding hides the loads of a body that contact alone holds, in words.  Collective."""
+        return "" if self.statics is None else self.statics.hidden(self)
+
     def no_state(self) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""
         said = "" if self.statics is None else self.statics.said

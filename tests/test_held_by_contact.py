@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Bodies held by contact alone: statics, soft springs that hold the same body, and what is refused with the motion named."""
 
+import warnings
+
 import numpy as np
 import pytest
 import scenes
@@ -319,3 +321,91 @@ def test_friction_at_its_limit_is_decided_in_every_direction():
             said = Statics(body, scene.contacts, step, np.zeros(body.size)).said
             assert (said == "") == (part < 1)
             assert part < 1 or "a translation along" in said
+
+
+@pytest.mark.parametrize("degrees", [2.0, 5.0])
+@pytest.mark.parametrize("lands", [True, False])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_comes_to_rest_on_a_tilted_floor(dim, lands, degrees):
+    """Below its angle of friction a floor carries a block, N = W cos t and T = W sin t, however it came to be tilted."""
+    scene = Loose(dim, mu=0.3, gap=0.01 if lands else 0.0)
+    scene.problem.solver = None
+    down, tilt = -1e-3 * scene.up, np.radians(degrees)
+    if not lands:
+        scene.load(*down)
+    scene.contact.plane.rotation = -tilt if dim == 2 else (0.0, tilt, 0.0)
+    step = scene.load(*down)
+    force, _ = scene.sums()
+    local = COMM.allreduce(scene.contact.reaction.sum(axis=0), op=MPI.SUM)
+    assert local[-1] == pytest.approx(1e-3 * np.cos(tilt), rel=1e-7)
+    assert np.linalg.norm(local[:-1]) == pytest.approx(1e-3 * np.sin(tilt), rel=1e-6)
+    assert np.abs(force + down).max() < 1e-10
+    assert step.iterations < 300  # Newton's fallbacks took 3000, and found nothing
+
+
+@pytest.mark.parametrize("way", [0.5, -0.5, 3.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_goes_with_its_belt(dim, way):
+    """A belt takes a loose block along by half its length, and more: the same reactions, the same displacement beside it."""
+    scene = Loose(dim)
+    scene.problem.solver = None
+    down = -1e-3 * scene.up
+    scene.load(*down)
+    before, reaction = scene.u.x.array.reshape(-1, dim).copy(), scene.contact.reaction.copy()
+    scene.contact.plane.displacement = way * np.eye(dim)[0]
+    scene.problem.solve()
+    moved = scene.u.x.array.reshape(-1, dim) - before
+    assert np.abs(moved - way * np.eye(dim)[0]).max() < 1e-6 * abs(way)
+    assert np.abs(scene.contact.reaction[:, -1] - reaction[:, -1]).max() < 1e-6 * 1e-3
+
+
+@pytest.mark.parametrize("part", [1e-3, 1e-6])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_almost_all_of_a_load_may_go_in_one_step(dim, part):
+    """From full weight to a millionth of it: the floor carries what is left."""
+    scene = Loose(dim)
+    scene.problem.solver = None
+    scene.load(*-1e-3 * scene.up)
+    step = scene.load(*-part * 1e-3 * scene.up)
+    force, _ = scene.sums()
+    assert force[-1] == pytest.approx(part * 1e-3, rel=1e-6)
+    assert step.iterations < 300
+
+
+def test_loads_that_rounding_hides_are_said_to_be():
+    """A load of 1e-15 of the last one is less than rounding of the coordinates makes of gaps: that is said, no motion."""
+    scene = Loose(2)
+    scene.problem.solver = None
+    scene.load(0.0, -1e-3)
+    with pytest.raises(dc.NotConverged, match=r"rounding of coordinates and displacements alone makes contact forces of .*Take the load off altogether"):  # fmt: skip
+        scene.load(0.0, -1e-18)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("undetermined", ["refused", "nearest"])
+def test_a_bar_between_walls_is_heated_and_cools_down(mu, undetermined):
+    """Heated N = E A T without friction; cold again nothing presses: no warning, and no search for what rounding leaves."""
+    domain = mesh.create_rectangle(COMM, [np.zeros(2), np.array([1.0, 0.2])], (8, 2), mesh.CellType.quadrilateral)  # fmt: skip
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, v, heat = fem.Function(V), ufl.TestFunction(V), fem.Constant(domain, 1e-3)
+    F = 1e4 * ufl.inner(ufl.sym(ufl.grad(u)) - heat * ufl.Identity(2), ufl.sym(ufl.grad(v))) * ufl.dx  # fmt: skip
+    contacts = []
+    for x, side in ((0.0, 1.0), (1.0, -1.0)):
+        facets = mesh.locate_entities_boundary(domain, 1, lambda p, x=x: np.isclose(p[0], x))
+        contacts.append(dc.Contact(V, facets, dc.RigidPlane((x, 0), (side, 0)), dc.Friction(mu)))
+    foot = mesh.locate_entities_boundary(domain, 1, lambda p: np.isclose(p[1], 0))
+    guide = fem.dirichletbc(0.0, fem.locate_dofs_topological(V.sub(1), 1, foot), V.sub(1))
+    problem = dc.ContactProblem(F, u, contacts, bcs=[guide], undetermined=undetermined)
+    problem.solve()
+    if mu == 0.0:
+        assert contacts[0].force()[0] == pytest.approx(2.0, rel=1e-10)
+    heat.value = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        if undetermined == "refused":
+            with pytest.raises(ValueError, match=r"a translation along \(1, 0\)"):
+                problem.solve()
+        else:
+            step = problem.solve()
+            assert max(step.error, step.forward_error) < 1e-12 and step.iterations < 300
+            assert np.abs(contacts[0].force()).max() < 1e-11

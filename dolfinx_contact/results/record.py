@@ -130,7 +130,8 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         error=errors.error,
         slip_error=errors.slip_error,
         rounding=errors.rounding,
-        forward_error=found.forward_error,
+        # where nothing acts it has no scale
+        forward_error=found.forward_error if errors.acts else errors.largest,
         bipotential_gap=float(body.total(gap)),
         penetration=body.largest(np.array([penetration])),
         iterations=found.iterations,
@@ -161,7 +162,7 @@ def warn_of_rounding(step: Step, tol: float) -> None:
 def warn_of_contact(step: Step, tol: float) -> None:
     """Warn, in the name of who called ``solve``, of reactions far less accurate than the tolerance, if a smaller one would help."""
     left = max(step.error, step.slip_error, step.forward_error)
-    if step.contact_error > WORSE * tol and left > ROUNDED * step.rounding:
+    if WORSE * tol < step.contact_error < np.inf and left > ROUNDED * step.rounding:
         warnings.warn(
             f"contact carries {left / step.contact_error:.1e} of the forces that act: its own may be off by {step.contact_error:.1e}, "
             f"more than {WORSE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",

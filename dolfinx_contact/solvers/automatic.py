@@ -92,21 +92,28 @@ class BoundAutomatic:
     def solve(self, step) -> SolverResult:
         """See ``BoundSolver``."""
         iterations, smallest, best, start, said = 0, np.inf, None, None, []
-        why = self._why
-        for solver in self._solvers:
+        why, solvers = self._why, self._solvers
+        # Of a body that contact alone holds the fixed point finds at once what takes Newton's fallbacks thousands of iterations.
+        brief = step.statics is not None and isinstance(solvers[0], CondensedNewton)
+        for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
             if solver not in self._bound:
                 self._bound[solver] = solver.bind(*self._arguments)
-            found = self._bound[solver].solve(step, start)
+            options = {"fallbacks": False} if brief and not said else {}
+            found = self._bound[solver].solve(step, start, **options)
             iterations += found.iterations
             said.append(f"{found.chosen} ({why})")
             errors = step.measure(found.x)
-            if best is None or errors.largest < smallest:
-                smallest, best = errors.largest, found
+            near = found.forward_error <= max(step.tol, errors.rounding)
+            done = errors.within(step.tol if near else 0.0)
+            # Where nothing acts errors are over no force that could be compared.
+            size = errors.largest if errors.acts else np.inf
+            if best is None or done or size < smallest:
+                smallest, best = size, found
                 # far from a solution the errors of an end tell nothing: the other solver has a start of its own
                 start = found.x if smallest <= ASTRAY else None
-            if errors.within(step.tol) and found.forward_error <= max(step.tol, errors.rounding):
+            if done:
                 break
-            if step.slides():
+            if not options and step.slides():
                 break
             why = f"the other one ended at {errors.largest:.1e}"
         return best._replace(iterations=iterations, chosen=", then ".join(said))

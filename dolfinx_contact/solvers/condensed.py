@@ -127,26 +127,26 @@ class CondensedBody:
                 self._set_up()
         return free
 
-    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:
         """One load step by Newton's method on the condensed problem.
 
         Args:
-            step: The ``LoadStep``.
-            start: Not used: reactions of earlier steps are better starts.
+            step, start: The ``LoadStep``; not used: reactions of earlier steps are better starts.
+            fallbacks: Whether a body that may slide is searched by all methods where Newton's fails.
         """
         self._until = perf_counter() + self._options.max_seconds  # of all searches together
         held, first, free = self._held_by.solve, self.dim * self.nodes, self._begin(step)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
-        q = self._motion(step, free)
+        q = rows = self._motion(step, free)
         placed, starts = np.zeros(q.size), self._starts(q)
-        rows = q
         if step.statics is not None:
             q, placed = self._placed(step, free)
+            starts += [step.statics.share() * last for last in starts[:1]]
         iterations, error, rounding, best = 0, np.inf, 0.0, None
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             previous = error
-            for limits in ({"fallbacks": False}, {}) if step.may_slide else ({},):
+            for limits in _searches(step, fallbacks):
                 goal = factor * step.tol
                 if not limits and step.statics is not None:
                     limits = self._limited(step)
@@ -183,8 +183,9 @@ class CondensedBody:
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result, change = best
         self._planes.move(step, force)
-        self.past.append((rows, force, self._tied))
         forward = max(change, step.measure(x).largest)
+        if fallbacks or forward <= step.tol:  # else another search follows, from the same steps
+            self.past.append((rows, force, self._tied))
         return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
 
     def _limited(self, step) -> dict:
@@ -334,6 +335,11 @@ class CondensedBody:
             turned = np.einsum("nij,njk,nlk->nil", turns, blocks, turns)
             gathered["tangential_stiffness"] = self.gather(turned)
         return gathered
+
+
+def _searches(step, fallbacks: bool) -> tuple[dict, ...]:
+    """Options of one search after another: where something may slide Newton's method alone first."""
+    return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
 
 
 def moved_across(contact) -> np.ndarray:
