@@ -79,7 +79,7 @@ def test_what_is_found_is_the_law_of_all_components(law, seed, T):
 @pytest.mark.parametrize("law", [name for name in LAWS if name != "far apart"])
 @pytest.mark.parametrize("seed", range(3))
 def test_derivatives_along_what_is_free_are_those_of_differences(law, seed):
-    """Of the part along f and of the normal one: the part across moves nothing, and has none."""
+    """Of the part along f and of the normal one; the part across, which supports carry, is left out of both."""
     friction, f, known, last, reaction, gap, slip, rho = draw(seed, 2, LAWS[law])
     known *= 1e6 ** (
         np.abs(known).max(axis=1, keepdims=True) < 1e-3
@@ -104,7 +104,7 @@ def test_derivatives_along_what_is_free_are_those_of_differences(law, seed):
             exact = np.einsum("nij,nj->ni", by_r, way)
         else:
             exact = np.einsum("nij,nj->ni", by_w, way) / rho[1][:, None]
-        change = np.einsum("nij,nj->ni", free, change)
+        change, exact = (np.einsum("nij,nj->ni", free, of) for of in (change, exact))
         same = (ends[0][1] == ends[1][1]) & (np.abs(reaction[:, -1] - rho[0] * gap) > 1e-3)
         error = np.abs(change - exact).max(axis=1)
         assert same.sum() > N // 2 and np.median(error[same]) < 1e-7
