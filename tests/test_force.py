@@ -139,6 +139,41 @@ def test_no_state_beyond_gross_sliding(dim, solver):
         assert scene.force()[0] == pytest.approx(0.24 * load, rel=1e-9)
 
 
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("degrees", [0, 30, 60, 90])
+def test_no_state_beyond_the_ellipse_of_friction(degrees, given):
+    """Pushed at an angle to the grooves a plane is held up to |M^-1 F| = N, whatever the slip rule; beyond, the refusal says so at once."""
+    scene = free_block(("t1", "t2", "n") if given else ("t1", "t2"), mu=(0.3, 0.15), p=(0.05, 0.2))
+    load, way = 1e-3 * E, np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    if given:
+        scene.push(0, 0, load)
+    else:
+        scene.plane.displacement = scene.axes @ (0, 0, 1e-3)
+        scene.push(0, 0, 0)
+        load = scene.force()[2]
+    most = load / np.linalg.norm(way / (0.3, 0.15))
+    stood = scene.plane.displacement
+    with pytest.raises(dc.NotConverged, match="slides away, no static state exists") as caught:
+        scene.push(*(1.03 * most * way if given else 1.5 * most * way), load)
+    assert "unknown" not in str(caught.value).split(",")[0] or not given
+    assert (scene.plane.displacement == stood).all()
+    scene.push(*0.9 * most * way, load)
+    assert scene.force()[:2] == pytest.approx(0.9 * most * way, rel=1e-7, abs=1e-7 * load)
+
+
+def test_the_refusal_names_the_weak_direction():
+    """Across the grooves friction carries mu_y N = 0.15 N; with the plane guided along them, along the other axis mu_x N."""
+    for free, force, said in (
+        (("t1", "t2", "n"), (0.0, 0.2), r"\[0.0, 1.0, 0.0\] by 42, and friction carries 31.5"),
+        (("t1", "n"), (0.4, 0.0), r"\[1.0, 0.0, 0.0\] by 84, and friction carries 63"),
+    ):
+        scene = free_block(free, mu=(0.3, 0.15), p=None)
+        load = 1e-3 * E  # 210
+        scene.push(0, 0, load)
+        with pytest.raises(dc.NotConverged, match=said):
+            scene.push(force[0] * load, force[1] * load, load)
+
+
 @pytest.mark.parametrize("solver", OF_EACH)
 def test_a_spring_in_series(solver):
     """Body and spring share the drive: R = F + k (drive - u) with R = E A u / h; pulled off, the spring alone holds."""

@@ -7,6 +7,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+# Part of a motion that is not named.
+NONE = 1e-6
+
 # Part of what friction carries that has to be left: where all is used, how far the plane slides is not determined.
 MARGIN = 1e-9
 
@@ -72,13 +75,16 @@ class _Driven:
     def slides(self, given: bool) -> str:
         """Whether a plane is pushed along itself by more than friction carries."""
         along = ~self._turns & np.array([name != "n" for name in self._names])
-        if not along.any() or self._springs[along].any():
+        motions = np.flatnonzero(along & (self._springs == 0.0))
+        if not motions.size or (given and self._weight() == np.inf):
             return ""
-        most = self._most(given)
-        pushed = float(np.linalg.norm(self._driving[along]))
+        limit = _Limit(self._contacts, motions, self._body, self._weight() if given else None)
+        way, pushed, most = limit.weakest(self._driving[motions])
         if pushed > most * (1 - MARGIN if given else 1):
+            direction = way @ np.array([m.axis for m in self._plane.motions])[motions]
+            direction = (direction.round(6) + 0.0).tolist()
             return (
-                f"plane.force pushes {self._plane} along it by {pushed:.6g}, and friction carries {most:.6g} at most: "
+                f"plane.force pushes {self._plane} along {direction} by {pushed:.6g}, and friction carries {most:.6g} along it at most: "
                 "the plane slides away, no static state exists"
             )
         return ""
@@ -87,18 +93,6 @@ class _Driven:
         """The force along the normal, if it is given: infinite otherwise."""
         known = self._names[-1] == "n" and self._springs[-1] == 0
         return float(self._driving[-1]) if known else np.inf
-
-    def _most(self, given: bool) -> float:
-        """What friction on a plane carries at most; infinite where that is not known yet."""
-        laws = [contact.friction.mu for contact, _ in self._contacts]
-        if given:
-            largest = self._body.largest(np.concatenate([mu.ravel() for mu in laws]))
-            weight = self._weight()
-            return largest * weight if weight < np.inf else np.inf
-        carried = [
-            (c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c, _ in self._contacts
-        ]
-        return float(self._body.total([sum(carried)])[0])
 
     def tips(self) -> str:
         """Whether moment and weight ask for a centre of pressure beyond the nodes of a plane."""
@@ -123,24 +117,88 @@ class _Driven:
         return ""
 
     def spins(self) -> str:
-        """Whether a motion that friction alone resists is driven by more than it carries with the present normals."""
-        for k in np.flatnonzero(~self._pressing & (self._springs == 0.0)):
-            if not (self._turns[k] or self._plane.curved):
-                continue
-            sums = np.zeros(2)
-            for contact, axes in self._contacts:
-                normal = contact.reaction[:, -1]
-                across = np.linalg.norm(axes[:, :-1, k], axis=1)
-                sums += (
-                    (axes[:, -1, k] * normal).sum(),
-                    (contact.friction.mu.max(axis=-1) * normal * across).sum(),
-                )
-            by_normals, most = self._body.total(sums)
-            pushed = abs(self._driving[k] - by_normals)
-            if pushed > most:
-                way = "turns" if self._turns[k] else "moves"
-                return (
-                    f"what drives {self._plane} along or about {self._names[k]!r} is {pushed / most if most else np.inf:.6g} "
-                    f"times what friction carries: the surface {way} away, no static state exists"
-                )
+        """Whether motions that friction alone resists are driven by more than it carries with the present normals."""
+        free = ~self._pressing & (self._springs == 0.0)
+        motions = np.flatnonzero(free & (self._turns | self._plane.curved))
+        if not motions.size:
+            return ""
+        limit = _Limit(self._contacts, motions, self._body)
+        way, pushed, most = limit.weakest(self._driving[motions] - limit.by_normals())
+        if pushed > most:
+            names = [
+                self._names[k]
+                for k, part in zip(motions, way)
+                if abs(part) > NONE * np.abs(way).max()
+            ]
+            turns = self._turns[motions][np.abs(way).argmax()]
+            return (
+                f"what drives {self._plane} along or about {' and '.join(map(repr, names))} is "
+                f"{pushed / most if most else np.inf:.6g} times what friction carries: the surface "
+                f"{'turns' if turns else 'moves'} away, no static state exists"
+            )
         return ""
+
+
+class _Limit:
+    """What friction carries against motions of a surface, at most, whatever the nodes' friction within the cone.
+
+    Against a virtual motion ``c`` node i works ``r_n |M D_t c|`` at most, the support function of its ellipse: forces ``F`` that are in balance
+    have ``F . c <= sum r_n |M D_t c|`` for every ``c``.
+
+    Args:
+        contacts: With their columns of ``D``.
+        motions: Columns that are asked for, ``shape=(k,)``.
+        body: For sums over ranks.
+        weight: Sum of normal reactions, of which no node is known; None takes the present ones.
+    """
+
+    def __init__(self, contacts, motions: np.ndarray, body, weight: float | None = None):
+        self._body, self._weight = body, weight
+        self._parts = [(c.friction, c.reaction[:, -1], axes[:, :, motions]) for c, axes in contacts]
+        laws = [friction for friction, _, _ in self._parts]
+        alike = all(law.frictionless or law.isotropic for law in laws)
+        self._plain = (
+            alike
+            and motions.size <= 2
+            and not any(c.plane.curved or c.plane.spins for c, _ in contacts)
+        )
+
+    def by_normals(self) -> np.ndarray:
+        """What the present normal reactions carry of each motion, ``shape=(k,)``.  Collective."""
+        return self._body.total(sum(normal @ axes[:, -1] for _, normal, axes in self._parts))
+
+    def carried(self, way: np.ndarray) -> float:
+        """The most work of friction against a motion, per length.  Collective."""
+        most = [np.zeros(1)]
+        for friction, normal, axes in self._parts:
+            slip = axes[:, :-1] @ way
+            radius = np.linalg.norm(
+                friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1
+            )
+            most.append(radius if self._weight is not None else np.maximum(normal, 0.0) * radius)
+        if self._weight is not None:
+            return self._weight * self._body.largest(np.concatenate(most))
+        return float(self._body.total([np.concatenate(most).sum()])[0])
+
+    def weakest(self, force: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """The motion against which the least is carried of what drives it, a unit vector, and both sizes.  Collective."""
+        size = float(np.linalg.norm(force))
+        if size == 0.0:
+            return np.eye(force.size)[0], 0.0, np.inf
+        along = force / size
+        across = np.linalg.svd(along[None])[2][
+            1:
+        ]  # all motions with along . c = 1 are along + s across
+        best = np.zeros(len(across))
+        if len(across) and not self._plain:
+            from scipy.optimize import minimize
+
+            best = minimize(
+                lambda s: self.carried(along + s @ across),
+                best,
+                method="Powell",
+                options={"xtol": 1e-6, "ftol": 1e-9},
+            ).x
+        way = along + np.atleast_1d(best) @ across
+        way /= np.linalg.norm(way)
+        return way, float(force @ way), self.carried(way)

@@ -74,10 +74,15 @@ class Step:
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
         return (
-            f"error {self.error:.3e}, slip error {self.slip_error:.3e}, forward error {self.forward_error:.3e}, "
+            f"error {_said(self.error)}, slip error {_said(self.slip_error)}, forward error {_said(self.forward_error)}, "
             f"rounding {self.rounding:.1e}, after {self.iterations} iterations ({self.counts.open} open, "
             f"{self.counts.stick} sticking, {self.counts.slip} slipping nodes)"
         )
+
+
+def _said(error: float) -> str:
+    """A number; of what cannot be measured, as where rounding hides the loads on what has moved far away, that it cannot."""
+    return f"{error:.3e}" if np.isfinite(error) else "unknown"
 
 
 class NotConverged(RuntimeError):
