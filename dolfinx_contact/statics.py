@@ -341,4 +341,6 @@ def _touching(normal: np.ndarray, gap: np.ndarray, force: np.ndarray) -> np.ndar
     if not left > 1e-14:
         return None
     rest = np.vstack((normal.T, below)) @ weights - np.append(np.zeros(len(far)), 1.0)
+    if rest[-1] == 0.0:  # minus the square of what is left, which rounding has taken
+        return None
     return far - length * rest[:-1] / rest[-1]
