@@ -10,9 +10,9 @@
 #               results/report/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
 # All set up .venv first (tools/setup), when something it was made from has changed.
 
-.PHONY: punch study stress report docs test test-rest test-wheel test-all format stubs clean
+.PHONY: punch study stress report docs test test-rest test-ranks \
+	test-wheel test-wheel-ranks test-all format stubs clean
 
-TWO = -n 2 --dist loadfile # processes of pytest on one rank
 RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/test_*.py)
 CORE = $(patsubst %,tests/test_%.py,force history multigrid problem)
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
@@ -35,18 +35,22 @@ docs: .venv/ready
 	tools/site .venv
 
 test: .venv/ready
-	tools/mpitest .venv 1 -m "not slow" --once $(TWO) $(ARGS)
+	tools/mpitest .venv 1 -m "not slow" --once $(ARGS)
 	tools/mpitest .venv 2 -m "not slow" --once $(CORE) $(ARGS)
 	tools/ctest example
 
-# what .ci/run has beside it: the other parameters of these tests, and all that are marked ranks on 2 ranks
+# what .ci/run has beside it: the other parameters of these tests; all that are marked ranks on 2 ranks; the newest
+# DOLFINx on PyPI
 test-rest: .venv/ready
-	tools/mpitest .venv 1 -m "not slow" --rest $(TWO)
+	tools/mpitest .venv 1 -m "not slow" --rest
+
+test-ranks: .venv/ready
 	tools/mpitest .venv 2 $(RANKS)
 
-# the newest DOLFINx on PyPI
 test-wheel: .venv-wheel/ready
-	tools/mpitest .venv-wheel 1 -m "not slow" --once $(TWO)
+	tools/mpitest .venv-wheel 1 -m "not slow" --once
+
+test-wheel-ranks: .venv-wheel/ready
 	tools/mpitest .venv-wheel 2 $(RANKS) --once
 
 test-all:

@@ -156,7 +156,7 @@ def test_rubber_seal_at_30_percent(bulk, mu, record_property):
     scene = ring(bulk, mu)
     upper, lower = (contact.force() for contact in scene.contacts)
     record_property("iterations", [step.iterations for step in scene.steps])
-    record_property("force", lower[1])
+    record_property("force", float(lower[1]))
     np.testing.assert_allclose(lower, upper * [1, -1], rtol=1e-6, atol=1e-9)
     assert max(step.iterations for step in scene.steps) <= 6
     volume = COMM.allreduce(fem.assemble_scalar(fem.form((scene.J - 1) * ufl.dx(domain=scene.mesh, metadata={"quadrature_degree": 5}))))  # fmt: skip
