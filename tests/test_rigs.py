@@ -245,6 +245,20 @@ def test_friction_holds_a_torque(solver):
             scene.step(0, 0, 0)
 
 
+def test_a_torque_is_held_by_friction_of_each_node_along_its_own_way():
+    """About the normal sum r_n |M w| holds, w = (-y, x) of each node: beyond it the plane turns away, with that said."""
+    scene, plane = platen(("n", "rn"), (0.5, 0.1), axis=(1, 0, 0))
+    scene.step(0, 0, 0)
+    x, y = scene.contact.x[:, :2].T
+    arms = np.hypot(0.5 * y, 0.1 * x)
+    most = COMM.allreduce(arms @ scene.contact.reaction[:, 2])
+    plane.moment = (0, 0, 0.9 * most)
+    scene.step(0, 0, 0)
+    plane.moment = (0, 0, 1.2 * most)
+    with pytest.raises(dc.NotConverged, match="times what friction carries with the normal forces found: the surface turns away"):  # fmt: skip
+        scene.step(0, 0, 0)
+
+
 def test_nothing_holds_a_turn_without_friction():
     """A plane about its normal, a ball about its centre, a roller about its axis; springs do."""
     for surface, name in (

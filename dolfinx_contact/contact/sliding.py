@@ -83,10 +83,10 @@ class _Driven:
         if pushed > most * (1 - MARGIN if given else 1):
             direction = way @ np.array([m.axis for m in self._plane.motions])[motions]
             direction = (direction.round(6) + 0.0).tolist()
-            return (
-                f"plane.force pushes {self._plane} along {direction} by {pushed:.6g}, and friction carries {most:.6g} along it at most: "
-                "the plane slides away, no static state exists"
-            )
+            known = "with the normal forces found: the plane slides away"
+            if given:
+                known = "at most: the plane slides away, no static state exists"
+            return f"plane.force pushes {self._plane} along {direction} by {pushed:.6g}, and friction carries {most:.6g} along it {known}"
         return ""
 
     def _weight(self) -> float:
@@ -102,8 +102,7 @@ class _Driven:
         for k in np.flatnonzero(self._turns & (self._springs == 0.0)):
             ends = [np.full((2, 1), -np.inf)]
             for contact, axes in self._contacts:
-                normal, across = axes[:, -1, k], np.linalg.norm(axes[:, :-1, k], axis=1)
-                most = contact.friction.mu.max(axis=-1) * across
+                normal, most = axes[:, -1, k], _radius(contact.friction, axes[:, :-1, k])
                 ends.append(np.array([-(normal - most), normal + most]))
             low, high = np.concatenate(ends, axis=1).max(axis=1)
             low, high = (self._body.comm.allreduce(float(end), op=MPI.MAX) for end in (low, high))
@@ -133,10 +132,15 @@ class _Driven:
             turns = self._turns[motions][np.abs(way).argmax()]
             return (
                 f"what drives {self._plane} along or about {' and '.join(map(repr, names))} is "
-                f"{pushed / most if most else np.inf:.6g} times what friction carries: the surface "
-                f"{'turns' if turns else 'moves'} away, no static state exists"
+                f"{pushed / most if most else np.inf:.6g} times what friction carries with the normal forces found: the surface "
+                f"{'turns' if turns else 'moves'} away"
             )
         return ""
+
+
+def _radius(friction, slip: np.ndarray) -> np.ndarray:
+    """``|M v|`` of nodes that move along their surfaces by ``v``, local components, ``shape=(n,)``."""
+    return np.linalg.norm(friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1)
 
 
 class _Limit:
@@ -172,9 +176,7 @@ class _Limit:
         most = [np.zeros(1)]
         for friction, normal, axes in self._parts:
             slip = axes[:, :-1] @ way
-            radius = np.linalg.norm(
-                friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1
-            )
+            radius = _radius(friction, slip)
             most.append(radius if self._weight is not None else np.maximum(normal, 0.0) * radius)
         if self._weight is not None:
             return self._weight * self._body.largest(np.concatenate(most))
