@@ -27,15 +27,18 @@ template <int T, int P> class Search {
         int iterations;
         From from;
         double rho_t;
-        VectorXd (Search::*run)(System<T> &, VectorXd);
+        VectorXd (Search::*run)(System<T> &, const VectorXd &);
     };
-    static constexpr std::array<Method, 5> methods{{
-        {"newton", false, Tuning::newton_most, From::start, 1.0, &Search::newton},
-        {"newton, 3 rho_t", true, Tuning::newton_most, From::start, 3.0, &Search::newton},
-        {"interior_point", false, Tuning::interior_most, From::start, 1.0, &Search::interior_point},
-        {"proximal_point", false, Tuning::proximal_most, From::last, 1.0, &Search::proximal},
-        {"homotopy", false, Tuning::homotopy_most, From::start, 1.0, &Search::homotopy},
-    }};
+    static std::array<Method, 5> methods() {
+        return {{
+            {"newton", false, Tuning::newton_most, From::start, 1.0, &Search::newton},
+            {"newton, 3 rho_t", true, Tuning::newton_most, From::start, 3.0, &Search::newton},
+            {"interior_point", false, Tuning::interior_most, From::start, 1.0,
+             &Search::interior_point},
+            {"proximal_point", false, Tuning::proximal_most, From::last, 1.0, &Search::proximal},
+            {"homotopy", false, Tuning::homotopy_most, From::start, 1.0, &Search::homotopy},
+        }};
+    }
 
   public:
     Search(const Operator &op, const AnyLaw<P> &law, const VectorXd &q, const Options &options)
@@ -66,7 +69,7 @@ template <int T, int P> class Search {
         const VectorXd start = scaling_.make_unit(nearest(starts));
         const auto &without = options_.without;
         VectorXd last = start;
-        for (const Method &method : methods) {
+        for (const Method &method : methods()) {
             if (best_.converged || budget_.over())
                 return;
             if ((method.of_friction_alone && T == 0) ||
@@ -113,7 +116,8 @@ template <int T, int P> class Search {
         return r;
     }
 
-    VectorXd newton(System<T> &system, VectorXd r) {
+    VectorXd newton(System<T> &system, const VectorXd &start) {
+        VectorXd r = start;
         const auto certified = [&](const VectorXd &mapped) { return certify(system, mapped); };
         const double target = Tuning::judged_from * std::min(options_.tol, options_.slip_tol);
         Newton<T> newton(system);
@@ -128,13 +132,14 @@ template <int T, int P> class Search {
     }
 
     /// Newton's method from the end of the interior point method, which is returned.
-    VectorXd interior_point(System<T> &system, VectorXd) {
-        const VectorXd end = InteriorPoint<T>(system).run(budget_);
+    VectorXd interior_point(System<T> &system, const VectorXd &) {
+        VectorXd end = InteriorPoint<T>(system).run(budget_);
         newton(system, end);
         return end;
     }
 
-    VectorXd proximal(System<T> &system, VectorXd r) {
+    VectorXd proximal(System<T> &system, const VectorXd &start) {
+        VectorXd r = start;
         system.inverse = nullptr;
         const auto error = [&](const VectorXd &mapped) {
             last_error_ = 0.0;
@@ -148,7 +153,7 @@ template <int T, int P> class Search {
     }
 
     /// From many easier problems and starts.
-    VectorXd homotopy(System<T> &system, VectorXd start) {
+    VectorXd homotopy(System<T> &system, const VectorXd &start) {
         Random random;
         const auto finish = [&](VectorXd &r) {
             r = newton(system, r);
