@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.forms import times_volume
+from dolfinx_contact.contact.sliding import nothing_holds
 from dolfinx_contact.error import BLIND, EPSILON, contact_rounding
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed_input import principal_axes
@@ -77,31 +78,56 @@ class Statics:
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
         self.start, self._last, self.placed, self.said = last, last, False, ""
-        escape = self._escape()
-        if escape is not None:
-            self.said = (
-                f"The loads drive {body.loose.words(escape)}, which no reactions of the contact nodes within their friction can "
+        escape, self._balancing = self._escape(self._motion, self.loads)
+        if escape is None and step.planes is not None:
+            escape, _ = self._escape(*self._with_planes(step.planes))
+            self.said = "" if escape is None else nothing_holds(contacts)
+        # Planes that move alone are the concern of ``DrivenPlanes.beyond``.
+        if escape is not None and np.linalg.norm(escape[:m]) > SMALL * np.linalg.norm(escape):
+            self.said = self.said or (
+                f"The loads drive {body.loose.words(escape[:m])}, which no reactions of the contact nodes within their friction can "
                 "hold: no static state exists"
             )
 
-    def _escape(self) -> np.ndarray | None:
-        """A motion along which the loads push the body and no reaction can hold it, ``shape=(m,)``; None if there is none.
+    def _with_planes(self, planes) -> tuple[np.ndarray, np.ndarray]:
+        """Motions of the contact nodes with those of planes under dead loads behind the body's, and what drives both.
+
+        Of such planes reactions are in balance with their forces: ``D^T r = F``, what they press with is known.
+        """
+        dead, felt = planes.springs == 0.0, self._felt.max()
+        driving, parts = planes.driving()[dead], [np.zeros((0, self._dim, dead.sum()))]
+        for contact, axes in zip(self._contacts, planes.axes):
+            turns = principal_axes(contact.free_friction, contact.points.count, self._dim)
+            parts.append(-turns @ axes[:, :, dead])
+        moved = np.concatenate(parts)
+        sizes = np.sqrt(self._body.total((moved**2).sum(axis=(0, 1))) / felt)
+        sizes[sizes == 0.0] = np.inf  # nothing of it is felt
+        return np.concatenate((self._motion, moved / sizes), axis=2), np.append(
+            self.loads, driving / sizes
+        )
+
+    def _escape(self, motion, loads) -> tuple[np.ndarray | None, np.ndarray]:
+        """A motion along which loads push and no reaction can hold, ``shape=(m,)``, None if there is none; what balances them.
+
+        Args:
+            motion: Of the contact nodes, ``shape=(n, gdim, m)``.
+            loads: Along the motions.
 
         The sums of forces and moments that reactions in their friction cones can have are a cone.  The loads' nearest
         point in it leaves a rest: along that motion loads do work, and reactions can only do more.  It is found by
         the rays that reach farthest along the rest, one after another, and least squares with weights that are not
         negative.  The last ones are reactions that balance the loads.
         """
-        unit = float(np.linalg.norm(self.loads)) or 1.0
-        target, rays, weights = -self.loads / unit, np.zeros((self.loads.size, 0)), np.zeros(0)
-        rest, kept, self._balancing = target, [], np.zeros(self._motion.shape[:2])
+        unit = float(np.linalg.norm(loads)) or 1.0
+        target, rays, weights = -loads / unit, np.zeros((loads.size, 0)), np.zeros(0)
+        rest, kept, balancing = target, [], np.zeros(motion.shape[:2])
         for _ in range(RAYS):
             if np.linalg.norm(rest) <= BALANCED:
                 break
-            reach, ray, *reaction = self._farthest(rest)
+            reach, ray, *reaction = self._farthest(motion, rest)
             length = float(np.linalg.norm(ray))
             if reach <= length * max(1e-14, np.linalg.norm(rest) / JAMMED):
-                return self._along_planes(-rest, kept, weights)
+                return self._along_planes(-rest, loads, kept, weights), balancing
             rays = np.column_stack((rays[:, weights > 0], ray))
             kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
             weights, _ = self._body.comm.bcast(
@@ -109,10 +135,12 @@ class Statics:
             )
             rest = target - rays @ weights
         for weight, (_, reaction) in zip(weights, kept):
-            self._balancing += unit * weight * reaction
-        return None  # or not decided: the solver will
+            balancing += unit * weight * reaction
+        return None, balancing  # or not decided: the solver will
 
-    def _along_planes(self, motion: np.ndarray, kept: list, weights: np.ndarray) -> np.ndarray:
+    def _along_planes(
+        self, motion: np.ndarray, loads, kept: list, weights: np.ndarray
+    ) -> np.ndarray:
         """The part of a motion with which the nodes of some reactions stay on their planes, if loads drive that."""
         normals = [normal for (normal, _), weight in zip(kept, weights) if weight > 0]
         if normals:
@@ -120,17 +148,19 @@ class Statics:
                 motion
                 - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
             )
-            if along @ self.loads > SMALL * np.linalg.norm(self.loads) * np.linalg.norm(motion):
+            if along @ loads > SMALL * np.linalg.norm(loads) * np.linalg.norm(motion):
                 return along
         return motion
 
-    def _farthest(self, along: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    def _farthest(
+        self, motion, along: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Of reactions with ``r_n = 1`` at one node those whose sums reach farthest along a motion.
 
         Returns:
             How far; the sums; what ``r_n`` alone makes of them; the reactions of this rank's nodes.
         """
-        velocity, reaction = self._motion @ along, np.zeros(self._motion.shape[:2])
+        velocity, reaction = motion @ along, np.zeros(motion.shape[:2])
         tangential = self._mu * velocity[:, :-1]
         length = np.linalg.norm(tangential, axis=1)
         reach = velocity[:, -1] + length
@@ -141,7 +171,7 @@ class Statics:
             k = int(reach.argmax())
             way = np.divide(tangential[k], length[k], np.zeros(self._dim - 1), where=length[k] > 0)
             reaction[k] = np.append(self._mu[k] * way, 1.0)
-            ray = reaction[k] @ self._motion[k], self._motion[k, -1]
+            ray = reaction[k] @ motion[k], motion[k, -1]
         return reached, *self._body.comm.bcast(ray, root=owner), reaction
 
     def place(self) -> None:

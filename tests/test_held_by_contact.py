@@ -409,3 +409,19 @@ def test_a_bar_between_walls_is_heated_and_cools_down(mu, undetermined):
             step = problem.solve()
             assert max(step.error, step.forward_error) < 1e-12 and step.iterations < 300
             assert np.abs(contacts[0].force()).max() < 1e-11
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_more_than_a_gripper_holds_is_refused_at_once(dim):
+    """Plates squeeze a block by a force N: 2 mu N hold it; beyond, and where it pushes a plate away, nothing is searched."""
+    scene = Loose(dim, mu=0.3, faces=("low", "high"))
+    scene.problem.solver = None
+    plate, side = scene.contacts[1].plane, np.eye(dim)[0]
+    plate.free, plate.force = ("n",), -1e-3 * scene.up
+    scene.load(*0.95 * 0.6e-3 * side)
+    force, _ = scene.sums()
+    assert np.abs(force + 0.95 * 0.6e-3 * side).max() < 1e-9
+    for load, said in ((1.001 * 0.6e-3 * side, r"along \(1, 0"), (2e-3 * scene.up, r"along \(0, (0, )?1\)")):  # fmt: skip
+        with pytest.raises(dc.NotConverged, match=f"a translation {said}.*no static state") as caught:  # fmt: skip
+            scene.load(*load)
+        assert caught.value.step.iterations == 0
