@@ -272,7 +272,7 @@ def test_where_the_second_solver_starts(end, given):
 
     bound = object.__new__(automatic.BoundAutomatic)
     bound._why, bound._solvers, bound._bound = "", [0, 1], {0: solver(end), 1: solver(0.0)}
-    step = SimpleNamespace(tol=1e-8, slides=lambda: False)
+    step = SimpleNamespace(tol=1e-8, statics=None, slides=lambda: False)
     step.measure = lambda x: Errors(step.error, 0.0, 0.0)
     bound.solve(step)
     assert starts[0] is None and (starts[1] is x if given else starts[1] is None)
