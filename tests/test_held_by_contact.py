@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Bodies held by contact alone: statics, soft springs that hold the same body, and what is refused with the motion named."""
 
+import re
 import warnings
 
 import numpy as np
@@ -425,3 +426,19 @@ def test_more_than_a_gripper_holds_is_refused_at_once(dim):
         with pytest.raises(dc.NotConverged, match=f"a translation {said}.*no static state") as caught:  # fmt: skip
             scene.load(*load)
         assert caught.value.step.iterations == 0
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_no_motion_is_named_by_a_point_far_from_the_body(dim):
+    """A turn about a point of the body is said as that; about one ten metres away as a translation that turns a little."""
+    scene = Loose(dim)
+    scene.load(*-1e-3 * scene.up)
+    body, V = scene.problem.body, scene.u.function_space
+    for centre, said in (((1.0, 0.0), r"a rotation about .*\(1, (0.5, )?0\)"), ((-9.7, 0.4), r"a translation along \(0, (0, )?-?1\) that turns a little about the middle")):  # fmt: skip
+        turned = fem.Function(V)
+        turned.interpolate(
+            lambda x, at=centre: np.array([-(x[dim - 1] - at[1]), *[0 * x[0]] * (dim - 2), x[0] - at[0]])
+        )  # fmt: skip
+        Z, motion = body.loose.modes, turned.x.array[: body.size]
+        c = np.linalg.solve(body.total(Z.T @ Z), body.total(Z.T @ motion))
+        assert re.fullmatch(said, body.loose.words(c).split(" (0.5")[0])

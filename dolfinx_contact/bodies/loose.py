@@ -12,6 +12,9 @@ from scipy.linalg import block_diag
 # What is smaller than this part of the largest component is not said of a motion.
 SAID = 3e-3
 
+# Sizes of the body from its middle, beyond which nobody looks for the axis of a rotation.
+NEAR = 3.0
+
 
 class LoosePart(NamedTuple):
     """A connected part of a body, and its motions that cost no energy."""
@@ -57,6 +60,9 @@ class LooseMotions:
             return f"a translation along {_rounded(along)}{of}"
         axis = turning / np.linalg.norm(turning)
         arm = np.cross(axis, np.append(along, np.zeros(3 - gdim))) / np.linalg.norm(turning)
+        if np.linalg.norm(arm) > NEAR * part.size:
+            middle = ", ".join(f"{x:.4g}" for x in part.middle)
+            return f"a translation along {_rounded(along)} that turns a little about the middle ({middle}){of}"
         at = part.middle + arm[:gdim]
         at[np.abs(at) < SAID * part.size] = 0.0
         about = f"({', '.join(f'{x:.4g}' for x in at)}){of}"
