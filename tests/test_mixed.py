@@ -66,7 +66,7 @@ def test_even_compression_without_friction(compliance):
     np.testing.assert_allclose(p.x.array, -2 * across, rtol=1e-10)
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error::UserWarning")
 def test_compression_between_walls():
     """Where nearly incompressible rubber cannot escape, the force is that of its bulk; a large pressure is no large displacement."""
     scene = block(compliance=1e-6, mu=0.0, whole=False, confined=True)
