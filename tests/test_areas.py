@@ -13,6 +13,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
 COMM = MPI.COMM_WORLD
+pytestmark = pytest.mark.ranks
 E, NU = 210e3, 0.3
 
 
@@ -213,3 +214,47 @@ def test_weights_that_are_not_positive_are_refused(wrong):
     foot = boundary(body, lambda x: np.isclose(x[1], 0))
     with pytest.raises(ValueError, match="weight"):
         dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0), weight=wrong).area  # noqa: B018
+
+
+HALVES = [("default", 2, 1), ("fixed point", 2, 1), ("sparse", 2, 1), ("condensed", 3, 1), ("default", 2, 2), ("fixed point", 3, 1)]  # fmt: skip
+
+
+@pytest.mark.parametrize("solver, dim, order", HALVES)
+def test_two_contacts_on_one_face_are_one_with_the_mean_at_their_edge(solver, dim, order):
+    """A face in two parts of different friction: forces are those of one contact whose edge nodes have the mean by area."""
+    solver = {"default": None, "fixed point": dc.FixedPoint(), "condensed": dc.CondensedNewton(), "sparse": dc.SparseNewton()}[solver]  # fmt: skip
+    cut, laws, found = 0.4, (0.3, 0.1), []
+    if dim == 2:
+        body = mesh.create_rectangle(COMM, [[0, 0], [1, 1]], [5, 4], mesh.CellType.quadrilateral)
+    else:
+        body = mesh.create_box(COMM, [[0, 0, 0], [1, 1, 1]], [5, 2, 2], mesh.CellType.hexahedron)
+    V = functionspace(body, ("Lagrange", order, (dim,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = elasticity(u, v, 1000.0, 0.0)
+    head = boundary(body, lambda x: np.isclose(x[dim - 1], 1))
+    held = fem.Constant(body, np.zeros(dim))
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, dim - 1, head), V)
+    plane = dc.RigidPlane(np.zeros(dim), np.eye(dim)[-1])
+    foot = lambda low, high: boundary(  # noqa: E731
+        body, lambda x: np.isclose(x[dim - 1], 0) & (x[0] > low - 1e-9) & (x[0] < high + 1e-9)
+    )
+
+    def mean(x):
+        return np.where(np.isclose(x[0], cut), np.mean(laws), np.where(x[0] < cut, *laws))
+
+    for apart in (True, False):
+        if apart:
+            parts = ((0, cut), (cut, 1))
+            contacts = [dc.Contact(V, foot(*ends), plane, mu) for ends, mu in zip(parts, laws)]
+        else:
+            contacts = [dc.Contact(V, foot(0, 1), plane, dc.Friction(mean))]
+        u.x.array[:] = 0.0  # no guess from the other one
+        problem = dc.ContactProblem(F, u, contacts, bcs=[bc], solver=solver)
+        for way in (0.0, 0.002, 0.5, 0.45):
+            held.value = (way, *np.zeros(dim - 2), -0.01)
+            problem.solve()
+            found.append([contact.force() for contact in contacts])
+    for apart, whole in zip(found[:4], found[4:]):
+        assert sum(apart) == pytest.approx(whole[0], rel=1e-6, abs=1e-6)
+    (friction, *_, normal), (other, *_, rest) = found[2]  # all slides
+    assert (-friction, -other) == pytest.approx((0.3 * normal, 0.1 * rest), rel=1e-6)

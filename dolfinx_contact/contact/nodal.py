@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: MIT
 r"""The contact problem of a node by itself, on a spring, with several surfaces at once.
 
-.. math:: r_c = R_c(F_c (p - \sum_{d \ne c} F_d^T r_d), w_c)
+.. math:: r_c = R_c(s_c F_c (p - \sum_{d} F_d^T r_d), w_c)
 
-with the force ``p`` on the node, return maps ``R_c``, frames ``F_c``, gaps and slips ``w_c``.  The spring, the same for all
+with the force ``p`` on the node, return maps ``R_c``, frames ``F_c``, gaps and slips ``w_c``, and the sum over contacts of other normals.
+Contacts of the same normal share what is left with the parts ``s_c``, which are one for all others.  The spring, the same for all
 contacts, moves the node by ``(sum F^T r - p) / spring``.  Semismooth Newton, and Gauss-Seidel sweeps over the contacts.
 """
 
@@ -44,15 +45,18 @@ class NodalProblems:
         parts: Of each contact.
         frames: ``shape=(m, n, gdim, gdim)``, zero where a contact has not the node.
         force: ``p``, ``shape=(m, gdim)``, global frame.
+        alike: Which contacts have the same normal, ``shape=(m, n, n)``.
+        shares: ``s``, ``shape=(m, n)``.
     """
 
-    def __init__(self, parts: list[Part], frames: np.ndarray, force: np.ndarray):
+    def __init__(self, parts: list[Part], frames: np.ndarray, force, alike, shares):
         self._parts, self._shape = parts, frames.shape[:3]
         m, n, dim = self._shape
         self.stacked = frames.reshape(m, n * dim, dim)
-        others = 1.0 - np.kron(np.eye(n), np.ones((dim, dim)))
-        self.coupling = self.stacked @ self.stacked.transpose(0, 2, 1) * others
-        self._force, self._all = force, times(self.stacked, force)
+        others = ~(alike | np.eye(n, dtype=bool)).repeat(dim, axis=1).repeat(dim, axis=2)
+        self.asks = shares.repeat(dim, axis=1)[:, :, None] * self.stacked
+        self.coupling = self.asks @ self.stacked.transpose(0, 2, 1) * others
+        self._force, self._all = force, times(self.asks, force)
         self._terms = np.linalg.norm(force, axis=1)
         for part in parts:
             lengths = np.abs(part.gap) + np.abs(part.slip).sum(axis=1)

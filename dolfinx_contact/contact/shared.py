@@ -13,6 +13,10 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part
+from dolfinx_contact.law.friction import Friction
+
+# By which the product of two unit normals may miss one for them to be the same.
+ALIKE = 1e-12
 
 
 def shared_nodes(contacts, stiffness, fixed: np.ndarray) -> SharedNodes | None:
@@ -27,7 +31,64 @@ def shared_nodes(contacts, stiffness, fixed: np.ndarray) -> SharedNodes | None:
         return None
     nodes, counts = np.unique(np.concatenate([c.nodes for c in contacts]), return_counts=True)
     nodes = nodes[counts > 1]
-    return SharedNodes(contacts, stiffness, fixed, nodes) if nodes.size else None
+    alike, shares = shares_of(contacts, nodes)
+    return SharedNodes(contacts, stiffness, fixed, nodes, alike, shares) if nodes.size else None
+
+
+def shares_of(contacts, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which contacts have the same normal at nodes, and the part of what presses there that each of those carries.  Collective.
+
+    Two contacts on one face leave open how the reaction of a node of their common edge is shared; it is by area.
+
+    Args:
+        contacts: The contacts.
+        nodes: Sorted, ``shape=(m,)``.
+
+    Returns:
+        ``shape=(m, n, n)``, booleans, false on the diagonal; and ``(m, n)``, one where no other has the same normal.
+    """
+    n, dim = len(contacts), contacts[0].points.dim
+    normals, area = np.zeros((nodes.size, n, dim)), np.zeros((nodes.size, n))
+    found = [np.intersect1d(contact.nodes, nodes, return_indices=True)[1:] for contact in contacts]
+    for k, (contact, (rows, slots)) in enumerate(zip(contacts, found)):
+        normals[slots, k] = contact.points.frames[rows, -1]
+    alike = normals @ normals.transpose(0, 2, 1) > 1.0 - ALIKE
+    if contacts[0].comm.allreduce(bool((alike.sum(axis=2) > 1).any()), op=MPI.LOR):
+        for k, (contact, (rows, slots)) in enumerate(zip(contacts, found)):
+            area[slots, k] = contact.area[rows]
+    together = (alike * area[:, None, :]).sum(axis=2)
+    equal = 1.0 / np.maximum(alike.sum(axis=2), 1)
+    shares = np.divide(area, together, out=equal, where=together > 0.0)
+    return alike & ~np.eye(n, dtype=bool), shares
+
+
+def mean_laws(laws, contacts) -> list[Friction]:
+    """Friction of each contact with, at nodes of several contacts with the same normal, the mean of theirs by shares.  Collective.
+
+    That of the node as a whole, for solvers that do not know of shares: exact where it is isotropic, along principal directions else.
+    """
+    if len(contacts) < 2:
+        return laws
+    nodes, counts = np.unique(np.concatenate([c.nodes for c in contacts]), return_counts=True)
+    alike, shares = shares_of(contacts, nodes[counts > 1])
+    if not contacts[0].comm.allreduce(bool(alike.any()), op=MPI.LOR):
+        return laws
+    nodes, n = nodes[counts > 1], len(contacts)
+    mu, p = np.zeros((2, nodes.size, n, 2))
+    found = [np.intersect1d(contact.nodes, nodes, return_indices=True)[1:] for contact in contacts]
+    for k, (law, contact, (rows, slots)) in enumerate(zip(laws, contacts, found)):
+        for of, given in ((mu, law.mu), (p, law.p)):
+            of[slots, k] = np.broadcast_to(given, (contact.nodes.size, 2))[rows]
+    among = alike | np.eye(n, dtype=bool)
+    mu, p = ((among * shares[:, None, :]) @ of for of in (mu, p))
+    mixed = []
+    for k, (law, contact, (rows, slots)) in enumerate(zip(laws, contacts, found)):
+        own = [np.broadcast_to(of, (contact.nodes.size, 2)).copy() for of in (law.mu, law.p)]
+        these = alike[slots, k].any(axis=1)
+        for of, mean in zip(own, (mu, p)):
+            of[rows[these]] = mean[slots[these], k]
+        mixed.append(Friction(own[0], np.where(own[0] > 0, own[1], 1.0), axes=law.axes))
+    return mixed
 
 
 def any_shared(contacts) -> bool:
@@ -46,9 +107,10 @@ class SharedNodes:
         stiffness: ``NodalStiffness`` of each; the spring of a node is the mean of its normal stiffnesses.
         fixed: Owned degrees of freedom that boundary conditions fix.
         nodes: The nodes, sorted, ``shape=(m,)``.
+        alike, shares: As ``shares_of`` returns them.
     """
 
-    def __init__(self, contacts, stiffness, fixed: np.ndarray, nodes: np.ndarray):
+    def __init__(self, contacts, stiffness, fixed: np.ndarray, nodes, alike, shares):
         self._contacts, dim = contacts, contacts[0].points.dim
         self._dofs = dim * nodes[:, None] + np.arange(dim)
         m, n = nodes.size, len(contacts)
@@ -62,6 +124,7 @@ class SharedNodes:
             springs[slots, k] = of.normal[rows]
             self._rows.append(rows)
             self._slots.append(slots)
+        self._alike, self._shares = alike, shares
         self._spring = springs.sum(axis=1) / (springs > 0).sum(axis=1)
         self._copies = [np.tile(rows, n + 2) for rows in self._rows]
         self._laws = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._copies)]
@@ -104,7 +167,8 @@ class SharedNodes:
             spring = np.tile(self._spring[slots], copies)
             parts.append(Part(every, law, spring, np.tile(gap, copies), np.tile(slip, (copies, 1))))
         frames = np.tile(self._frames, (copies, 1, 1, 1))
-        return NodalProblems(parts, frames, np.tile(self._force, (copies, 1)))
+        alike, shares = np.tile(self._alike, (copies, 1, 1)), np.tile(self._shares, (copies, 1))
+        return NodalProblems(parts, frames, np.tile(self._force, (copies, 1)), alike, shares)
 
     def give(self, k: int) -> None:
         """Give a contact the reactions that its map starts from at these nodes."""
@@ -121,13 +185,15 @@ class SharedNodes:
         """
         problems = self._problems(1, self._law, self._rows)
         _, by_asked, by_motion = problems.linearised(self._asked)
-        C, F = problems.coupling, problems.stacked
+        C, F, asks = problems.coupling, problems.stacked, problems.asks
         inverse = C @ np.linalg.pinv(np.eye(C.shape[1]) + by_asked @ C, SINGULAR)
         shape = *self._shape, self._shape[-1]
-        asked, moved = ((-inverse @ part @ F).reshape(shape) for part in (by_asked, by_motion))
+        both = ((by_asked, asks), (by_motion, F))
+        asked, moved = ((-inverse @ part @ by).reshape(shape) for part, by in both)
         for k, (by_reaction, by_slip) in enumerate(derivatives):
             rows, slots = self._rows[k], self._slots[k]
             back = self._frames[slots, k].transpose(0, 2, 1)
             by_slip[rows] += by_reaction[rows] @ moved[slots, k] @ back
-            by_reaction[rows] += by_reaction[rows] @ asked[slots, k] @ back
+            own = self._shares[slots, k, None, None] * np.eye(back.shape[1])
+            by_reaction[rows] = by_reaction[rows] @ (own + asked[slots, k] @ back)
         return derivatives

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from dolfinx_contact.checks import RoundingWarning
 from dolfinx_contact.collective import by_first_rank, raised_together
-from dolfinx_contact.contact.shared import any_shared
+from dolfinx_contact.contact.shared import any_shared, mean_laws
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.compliance import Rows, bytes_needed, check_memory, compliance, tie
@@ -71,7 +71,7 @@ class CondensedBody:
         guided = any(contact.points.along.any() for contact in contacts)
         self._guided = self.dim == 3 and self.comm.allreduce(guided, op=MPI.LOR)
         self._moved = [moved_across(contact) for contact in contacts]
-        self._laws = [acting(contact, moved) for contact, moved in zip(contacts, self._moved)]
+        self._laws = self._acting()
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
@@ -105,9 +105,14 @@ class CondensedBody:
     def destroy(self) -> None:
         """Nothing to free: the body owns the factorisation."""
 
+    def _acting(self) -> list[Friction]:
+        """Friction of each contact as it acts on this problem.  Collective."""
+        laws = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        return mean_laws(laws, self._contacts)
+
     def renew_law(self) -> bool:
         """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""
-        now = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        now = self._acting()
         turned = not all(np.array_equal(a.axes, b.axes) for a, b in zip(now, self._laws))
         if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
             return False
