@@ -14,6 +14,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 
 SOLVED = """
+import dolfinx_contact  # before PETSc, which one of DOLFINx's wheels needs
 import numpy as np
 from petsc4py import PETSc
 from dolfinx_contact.petsc.linear_solver import LinearSolver
