@@ -27,8 +27,8 @@ OWNERS = ("body", "surface")  # of a texture
 _SMALLEST, _LARGEST = 1e-50, 1e50
 
 # What stands for infinity: nodes slide only where their normal reaction is less than a ten-thousandth of the tangential one.
-# What nodes that are about to open make of it falls with 1 / ROUGH; solvers find states with them up to here.
-ROUGH = 1e4
+# What nodes that are about to open make of it falls with 1 / ROUGH; solvers find states with them up to here at once, beyond it by luck.
+ROUGH = 1e3
 
 
 def rough(mu):
@@ -82,7 +82,7 @@ class Friction(Guarded):
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
             ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
-            frictionless, infinity perfectly rough: what touches sticks; a contact takes 1e4 for all that is larger. Or a field, see below.
+            frictionless, infinity perfectly rough: what touches sticks; a contact takes 1e3 for all that is larger. Or a field, see below.
         p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
         axes: Principal friction direction x at each node, e.g. of grooves: unit vectors

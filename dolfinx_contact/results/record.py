@@ -167,7 +167,8 @@ def warn_of_rounding(step: Step, tol: float) -> None:
 def warn_of_contact(step: Step, tol: float) -> None:
     """Warn, in the name of who called ``solve``, of reactions far less accurate than the tolerance, if a smaller one would help."""
     left = max(step.error, step.slip_error, step.forward_error)
-    if WORSE * tol < step.contact_error < np.inf and left > ROUNDED * step.rounding:
+    known = max(tol, left)  # where that is more than tol, rounding is warned of
+    if WORSE * known < step.contact_error < np.inf and left > ROUNDED * step.rounding:
         warnings.warn(
             f"contact carries {left / step.contact_error:.1e} of the forces that act: its own may be off by {step.contact_error:.1e}, "
             f"more than {WORSE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",
