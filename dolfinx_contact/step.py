@@ -303,8 +303,10 @@ class LoadStep:
             for column, part in zip(columns, parts):
                 column.append(part.ravel())
         law, penetration, slip, rounding, reaction = map(np.concatenate, columns)
-        before, self._before = self._before, reaction
-        change = np.full(1, np.inf) if before is None else reaction - before
+        # Where contacts share a node only the sum is the state's; how they share it may jump.
+        acts = reaction if self._shared is None else self.free(self.with_reactions(0.0 * left))
+        before, self._before = self._before, acts
+        change = np.full(1, np.inf) if before is None else acts - before
         cancelling = EPSILON * (self.body.cancelling(x) + acting)
         if self.planes is not None:
             on_planes, terms = self.planes.left()

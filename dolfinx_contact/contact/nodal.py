@@ -18,8 +18,8 @@ import numpy as np
 from dolfinx_contact.error import EPSILON
 from dolfinx_contact.law.maps import ReturnMap
 
-# Newton's steps at most, and sweeps over the contacts after one that does not help.
-MOST, SWEEPS = 30, 4
+# Newton's steps at most, those in which a residual has to halve, and sweeps over the contacts after one that does not help.
+MOST, PATIENCE, SWEEPS = 30, 8, 4
 
 # A residual that is rounding, over the size of its terms, and what a step has to leave at most.
 ROUNDED, HELPS = 64 * EPSILON, 0.5
@@ -80,8 +80,9 @@ class NodalProblems:
         left, slope = self._left(r)
         size = np.linalg.norm(left, axis=1)
         best, smallest = r, size
+        halved, since = size, np.zeros(size.size, dtype=int)
         for _ in range(MOST):
-            goes_on = ~(size <= self._rounding(r))
+            goes_on = ~(size <= self._rounding(r)) & (since < PATIENCE)
             if not goes_on.any():
                 break
             trial = r.copy()
@@ -104,6 +105,8 @@ class NodalProblems:
             size = np.where(goes_on, trial_size, size)
             better = size < smallest
             best, smallest = np.where(better[:, None], r, best), np.where(better, size, smallest)
+            helps = smallest <= HELPS * halved
+            halved, since = np.where(helps, smallest, halved), np.where(helps, 0, since + 1)
         return best
 
     def _left(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

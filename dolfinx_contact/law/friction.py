@@ -143,6 +143,7 @@ class Friction(Guarded):
         self.of = of
         self._given, self.exponent = {"mu": mu, "p": p, "axes": axes}, k
         self._laws: dict[int, Any] = {}
+        self._soft: dict[int, np.ndarray] = {}
         self.field = any(map(is_field, self._given.values()))
         if not self.field:
             self._take(mu, p, k, axes)
@@ -251,14 +252,16 @@ class Friction(Guarded):
         Returns:
             The same shape, dimensionless; zero where ``slip`` or ``mu`` is.
         """
-        mu, _, unit = self._resisted(slip, slip)
-        return self._from_axes(mu * unit)
+        unit, _ = self._resisted(slip)
+        return self._from_axes(self.mu[..., : slip.shape[1]] * unit)
 
-    def drag_slope(self, slip: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Derivative of ``along . drag(slip + w along)`` by w, ``shape=(n,)``, per length of the slip."""
-        mu, rate, unit = self._resisted(slip, along)
+    def drag_with_slope(self, slip: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``drag(slip)``, and the derivative of ``along . drag(slip + w along)`` by w, ``shape=(n,)``, per length of the slip."""
+        (unit, length), along = self._resisted(slip), self.along_axes(along)
+        mu, T = self.mu[..., : slip.shape[1]], slip.shape[1]
+        rate = np.divide(self._softness(T) * along, length, out=np.zeros_like(along), where=length > 0)  # fmt: skip
         turning = rate - (rate * unit).sum(axis=1, keepdims=True) * unit
-        return (self.along_axes(along) * mu * turning).sum(axis=1)
+        return self._from_axes(mu * unit), (along * mu * turning).sum(axis=1)
 
     def over_radii(self, t: np.ndarray) -> np.ndarray:
         """``M^-1 t`` along the principal directions, ``shape=(n, T)``; zero without friction."""
@@ -269,25 +272,22 @@ class Friction(Guarded):
         """``M t`` in the local frame, ``shape=(n, T)``."""
         return self._from_axes(self.mu[..., : t.shape[1]] * self.along_axes(t))
 
-    def _resisted(self, slip: np.ndarray, along: np.ndarray) -> tuple:
-        """``mu``, ``M^-1 P^2 along`` over the length of ``M^-1 P^2 slip``, and the latter's unit vector: principal directions."""
-        T = slip.shape[1]
+    def _resisted(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit vector and length of ``M^-1 P^2 slip``, the latter up to a factor, along the principal directions."""
         largest = np.abs(slip).max(axis=1, keepdims=True, initial=0.0)
-        slip, along = (
-            np.divide(part, largest, out=np.zeros_like(part), where=largest > 0)
-            for part in (slip, along)
-        )
-        mu = self.mu[..., :T]
-        weight = self.Q[..., :T] ** 2 * mu
-        largest = weight.max(axis=-1, keepdims=True)
-        weight = np.divide(weight, largest, out=np.zeros_like(weight), where=largest > 0)
-        resisted, rate = (weight * self.along_axes(part) for part in (slip, along))
+        unit = np.divide(slip, largest, out=np.zeros_like(slip), where=largest > 0)
+        resisted = self._softness(slip.shape[1]) * self.along_axes(unit)
         length = np.linalg.norm(resisted, axis=1, keepdims=True)
-        unit, rate = (
-            np.divide(part, length, out=np.zeros_like(part), where=length > 0)
-            for part in (resisted, rate)
-        )
-        return mu, rate, unit
+        unit = np.divide(resisted, length, out=np.zeros_like(resisted), where=length > 0)
+        return unit, largest * length
+
+    def _softness(self, T: int) -> np.ndarray:
+        """Diagonal of ``M^-1 P^2``, largest entry 1, ``shape=(T,)`` or ``(n, T)``; zero without friction."""
+        if T not in self._soft:
+            weight = self.Q[..., :T] ** 2 * self.mu[..., :T]
+            largest = weight.max(axis=-1, keepdims=True)
+            self._soft[T] = np.divide(weight, largest, out=np.zeros_like(weight), where=largest > 0)
+        return self._soft[T]
 
     def _from_axes(self, t: np.ndarray) -> np.ndarray:
         """Tangential vectors of these components along the principal friction directions."""

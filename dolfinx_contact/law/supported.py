@@ -18,6 +18,7 @@ These are the law of [dSFMH07, Section 1] for all components together.  Needs Nu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -85,6 +86,14 @@ class SupportedLaw:
     moved: np.ndarray
     kept: np.ndarray
 
+    @cached_property
+    def kinds(self) -> tuple:
+        """Which of the nodes are moved, are guided, are both; what slip alone tells: ``d(known)``, ``f.d(f)``, the law of both."""
+        moved, guided = self.moved.any(axis=1), self.along.any(axis=1)
+        both = np.flatnonzero(moved & guided)
+        most = _dot(self.friction.drag(self.along), self.along)
+        return moved, guided, both, self.friction.drag(self.moved), most, self.friction.at(both)
+
     def return_map(self, reaction, gap, slip, normal, tangential):
         found = self.law.return_map(reaction, gap, slip - self.known, normal, tangential)
         return self._replaced(found, reaction, gap, slip, normal, tangential)
@@ -106,8 +115,7 @@ class SupportedLaw:
         nodes, f = self.nodes, self.along
         R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
         tau = _dot(reaction[nodes, :-1] - tangential[nodes, None] * slip[nodes], f)
-        answer = _Answer(self.friction, f, tangential[nodes])
-        answer.find(R, tau, self.moved, self.kept, self.ratio)
+        answer = _Answer(self, tangential[nodes], R, tau)
         made, status, *derivatives = found
         made, status = made.copy(), status.copy()
         made[nodes] = np.column_stack((answer.friction, R))
@@ -120,58 +128,27 @@ class SupportedLaw:
 class _Answer:
     """Friction of ``k`` supported nodes, and its derivatives by R and by the predictor along ``f``."""
 
-    def __init__(self, law: Friction, f: np.ndarray, rho: np.ndarray):
-        self._law, self._f, self._rho = law, f, rho
-
-    def find(self, R, tau, known, kept, ratio) -> None:
-        moved = known.any(axis=1)
-        guided = self._f.any(axis=1)
-        d, slope = self._law.drag(known), np.zeros(R.size)
-        both = np.flatnonzero(moved & guided)
+    def __init__(self, of: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
+        self._law, self._f, self._rho = of.friction, of.along, rho
+        moved, guided, both, d, most, friction = of.kinds
+        slope = np.zeros(R.size)
         if both.size:
-            w = self._slipped(both, R[both], tau[both], known[both])
-            d[both], slope[both] = self._resisting(both, w, known[both])
-        d_f = _dot(d, self._f)
-        stiff = self._rho + R * np.maximum(slope, 0.0)
+            d = d.copy()
+            rows = (self._f[both], rho[both], R[both], tau[both], of.moved[both])
+            d[both], slope[both] = _slipped(friction, *rows)
+        stiff = rho + R * np.maximum(slope, 0.0)
         self.friction = -R[:, None] * d
-        self.by_predictor, self.by_R = R * np.maximum(slope, 0.0) / stiff, -d_f * self._rho / stiff
+        self.by_predictor, self.by_R = R * np.maximum(slope, 0.0) / stiff, -_dot(d, self._f) * rho / stiff  # fmt: skip
         rest = ~moved
-        most = _dot(self._law.drag(self._f), self._f)
         slips = np.abs(tau) > most * R
         along = np.clip(tau, -most * R, most * R)
-        stuck = along[:, None] * ratio
-        stuck += self._room(stuck, np.where(slips[:, None], 0.0, kept), R) * kept
+        stuck = along[:, None] * of.ratio
+        stuck += self._room(stuck, np.where(slips[:, None], 0.0, of.kept), R) * of.kept
         self.friction[rest] = stuck[rest]
         self.by_predictor[rest] = (guided & ~slips)[rest]
         self.by_R[rest] = (slips * np.sign(tau) * most)[rest]
         self.slips = moved | (guided & slips)
         self.share = np.where(moved[:, None], -d, 0.0)
-
-    def _slipped(self, rows, R, tau, known) -> np.ndarray:
-        """``w`` with ``rho w + R f.d(known + w f) + tau = 0``, which grows with w: Newton's steps within an interval."""
-        rho = self._rho[rows]
-        most = R * np.linalg.norm(self._law.at(rows).mu[..., : known.shape[1]], axis=-1)
-        low, high = (-tau - most) / rho, (-tau + most) / rho
-        w = -tau / rho
-        for _ in range(STEPS):
-            d, slope = self._resisting(rows, w, known)
-            left = rho * w + R * _dot(d, self._f[rows]) + tau
-            low, high = np.where(left < 0.0, w, low), np.where(left > 0.0, w, high)
-            following = w - left / (rho + R * np.maximum(slope, 0.0))
-            outside = ~((low < following) & (following < high))
-            following = np.where(outside, (low + high) / 2, following)
-            following = np.where(left == 0.0, w, following)
-            done = np.abs(following - w) <= np.finfo(float).eps * np.abs(w)
-            w = following
-            if done.all():
-                break
-        return w
-
-    def _resisting(self, rows, w, known) -> tuple[np.ndarray, np.ndarray]:
-        """``d(known + w f)`` and the derivative of ``f.d`` by w."""
-        law, f = self._law.at(rows), self._f[rows]
-        slip = known + w[:, None] * f
-        return law.drag(slip), law.drag_slope(slip, f)
 
     def _room(self, friction, kept, R) -> np.ndarray:
         """Largest part of ``kept`` up to one with which ``friction`` stays within the cone, ``shape=(k, 1)``."""
@@ -196,6 +173,29 @@ class _Answer:
             whole[nodes] = part
             replaced.append(whole)
         return replaced
+
+
+def _slipped(friction: Friction, f, rho, R, tau, known) -> tuple[np.ndarray, np.ndarray]:
+    """``d(known + w f)`` and the derivative of ``f.d`` by w, where ``rho w + R f.d + tau = 0``.
+
+    The left side grows with w: Newton's steps within an interval.
+    """
+    most = R * np.linalg.norm(friction.mu[..., : known.shape[1]], axis=-1)
+    low, high = (-tau - most) / rho, (-tau + most) / rho
+    w = -tau / rho
+    for _ in range(STEPS):
+        d, slope = friction.drag_with_slope(known + w[:, None] * f, f)
+        left = rho * w + R * _dot(d, f) + tau
+        low, high = np.where(left < 0.0, w, low), np.where(left > 0.0, w, high)
+        following = w - left / (rho + R * np.maximum(slope, 0.0))
+        outside = ~((low < following) & (following < high))
+        following = np.where(outside, (low + high) / 2, following)
+        following = np.where(left == 0.0, w, following)
+        done = np.abs(following - w) <= np.finfo(float).eps * np.abs(w)
+        w = following
+        if done.all():
+            break
+    return friction.drag_with_slope(known + w[:, None] * f, f)
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
