@@ -30,8 +30,9 @@ from benchmarks.measurement import commit, now
 from benchmarks.stress import matrix
 from benchmarks.stress.rigs import corner_scenes, rig_scenes
 from benchmarks.stress.scenes import scenes
-from dolfinx_contact.solvers import condensed, condensed_newton
-from dolfinx_contact.solvers.condensed_kernel import condensed_operator
+from dolfinx_contact.solvers.condensed import body as condensed
+from dolfinx_contact.solvers.condensed import newton as condensed_newton
+from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 
 LARGEST = 300  # contacts of a pile
 LIMITS = dict(max_iterations=200_000, newton_iterations=60, fallbacks=True)

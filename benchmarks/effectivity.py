@@ -210,7 +210,7 @@ def off_disc(contact, exact) -> tuple[float, float]:
 def ball_on_flat(scene, order: int) -> dc.ContactProblem:
     """The sphere of demo_ball_on_flat on a quarter of the block, pressed."""
     problem, contact = flat.ball_on_flat(*scene, order=order)
-    contact.plane.displacement = (0, 0, -flat.DELTA)
+    contact.surface.displacement = (0, 0, -flat.DELTA)
     problem.solve()
     return problem
 

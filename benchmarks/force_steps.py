@@ -25,7 +25,7 @@ from studies.punch import CASES, Parameters, Punch, programme
 def cycle(parameters: Parameters, solver: str, values, free=()) -> tuple[list, list, list]:
     """Seconds, reactions and normal forces of the steps in which the plane has each displacement, or each force if ``free``."""
     punch = Punch(parameters, solver=getattr(dc, solver)())
-    plane, contact = punch.contact.plane, punch.contact
+    plane, contact = punch.contact.surface, punch.contact
     plane.free = free
     seconds, reactions, forces = [], [], []
     for value in values:

@@ -59,7 +59,7 @@ def cylinder(cells: int, parts: int, mu: float = 0.0, order: int = 1) -> tuple:
     if mu > 0:
         ways = np.array([0.0, 0.4, 0.8, 0.6, 0.4])  # two increments there, two back
         for way in np.interp(np.arange(1, 4 * parts + 1) / parts, np.arange(5), ways):
-            contact.plane.displacement = np.array([way * stroke, 0.0])
+            contact.surface.displacement = np.array([way * stroke, 0.0])
             problem.solve()
     return float(contact.force()[1]), float(contact.dissipation.sum())
 

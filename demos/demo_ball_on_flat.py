@@ -75,7 +75,7 @@ def ball_on_flat(domain, top, *boundary, order: int = 1):
 def press(cells: int):
     """Press the ball on the block, then leave it to the weight F; the contact after both."""
     problem, contact = ball_on_flat(*scene(cells))
-    ball = contact.plane
+    ball = contact.surface
     ball.displacement = (0, 0, -DELTA)
     problem.solve()
     yield contact
@@ -115,7 +115,7 @@ def main(cells: int = 20):
     assert abs(peak) < 0.01 and within < 0.05
     assert np.allclose(force[:2], normal @ x[:, :2] / R, rtol=1e-3)
     next(states)
-    weighed, way = -4 * contact.force()[2] / FORCE - 1, -contact.plane.displacement[2] / DELTA - 1
+    weighed, way = -4 * contact.force()[2] / FORCE - 1, -contact.surface.displacement[2] / DELTA - 1
     say(f"under its weight: force {weighed:+.1e}, way down {100 * way:+.2f} %")
     assert abs(weighed) < 1e-8 and abs(way) < 0.01
     return r / A, pressure / P0

@@ -68,7 +68,7 @@ def loop(quarter: int, cells: int = 64):
     """Press, push, and go once round; force over F and motion from Q_1 on, and the dissipation of the cycle."""
     problem, _ = cylinder(E, NU, cells=cells)
     contact = problem.contacts[0]
-    plane = contact.plane
+    plane = contact.surface
     plane.free = ("t", "n")
     history = dc.History(problem)
     to_and_fro = AMPLITUDE * np.interp(

@@ -66,7 +66,7 @@ def fret(cycles: int, wear: dc.Wear | None, quarter: int = QUARTER):
     positions = STROKE * np.interp(ramp, [0, 1, 3, 4], [0, 1, -1, 0])
     for cycle in range(1, cycles + 1):
         for position in positions:
-            contact.plane.displacement = np.array([position, 0.0])
+            contact.surface.displacement = np.array([position, 0.0])
             history.record(problem.solve(), cycle=cycle, position=float(position))
             if wear is not None:
                 held.value[1] -= (load - contact.force()[1]) / stiffness

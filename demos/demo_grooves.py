@@ -140,7 +140,7 @@ def main(cells: int = 16):
         sizes[0] / A,
         sizes[1] / B,
         pressure.max() / P0,
-        -contact.plane.displacement[2] / DELTA,
+        -contact.surface.displacement[2] / DELTA,
     ]
     off = np.array(found) - 1
     say(f"off by {100 * off[0]:+.2f} % in a, {100 * off[1]:+.2f} % in b, {100 * off[2]:+.2f} % in p0, {100 * off[3]:+.2f} % "

@@ -144,7 +144,7 @@ def main() -> list[dict]:
     residual_tractions()
     for times, displacements in ((1, (0.3, 0.6, 0.9)), (2, (0.6, 0.3))):
         for displacement in displacements:
-            contact.plane.displacement = np.array([displacement * stroke, 0.0])
+            contact.surface.displacement = np.array([displacement * stroke, 0.0])
             problem.solve()
             now = observe(contact)
             closed, moments = sticking_part(now, before, times)

@@ -103,7 +103,7 @@ def flatten(mu: float, depths) -> dict:
     problem, energy = seal(mu)
     contact, found = problem.contacts[0], {name: [0.0] for name in ("force", "energy", "friction")}
     for depth in depths:
-        contact.plane.displacement = (0.0, -depth)
+        contact.surface.displacement = (0.0, -depth)
         step, errors = solved(problem)
         found["force"].append(-contact.force()[1])
         found["energy"].append(stored(energy))

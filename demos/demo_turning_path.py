@@ -100,7 +100,7 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
     rows, before = [], 0.0
     for angle in path():
         d = np.array([np.cos(angle), np.sin(angle), 0.0])
-        contact.plane.displacement = contact.plane.displacement + STEP * d
+        contact.surface.displacement = contact.surface.displacement + STEP * d
         step = problem.solve()
         assert step.counts.slip == sum(step.counts)  # all nodes touch and slide
         force, expected = contact.force(), closed_form(angle, p)

@@ -94,7 +94,7 @@ def friction(problem):
 def main(turns: int = 5):
     """Press and turn; print and assert what is claimed above; positions and friction."""
     problem = pin()
-    contact, plate = problem.contacts[0], problem.contacts[0].plane
+    contact, plate = problem.contacts[0], problem.contacts[0].surface
     problem.solve()
     expected, before = MU * WEIGHT * mean_radius(), 0.0
     for k in range(1, turns + 1):

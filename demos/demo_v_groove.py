@@ -127,7 +127,9 @@ def main():
         turning = sum(moment(contact) for contact in problem.contacts)
         assert np.abs(forces.sum(axis=0) - [0, WEIGHT]).max() < 1e-7 * WEIGHT
         assert abs(turning + part * largest) < 1e-7 * WEIGHT * RADIUS
-        normal = [force @ contact.plane.normal for force, contact in zip(forces, problem.contacts)]
+        normal = [
+            force @ contact.surface.normal for force, contact in zip(forces, problem.contacts)
+        ]
         table.append([part, *np.array(normal) / WEIGHT])
         say(f"T = {part:5.3f} T_max: N_1 = {normal[0]:.4f}, N_2 = {normal[1]:.4f} N per mm")
     assert np.allclose(normal, expected, rtol=0.01)

@@ -24,20 +24,15 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:  # what type checkers and editors read; a test compares it with _HOME
-    from dolfinx_contact.adaptation import Adapted as Adapted
-    from dolfinx_contact.adaptation import adapt as adapt
-    from dolfinx_contact.checks import RoundingWarning as RoundingWarning
+    from dolfinx_contact.analysis.adapt import Adapted as Adapted
+    from dolfinx_contact.analysis.adapt import adapt as adapt
+    from dolfinx_contact.analysis.converge import Converged as Converged
+    from dolfinx_contact.analysis.converge import converge as converge
+    from dolfinx_contact.analysis.estimate import Estimate as Estimate
+    from dolfinx_contact.analysis.estimate import estimate as estimate
+    from dolfinx_contact.analysis.increments import advance as advance
     from dolfinx_contact.contact.contact import Contact as Contact
-    from dolfinx_contact.contact.curved import RigidCylinder as RigidCylinder
-    from dolfinx_contact.contact.curved import RigidSphere as RigidSphere
-    from dolfinx_contact.contact.history import Status as Status
-    from dolfinx_contact.contact.level import RigidSurface as RigidSurface
-    from dolfinx_contact.contact.plane import RigidPlane as RigidPlane
-    from dolfinx_contact.convergence import Converged as Converged
-    from dolfinx_contact.convergence import converge as converge
-    from dolfinx_contact.discretisation import Estimate as Estimate
-    from dolfinx_contact.discretisation import estimate as estimate
-    from dolfinx_contact.increments import advance as advance
+    from dolfinx_contact.contact.state import Status as Status
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
     from dolfinx_contact.law.friction import Friction as Friction
     from dolfinx_contact.law.friction_cone import load_function as load_function
@@ -49,29 +44,34 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.results.record import Counts as Counts
     from dolfinx_contact.results.record import NotConverged as NotConverged
     from dolfinx_contact.results.record import Step as Step
-    from dolfinx_contact.solvers.condensed_newton import CondensedNewton as CondensedNewton
-    from dolfinx_contact.solvers.condensed_newton import solve_condensed as solve_condensed
-    from dolfinx_contact.solvers.condensed_result import (
+    from dolfinx_contact.solvers.condensed.newton import CondensedNewton as CondensedNewton
+    from dolfinx_contact.solvers.condensed.newton import solve_condensed as solve_condensed
+    from dolfinx_contact.solvers.condensed.result import (
         CondensedNotConverged as CondensedNotConverged,
     )
-    from dolfinx_contact.solvers.condensed_result import CondensedResult as CondensedResult
-    from dolfinx_contact.solvers.fixed_point import FixedPoint as FixedPoint
-    from dolfinx_contact.solvers.snes import SNES as SNES
-    from dolfinx_contact.solvers.sparse_newton import SparseNewton as SparseNewton
+    from dolfinx_contact.solvers.condensed.result import CondensedResult as CondensedResult
+    from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint as FixedPoint
+    from dolfinx_contact.solvers.newton.snes import SNES as SNES
+    from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton as SparseNewton
+    from dolfinx_contact.support.checks import RoundingWarning as RoundingWarning
+    from dolfinx_contact.surfaces.level_set import RigidSurface as RigidSurface
+    from dolfinx_contact.surfaces.plane import RigidPlane as RigidPlane
+    from dolfinx_contact.surfaces.round import RigidCylinder as RigidCylinder
+    from dolfinx_contact.surfaces.round import RigidSphere as RigidSphere
 
     __version__: str
 
 _NAMES = {  # by their module
-    "checks": ["RoundingWarning"],
+    "support.checks": ["RoundingWarning"],
     "contact.contact": ["Contact"],
-    "contact.curved": ["RigidCylinder", "RigidSphere"],
-    "contact.history": ["Status"],
-    "contact.level": ["RigidSurface"],
-    "contact.plane": ["RigidPlane"],
-    "adaptation": ["Adapted", "adapt"],
-    "convergence": ["Converged", "converge"],
-    "discretisation": ["Estimate", "estimate"],
-    "increments": ["advance"],
+    "surfaces.round": ["RigidCylinder", "RigidSphere"],
+    "contact.state": ["Status"],
+    "surfaces.level_set": ["RigidSurface"],
+    "surfaces.plane": ["RigidPlane"],
+    "analysis.adapt": ["Adapted", "adapt"],
+    "analysis.converge": ["Converged", "converge"],
+    "analysis.estimate": ["Estimate", "estimate"],
+    "analysis.increments": ["advance"],
     "law.bipotential": ["bipotential_gap"],
     "law.friction": ["Friction"],
     "law.friction_cone": ["load_function", "project_cone"],
@@ -80,11 +80,11 @@ _NAMES = {  # by their module
     "problem": ["ContactProblem"],
     "results.history": ["History"],
     "results.record": ["Counts", "NotConverged", "Step"],
-    "solvers.condensed_newton": ["CondensedNewton", "solve_condensed"],
-    "solvers.condensed_result": ["CondensedNotConverged", "CondensedResult"],
-    "solvers.fixed_point": ["FixedPoint"],
-    "solvers.snes": ["SNES"],
-    "solvers.sparse_newton": ["SparseNewton"],
+    "solvers.condensed.newton": ["CondensedNewton", "solve_condensed"],
+    "solvers.condensed.result": ["CondensedNotConverged", "CondensedResult"],
+    "solvers.fixed_point.fixed_point": ["FixedPoint"],
+    "solvers.newton.snes": ["SNES"],
+    "solvers.newton.sparse_newton": ["SparseNewton"],
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = list(_HOME)

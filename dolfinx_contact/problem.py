@@ -14,18 +14,14 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.internal_variables import InternalVariables
 from dolfinx_contact.bodies.nonlinear import body_of
-from dolfinx_contact.collective import agree, raised_together
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.driven import approach, check_driven, freedom
-from dolfinx_contact.contact.held_planes import HeldPlanes, held_planes
-from dolfinx_contact.nonlinear_step import NonlinearStep
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     NUMBERS,
     check_alive,
-    check_planes,
     check_size,
     check_step,
+    check_surfaces,
     check_weights,
     checked_conditions,
     checked_contacts,
@@ -45,12 +41,16 @@ from dolfinx_contact.results.record import (
     warn_of_contact,
     warn_of_rounding,
 )
-from dolfinx_contact.settle import found_for, refusal, with_friction
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
-from dolfinx_contact.solvers.linearised import Linearised
-from dolfinx_contact.step import LoadStep, nodal_stiffness
-from dolfinx_contact.trial import unmoved
-from dolfinx_contact.unseen import Unseen
+from dolfinx_contact.solvers.newton.linearised import Linearised
+from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
+from dolfinx_contact.step.nonlinear import NonlinearStep
+from dolfinx_contact.step.settle import found_for, refusal, with_friction
+from dolfinx_contact.step.trial import unmoved
+from dolfinx_contact.step.unseen import Unseen
+from dolfinx_contact.support.collective import agree, raised_together
+from dolfinx_contact.surfaces.driven import approach, check_driven, freedom
+from dolfinx_contact.surfaces.held import HeldSurfaces, held_surfaces
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -138,7 +138,7 @@ class ContactProblem(ProblemStates):
         of = self.contacts[0].displacements if self.contacts else None
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of, entity_maps)  # fmt: skip
         hold(self.contacts, self.body)
-        check_planes(self.contacts, self.body)
+        check_surfaces(self.contacts, self.body)
         check_weights(F, self.contacts)
         self._points = [contact.points for contact in self.contacts]
         self._unseen = Unseen(self.contacts)
@@ -181,7 +181,7 @@ class ContactProblem(ProblemStates):
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
-        stood = [contact.plane.displacement for contact in self.contacts]
+        stood = [contact.surface.displacement for contact in self.contacts]
         self._variables.settle()  # with what the user has written into them
         try:
             with raised_together(self.body.comm):  # whatever happens on one rank alone
@@ -193,8 +193,8 @@ class ContactProblem(ProblemStates):
                 self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
                 self.body.forget()
             for contact, where in zip(self.contacts, stood):
-                contact.plane.displacement = where
-                contact.plane.spin_by(None)
+                contact.surface.displacement = where
+                contact.surface.spin_by(None)
             self._restore()
             raise_interrupt(failure)
             raise
@@ -203,7 +203,7 @@ class ContactProblem(ProblemStates):
         for contact in self.contacts:
             contact.advance()
         for contact in self.contacts:
-            contact.plane.end_step()
+            contact.surface.end_step()
         self._keep(step=True)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x, self.u.x.array)
@@ -231,7 +231,7 @@ class ContactProblem(ProblemStates):
         self._variables.advance(self.u)
         return done, found
 
-    def load_step(self, holding: HeldPlanes | None = None) -> LoadStep:
+    def load_step(self, holding: HeldSurfaces | None = None) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.
 
         For solvers of one's own and for measurements; ``solve`` makes it for itself.
@@ -252,8 +252,8 @@ class ContactProblem(ProblemStates):
         b, external = body.load()
         last, before = self._states
         starts = [body.taken(self.u.x.array), 2 * last - before]
-        if holding is None and any(contact.plane.free for contact in self.contacts):
-            holding = held_planes(body, self.contacts, last, b)
+        if holding is None and any(contact.surface.free for contact in self.contacts):
+            holding = held_surfaces(body, self.contacts, last, b)
         if freedom(self.contacts) != self._freedom:
             self._unbind()
             self._freedom = freedom(self.contacts)

@@ -12,15 +12,15 @@ import numpy as np
 from ufl.classes import Indexed, Product, SpatialCoordinate
 
 from dolfinx_contact import compat
-from dolfinx_contact.attributes import Guarded
 from dolfinx_contact.bodies.rigid_motion import mean_strain
-from dolfinx_contact.checks import positive
-from dolfinx_contact.collective import from_first, raised_together
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.drive import SQUARE
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.solvers.base import Solver
+from dolfinx_contact.support.attributes import Guarded
+from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.collective import from_first, raised_together
+from dolfinx_contact.surfaces.drive import SQUARE
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 STRAINED = 0.5  # mean strain above which linear elasticity says nothing
@@ -67,7 +67,7 @@ def check_mesh(contact: Contact) -> None:
     if contact.mesh_has_moved():
         raise ValueError(
             "the mesh was moved or scaled after the contact was made, whose gaps and areas no longer fit: move it "
-            "first, then make Contact and ContactProblem. A plane moves by plane.displacement."
+            "first, then make Contact and ContactProblem. A plane moves by surface.displacement."
         )
 
 
@@ -192,19 +192,19 @@ def follow(contacts, body, u: np.ndarray, known: list) -> bool:
     return bool(changed)
 
 
-def check_planes(contacts, body) -> None:
+def check_surfaces(contacts, body) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
-        plane, gdim = contact.plane, contact.points.dim
+        surface, gdim = contact.surface, contact.points.dim
         x = body.displacements.x[:, :gdim]
         with raised_together(body.comm):
-            height = plane.distance(plane.relative(x))
+            height = surface.distance(surface.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.gap)
         if highest < DEEP * deepest:
-            said = f"the body lies on the other side of {plane} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
+            said = f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
         elif inside > DEEP * body.extent:
-            said = f"the body starts {inside:.3g} deep inside {plane}, more than a tenth of its size: check point and normal, or move the plane by plane.displacement step by step"  # fmt: skip
+            said = f"the body starts {inside:.3g} deep inside {surface}, more than a tenth of its size: check point and normal, or move the plane by surface.displacement step by step"  # fmt: skip
         else:
             continue
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
@@ -239,13 +239,15 @@ def check_axial(contacts) -> None:
     for contact in contacts:
         if not contact.axial:
             continue
-        plane = contact.plane
-        turns = plane.spins or plane.rotation.any()
-        radial = any(not motion.turns and abs(motion.axis[0]) > SQUARE for motion in plane.motions)
+        surface = contact.surface
+        turns = surface.spins or surface.rotation.any()
+        radial = any(
+            not motion.turns and abs(motion.axis[0]) > SQUARE for motion in surface.motions
+        )
         if turns or radial:
             what = "turn" if turns else "be driven by force along the radius"
             raise ValueError(
-                f"the contact has a weight in proportion to the first coordinate, so bodies are those of revolution, and {plane} cannot "
+                f"the contact has a weight in proportion to the first coordinate, so bodies are those of revolution, and {surface} cannot "
                 f"{what}: rotations in the plane and resultants along the radius have no meaning there. Prescribe the motion, or "
                 "drive the axial one."
             )
@@ -317,8 +319,8 @@ def check_alive(problem, body, contacts) -> None:
             "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
             "go on with that one, or make a Contact for each."
         )
-    for plane in {id(contact.plane): contact.plane for contact in contacts}.values():
-        plane.take(problem.number, next(NUMBERS))
+    for surface in {id(contact.surface): contact.surface for contact in contacts}.values():
+        surface.take(problem.number, next(NUMBERS))
 
 
 def check_step(u, comm, contacts) -> None:

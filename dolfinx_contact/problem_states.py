@@ -12,7 +12,7 @@ import numpy as np
 
 from dolfinx_contact.problem_input import ProblemOptions, check_alive
 from dolfinx_contact.results import checkpoint
-from dolfinx_contact.solvers.condensed import KEPT
+from dolfinx_contact.solvers.condensed.body import KEPT
 
 
 class Kept(NamedTuple):
@@ -20,7 +20,7 @@ class Kept(NamedTuple):
 
     states: list  # the last displacement and the one before
     contacts: list  # histories
-    planes: list  # displacements and rotations
+    surfaces: list  # displacements and rotations
     known: Any  # the body's free state
     past: tuple  # steps of the condensed solver
     variables: list  # values of internal variables
@@ -47,9 +47,9 @@ class ProblemStates(ProblemOptions):
             )
         kept = self._before
         self._states, self.body.known = kept.states, kept.known
-        for contact, history, where in zip(self.contacts, kept.contacts, kept.planes):
+        for contact, history, where in zip(self.contacts, kept.contacts, kept.surfaces):
             contact.go_back(history)
-            contact.plane.displacement, contact.plane.rotation = where
+            contact.surface.displacement, contact.surface.rotation = where
         self._remember(kept.past)
         self._variables.go_back(kept.variables)
         self._restore()
@@ -69,7 +69,9 @@ class ProblemStates(ProblemOptions):
 
     def _places(self) -> list[tuple]:
         """Displacement and rotation of each contact's surface."""
-        return [(contact.plane.displacement, contact.plane.rotation) for contact in self.contacts]
+        return [
+            (contact.surface.displacement, contact.surface.rotation) for contact in self.contacts
+        ]
 
     def _remember(self, past) -> None:
         """Starts for the condensed solver."""
@@ -81,7 +83,7 @@ class ProblemStates(ProblemOptions):
         """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""
         check_alive(self, self.body, self.contacts)
         for contact, where in zip(self.contacts, self._stood):
-            contact.plane.displacement, contact.plane.rotation = where
+            contact.surface.displacement, contact.surface.rotation = where
         self._begin()
         self._variables.reset()
         self._restore()

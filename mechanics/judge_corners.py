@@ -61,7 +61,7 @@ class CornerJudge:
             dofs = bc.dof_indices()[0]
             fixed[dofs[dofs < left.size]] = True
         for k, contact in enumerate(scene.contacts):
-            normal, moved = scene.normals[k], np.array(contact.plane.displacement)
+            normal, moved = scene.normals[k], np.array(contact.surface.displacement)
             point = -scene.gap * normal if hasattr(scene, "gap") else np.zeros(d)
             tangents = np.linalg.svd(normal[None, :])[2][1:]
             if d == 3 and scene.axes is not None:  # the plane's axis first

@@ -97,7 +97,7 @@ class RigJudge:
 
     def verdict(self, asked, tol: float) -> judge.Verdict:
         """Of the step that was just solved under what ``apply`` returned."""
-        scene, surface = self.scene, self.scene.plane
+        scene, surface = self.scene, self.scene.surface
         there = (self.x + self.before)[self.nodes]
         start = asked.moved
         if scene.kind != "plane":

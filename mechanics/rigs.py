@@ -81,6 +81,6 @@ def build_rig(
         return SimpleNamespace(force=force, moment=moment, moved=moved)
 
     return SimpleNamespace(
-        V=V, u=u, F=F, bcs=bcs, held=held, contact=contact, plane=surface, facets=foot, mesh=domain, apply=apply, kind=kind,
+        V=V, u=u, F=F, bcs=bcs, held=held, contact=contact, surface=surface, facets=foot, mesh=domain, apply=apply, kind=kind,
         radius=R, point=point, free=free,
     )  # fmt: skip

@@ -72,7 +72,7 @@ def on_plane(
         plane = dc.RigidPlane(point=np.zeros(d), normal=axes[:, -1], axis=axis)
         contact = dc.Contact(V, touching, plane, dc.Friction(mu=mu, p=p), wear=wear)
     return SimpleNamespace(
-        V=V, u=u, F=F, bcs=bcs, contact=contact, plane=plane, facets=touching, held=held, force=force,
+        V=V, u=u, F=F, bcs=bcs, contact=contact, surface=plane, facets=touching, held=held, force=force,
         axes=axes, mesh=domain, modulus=modulus,
     )  # fmt: skip
 

@@ -111,9 +111,9 @@ def block(
     v = ufl.TestFunction(V)
     scene.F = form(scene.u, v, modulus) + loads(scene, v)
     axis = (1.0, 0.0, 0.0) if d == 3 else None
-    scene.plane = dc.RigidPlane(point=np.zeros(d), normal=np.eye(d)[-1], axis=axis)
+    scene.surface = dc.RigidPlane(point=np.zeros(d), normal=np.eye(d)[-1], axis=axis)
     friction = dc.Friction(mu=(mu, mu))
-    scene.contact = dc.Contact(V, scene.bottom, scene.plane, friction)
+    scene.contact = dc.Contact(V, scene.bottom, scene.surface, friction)
     options |= dict(bcs=bcs, solver=solver, tol=tol, **(late or {}))
     scene.problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], **options)
     return scene

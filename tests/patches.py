@@ -89,7 +89,7 @@ def even_block(cell, slips, tilted, curved=False, distorted=True, comm=COMM):
     assert np.allclose(plane.frame, turn.T)
     friction = dc.Friction(MU, P) if d == 3 else dc.Friction(MU[0])
     return SimpleNamespace(
-        mesh=domain, top=top, plane=plane, traction=traction, slip=slip, pressure=pressure,
+        mesh=domain, top=top, surface=plane, traction=traction, slip=slip, pressure=pressure,
         # exact for these curved bricks; what UFL takes by itself makes FFCx warn of so many points
         dx=ufl.dx(metadata={"quadrature_degree": 6}) if curved else ufl.dx,
         moved=lambda x: gradient @ x[:d] + (turn @ slip)[:, None],

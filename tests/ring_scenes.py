@@ -67,7 +67,7 @@ def between_planes(F, u, sides, bcs, mu, tol):
 
     def press(depth):
         for contact in contacts:
-            contact.plane.displacement = depth * contact.plane.normal
+            contact.surface.displacement = depth * contact.surface.normal
         return problem.solve()
 
     return SimpleNamespace(problem=problem, contacts=contacts, press=press)

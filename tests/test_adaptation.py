@@ -10,7 +10,7 @@ from dolfinx import fem, mesh
 from helpers import hooke
 from scenes import COMM
 
-from dolfinx_contact.adaptation import _largest
+from dolfinx_contact.analysis.adapt import _largest
 from dolfinx_contact.compat import functionspace, refined
 
 EDGE = 0.25  # half width of a flat punch, of a body of width 2 and height 1

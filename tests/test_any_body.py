@@ -181,7 +181,7 @@ def test_hysteresis_under_a_cyclic_punch():
     depths = mean - swing * np.cos(2 * np.pi / steps * np.arange(3 * steps + 1))
     forces = []
     for depth in depths:  # the punch comes up from below
-        scene.plane.displacement = (0.0, 0.0, depth)
+        scene.surface.displacement = (0.0, 0.0, depth)
         scene.problem.solve()
         forces.append(scene.contact.force()[2])
     stiffness = forces[0] / depths[0] / (soft + stiff / (1 + rate))

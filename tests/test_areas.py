@@ -125,14 +125,14 @@ def test_an_expanded_ring_has_the_pressure_of_lame(order, weight):
     ratio = 2 * (G + lame) * b**2 / (2 * G)  # B / A
     A = way / (a + ratio / a)
     p = 2 * G * A * ratio / a**2 - 2 * (G + lame) * A
-    contact.plane.displacement = (way, 0)
+    contact.surface.displacement = (way, 0)
     problem.solve()
     assert contact.pressure == pytest.approx(
         np.full(contact.nodes.size, p), rel=0.02 if order == 1 else 1e-3
     )
     assert contact.force()[0] == pytest.approx(p * 2 * np.pi * a * 4, rel=2e-3)
     pressed = contact.pressure
-    contact.plane.displacement = (way, -1.0)
+    contact.surface.displacement = (way, -1.0)
     problem.solve()
     assert contact.force()[1] == pytest.approx(-0.1 * contact.force()[0], rel=1e-8)
     mean = (pressed + contact.pressure) / 2  # of both ends of the step, as its work is taken
@@ -152,7 +152,7 @@ def test_areas_without_a_weight_are_warned_of():
 def test_motions_that_no_body_of_revolution_makes_are_refused(wrong):
     """Rotations in the plane and forces along the radius have no meaning with axial symmetry; axial forces have."""
     contact, make, given, options = ring(1, "callable", closed=False)
-    problem, plane = make(*given, **options), contact.plane
+    problem, plane = make(*given, **options), contact.surface
     if wrong == "turned":
         plane.rotation = 0.01
     elif wrong == "free to turn":
@@ -183,7 +183,7 @@ def test_a_thickness_is_no_axial_symmetry():
         contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.3), weight=t)
         problem = dc.ContactProblem(F, u, [contact], bcs=[bc])
         problem.solve()
-        contact.plane.rotation = 1e-4
+        contact.surface.rotation = 1e-4
         problem.solve()
         mean = COMM.allreduce(contact.pressure @ contact.area) / COMM.allreduce(contact.area.sum())
         forces.append([contact.force()[1] / t, mean])

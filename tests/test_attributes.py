@@ -46,7 +46,7 @@ def test_misspelt_attributes_are_refused():
     """An attribute that nobody reads is a mistake, and the one that was meant is named."""
     scene = scenes.block(cells=(2, 2, 2))
     for thing, wrong, meant in [
-        (scene.plane, "displacment", "displacement"),
+        (scene.surface, "displacment", "displacement"),
         (scene.contact, "fricton", "friction"),
         (scene.problem, "montor", "monitor"),
         (scene.problem, "toll", "tol"),
@@ -55,7 +55,7 @@ def test_misspelt_attributes_are_refused():
             setattr(thing, wrong, 1.0)
     for thing, name in [
         (scene.contact, "reaction"),
-        (scene.contact, "plane"),
+        (scene.contact, "surface"),
         (scene.problem, "u"),
     ]:
         with pytest.raises(AttributeError, match="cannot be set: .* make a new Contact"):
@@ -72,11 +72,11 @@ def test_results_are_read_only():
         with pytest.raises(ValueError, match="read-only"):
             getattr(scene.contact, name)[:] = 0
     with pytest.raises(ValueError, match="read-only"):
-        scene.plane.displacement[0] = 1.0
+        scene.surface.displacement[0] = 1.0
     given = np.array([0.001, 0.0, 0.0])
-    scene.plane.displacement = given
+    scene.surface.displacement = given
     given[:] = 5.0  # the user's own array stays the user's
-    assert scene.plane.displacement.tolist() == [0.001, 0.0, 0.0]
+    assert scene.surface.displacement.tolist() == [0.001, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_friction_is_exchanged_between_steps(solver, new):
 
 def test_exchanged_friction_keeps_the_condensed_operator(monkeypatch):
     """Coefficients that change leave the compliance of the body as it is: it is computed once."""
-    from dolfinx_contact.solvers import condensed
+    from dolfinx_contact.solvers.condensed import body as condensed
 
     made, plain = [], condensed.compliance
     monkeypatch.setattr(condensed, "compliance", lambda *args: made.append(1) or plain(*args))

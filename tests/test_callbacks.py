@@ -12,7 +12,7 @@ import ufl
 from dolfinx import mesh
 
 import dolfinx_contact as dc
-from dolfinx_contact import collective
+from dolfinx_contact.support import collective
 
 pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
@@ -39,7 +39,7 @@ def made(at, error=OSError):
     scene = scenes.block(cells=(2, 2, 1))
     if at in ("distance", "before_residual", "after_step"):
         V, facets = scene.V, scene.contact.facets
-        contact = dc.Contact(V, facets, surface or scene.plane, dc.Friction(0.3))
+        contact = dc.Contact(V, facets, surface or scene.surface, dc.Friction(0.3))
         F, J = scene.F, ufl.derivative(scene.F, scene.u, ufl.TrialFunction(V))
         functions = {} if at == "distance" else {at: call}
         scene.problem = dc.ContactProblem(F, scene.u, contact, scene.bcs, J, **functions)
@@ -96,7 +96,7 @@ def test_what_converge_and_adapt_call_raises_on_all_ranks():
 
 LEFT = """
 from mpi4py import MPI
-from dolfinx_contact import collective
+from dolfinx_contact.support import collective
 collective.PATIENCE = 0.2
 with collective.raised_together(MPI.COMM_WORLD):
     if MPI.COMM_WORLD.rank == 0:

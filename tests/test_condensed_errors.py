@@ -10,9 +10,9 @@ import pytest
 from condensed_scenes import judge
 
 from dolfinx_contact import CondensedNewton, Friction, _kernel
-from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.solvers.condensed_newton import solve_condensed
-from dolfinx_contact.solvers.condensed_result import CondensedNotConverged
+from dolfinx_contact.solvers.condensed.newton import solve_condensed
+from dolfinx_contact.solvers.condensed.result import CondensedNotConverged
+from dolfinx_contact.support.checks import RoundingWarning
 from mechanics.condensed import random_problem
 
 TOL = 1e-8

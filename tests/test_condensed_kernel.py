@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from dolfinx_contact import Friction, RoundingWarning, _kernel
-from dolfinx_contact.solvers import condensed_kernel
-from dolfinx_contact.solvers.condensed_newton import CondensedNewton
+from dolfinx_contact.solvers.condensed import kernel as condensed_kernel
+from dolfinx_contact.solvers.condensed.newton import CondensedNewton
 from mechanics import judge
 
 TOL = 1e-10

@@ -10,7 +10,7 @@ import scipy.sparse
 import twin_solver
 
 from dolfinx_contact import Friction
-from dolfinx_contact.solvers.condensed_newton import (
+from dolfinx_contact.solvers.condensed.newton import (
     CondensedNewton,
     CondensedNotConverged,
     solve_condensed,

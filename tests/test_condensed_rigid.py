@@ -11,9 +11,9 @@ from condensed_scenes import judge
 
 from benchmarks.rigid_family import KINDS, problem
 from dolfinx_contact import CondensedNotConverged, Friction
-from dolfinx_contact.solvers.condensed_newton import solve_condensed
+from dolfinx_contact.solvers.condensed.newton import solve_condensed
 
-pytestmark = pytest.mark.filterwarnings("ignore::dolfinx_contact.checks.RoundingWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::dolfinx_contact.support.checks.RoundingWarning")
 TOL = 1e-8
 
 

@@ -232,7 +232,7 @@ def test_block_dragged_to_and_fro(increments, p):
         before = c.dissipation.copy()
         for x in np.linspace(start, end, increments + 1)[1:]:
             last = c.dissipation.copy()
-            scene.plane.displacement = (x, 0, 0)
+            scene.surface.displacement = (x, 0, 0)
             scene.problem.solve()
             normal.append(c.force()[2])
             assert (c.dissipation >= last).all()

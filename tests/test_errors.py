@@ -37,8 +37,8 @@ class Body:
             self.fixed = (3 * dofs[:, None] + np.arange(3)).ravel()
         touching = touching or (lambda x: np.isclose(x[2], 0.0))
         facets = mesh.locate_entities_boundary(self.mesh, 2, touching)
-        self.plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
-        self.contact = dc.Contact(V, facets, self.plane, dc.Friction(mu=0.3))
+        self.surface = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+        self.contact = dc.Contact(V, facets, self.surface, dc.Friction(mu=0.3))
         form = F - ufl.inner(self.load, v) * ufl.dx
         self.problem = dc.ContactProblem(form, self.u, self.contact, bcs=bcs, solver=solver, tol=tol)  # fmt: skip
 
@@ -67,7 +67,7 @@ def cantilever(slenderness, **options):
         (slenderness, 1.0, 1.0), (2 * slenderness, 2, 2), clamp=lambda x: np.isclose(x[0], 0.0),
         touching=lambda x: np.isclose(x[2], 0.0) & (x[0] > tip), **options,
     )  # fmt: skip
-    body.plane.displacement = (0, 0, 0.01 * slenderness)
+    body.surface.displacement = (0, 0, 0.01 * slenderness)
     return body
 
 

@@ -8,7 +8,7 @@ import scenes
 from dolfinx import mesh
 
 import dolfinx_contact as dc
-from dolfinx_contact.contact.plane_balance import PlaneBalance
+from dolfinx_contact.surfaces.balance import SurfaceBalance
 from mechanics.scenes import build, problem_of
 
 pytestmark = pytest.mark.ranks
@@ -23,15 +23,15 @@ def free_block(free, dim=3, **options):
     """A block whose top stands still, on a plane that is free in some directions; pushes it in the scene's axes."""
     scene = scenes.block(cells=CELLS[dim], tol=TOL, **options)
     scene.move_top(*np.zeros(dim))
-    scene.plane.free = free
+    scene.surface.free = free
 
     def push(*force):
-        scene.plane.force = scene.axes @ np.array(force, dtype=float)
+        scene.surface.force = scene.axes @ np.array(force, dtype=float)
         return scene.problem.solve()
 
     scene.push = push
     scene.force = lambda: scene.axes.T @ scene.contact.force()
-    scene.moved = lambda: scene.axes.T @ scene.plane.displacement
+    scene.moved = lambda: scene.axes.T @ scene.surface.displacement
     return scene
 
 
@@ -54,7 +54,7 @@ def test_a_stroke_under_dead_weight_is_resisted_by_mu_times_it(dim, solver):
     scene = free_block(("n",), dim, mu=0.3, p=None, solver=SOLVERS[solver])
     load = 1e-3 * E
     for stroke in (0.0, 0.5, 1.0):
-        scene.plane.displacement = np.array([stroke, *scene.plane.displacement[1:]])
+        scene.surface.displacement = np.array([stroke, *scene.surface.displacement[1:]])
         scene.push(*np.zeros(dim - 1), load)
         assert scene.moved()[0] == stroke
         assert scene.force()[-1] == pytest.approx(load, rel=1e-9)
@@ -76,12 +76,12 @@ def test_forces_of_a_displacement_driven_run_lead_back_to_its_displacements(case
     for place in programme:
         place = 1e-3 * np.array(place)[[0, 2] if dim == 2 else [0, 1, 2]]
         if case == "isotropic":
-            driven.plane.displacement = np.array([*driven.plane.displacement[:1], place[1], 0])
-        given.plane.displacement = place
+            driven.surface.displacement = np.array([*driven.surface.displacement[:1], place[1], 0])
+        given.surface.displacement = place
         given.problem.solve()
         step = driven.push(*given.force())
         assert max(step.error, step.slip_error) <= TOL
-        free_part = np.array([name in free for name in driven.plane.directions])
+        free_part = np.array([name in free for name in driven.surface.directions])
         assert driven.moved() == pytest.approx(place, abs=1e-7 * 2e-3)
         assert driven.force()[free_part] == pytest.approx(given.force()[free_part], abs=1e-8 * E * 1e-3)  # fmt: skip
 
@@ -125,15 +125,15 @@ def test_no_state_beyond_gross_sliding(dim, solver):
     tangent, rest = ("t1" if dim == 3 else "t"), np.zeros(dim - 2)
     for free in ((tangent, "n"), (tangent,)):
         scene = free_block(free, dim, mu=0.3, p=None, solver=solver)
-        scene.plane.displacement = np.append(np.zeros(dim - 1), 0.0 if "n" in free else 1e-3)
+        scene.surface.displacement = np.append(np.zeros(dim - 1), 0.0 if "n" in free else 1e-3)
         load = 1e-3 * E
         scene.push(0.2 * load, *rest, load)
-        stood, reaction = scene.plane.displacement, scene.contact.reaction
+        stood, reaction = scene.surface.displacement, scene.contact.reaction
         for part in (1.2, -1.2) if "n" in free else (3.0,):
             with pytest.raises(dc.NotConverged, match="the plane slides away") as caught:
                 scene.push(part * 0.3 * load, *rest, load)
             assert caught.value.step.error > TOL
-            assert (scene.plane.displacement == stood).all()
+            assert (scene.surface.displacement == stood).all()
             assert (scene.contact.reaction == reaction).all()
         scene.push(0.24 * load, *rest, load)
         assert scene.force()[0] == pytest.approx(0.24 * load, rel=1e-9)
@@ -148,18 +148,18 @@ def test_no_state_beyond_the_ellipse_of_friction(degrees, given):
     if given:
         scene.push(0, 0, load)
     else:
-        scene.plane.displacement = scene.axes @ (0, 0, 1e-3)
+        scene.surface.displacement = scene.axes @ (0, 0, 1e-3)
         scene.push(0, 0, 0)
         load = scene.force()[2]
     most = load / np.linalg.norm(way / (0.3, 0.15))
-    stood = scene.plane.displacement
+    stood = scene.surface.displacement
     said = (
         "no static state exists" if given else "with the normal forces found: the plane slides away"
     )
     with pytest.raises(dc.NotConverged, match=said) as caught:
         scene.push(*(1.03 * most * way if given else 1.5 * most * way), load)
     assert "unknown" not in str(caught.value).split(",")[0] or not given
-    assert (scene.plane.displacement == stood).all()
+    assert (scene.surface.displacement == stood).all()
     scene.push(*0.9 * most * way, load)
     assert scene.force()[:2] == pytest.approx(0.9 * most * way, rel=1e-7, abs=1e-7 * load)
 
@@ -183,12 +183,12 @@ def test_a_spring_in_series(solver):
     scene = free_block(("n",), mu=0.0, p=None, nu=0.0, solver=SOLVERS[solver])
     body, drive = E / 0.6, 1e-3
     for k in (1e-6 * body, body, 1e6 * body):
-        scene.plane.stiffness = k
+        scene.surface.stiffness = k
         for force in (0.0, 1e-4 * body):
-            scene.plane.drive = np.array([0, 0, drive])
+            scene.surface.drive = np.array([0, 0, drive])
             scene.push(0, 0, force)
             assert scene.moved()[2] == pytest.approx((force + k * drive) / (k + body), rel=1e-8)
-        scene.plane.drive = np.array([0, 0, -drive])
+        scene.surface.drive = np.array([0, 0, -drive])
         scene.push(0, 0, 0.5 * k * drive)
         assert scene.moved()[2] == pytest.approx(-0.5 * drive, rel=1e-8)
         assert (scene.contact.reaction == 0).all()
@@ -199,10 +199,10 @@ def test_a_pulled_spring_slides_at_mu_n(solver):
     """A slider pulled by a spring: once it slides friction is mu N, and the spring is stretched by mu N / k."""
     scene = free_block(("t1", "n"), mu=0.3, p=None, solver=SOLVERS[solver])
     load, k = 1e-3 * E, 1e-2 * E
-    scene.plane.stiffness = (k, 0.0)
+    scene.surface.stiffness = (k, 0.0)
     scene.push(0, 0, load)
     for drive in (0.5, 1.0, 1.5):
-        scene.plane.drive = np.array([drive, 0, 0])
+        scene.surface.drive = np.array([drive, 0, 0])
         scene.push(0, 0, load)
     assert scene.force()[[0, 2]] == pytest.approx([0.3 * load, load], rel=1e-9)
     assert scene.moved()[0] == pytest.approx(1.5 - 0.3 * load / k, rel=1e-9)
@@ -220,8 +220,8 @@ def two_contacts():
         return mesh.locate_entities_boundary(scene.mesh, 2, here)
 
     laws = (((-0.5, 0.0), dc.Friction(0.3)), ((0.25, 0.5), dc.Friction(0.1)))
-    contacts = [dc.Contact(scene.V, facets(*ends), scene.plane, law) for ends, law in laws]
-    return scene.plane, dc.ContactProblem(scene.F, scene.u, contacts, bcs=scene.bcs, tol=TOL)
+    contacts = [dc.Contact(scene.V, facets(*ends), scene.surface, law) for ends, law in laws]
+    return scene.surface, dc.ContactProblem(scene.F, scene.u, contacts, bcs=scene.bcs, tol=TOL)
 
 
 @pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
@@ -248,8 +248,8 @@ def test_an_unbalanced_plane_is_never_converged(monkeypatch):
     load = 1e-3 * E
     scene.push(0, 0, load)
     problem, x = scene.problem, scene.u.x.array[: scene.problem.body.size].copy()
-    scene.plane.force = (0, 0, load * (1 + 1e-6))
-    monkeypatch.setattr(PlaneBalance, "reach", lambda self: None)  # it stays where it was
+    scene.surface.force = (0, 0, load * (1 + 1e-6))
+    monkeypatch.setattr(SurfaceBalance, "reach", lambda self: None)  # it stays where it was
     step = problem.load_step()
     size = np.sqrt(COMM.allreduce((scene.contact.reaction**2).sum()))
     assert step.measure(x).error == pytest.approx(1e-6 * load / size, rel=1e-3)
@@ -260,7 +260,7 @@ def test_a_plane_lost_far_away_is_never_converged():
     scene = free_block(("n",))
     scene.push(0, 0, 1e-3 * E)
     step = scene.problem.load_step()
-    step.planes.move_to(np.array([-1e20]))
+    step.surfaces.move_to(np.array([-1e20]))
     errors = step.measure_open(np.zeros(scene.problem.body.size))
     assert not errors.acts and not errors.within(TOL)
 
@@ -269,13 +269,13 @@ def test_a_plane_lost_far_away_is_never_converged():
 def test_a_node_that_rounding_lets_touch_does_not_hold_a_plane_back(depth):
     """One node 1e-16 lower than the others says nothing of them: the plane begins where a node would carry the force."""
     scene = free_block(("n",))
-    scene.plane.force = scene.axes @ np.array([0.0, 0.0, 1e-3 * E])
+    scene.surface.force = scene.axes @ np.array([0.0, 0.0, 1e-3 * E])
     step, points = scene.problem.load_step(), scene.contact.points
     x, forces = np.zeros(scene.problem.body.size), np.zeros((points.count, 3))
     forces[:1, 2] = -depth
     points.add_forces(forces, x)  # the motion of that node
-    assert step.planes.touch(x)
-    assert step.planes.moved[0] > 1e-6
+    assert step.surfaces.touch(x)
+    assert step.surfaces.moved[0] > 1e-6
 
 
 @pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
@@ -288,17 +288,17 @@ def test_checkpoints_resets_and_failures_keep_the_plane(solver, tmp_path):
         scene.push(side * load, 0, down * load)
         if k == 1:
             scene.problem.save(path)
-            stood = scene.plane.displacement
+            stood = scene.surface.displacement
             with pytest.raises(ValueError, match="NaN"):
                 scene.held.x.array[:] = np.nan
                 scene.problem.solve()
             scene.move_top(0, 0, 0)
-            assert (scene.plane.displacement == stood).all()
+            assert (scene.surface.displacement == stood).all()
     other.problem.load(path)
-    assert (other.plane.displacement == stood).all()
+    assert (other.surface.displacement == stood).all()
     for side, down in programme[2:]:
         other.push(side * load, 0, down * load)
-    assert other.plane.displacement == pytest.approx(scene.plane.displacement, rel=1e-9)
+    assert other.surface.displacement == pytest.approx(scene.surface.displacement, rel=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore:.* no force moves the plane")
@@ -307,13 +307,13 @@ def test_how_a_plane_is_driven_may_change_between_steps(solver):
     """Pressed by displacement, held by the force that took, sheared by force, then by displacement: one history."""
     scene, given = (free_block((), mu=0.3, p=None, solver=s) for s in (solver, None))
     for place in ((0, 0, 1e-3), (2e-4, 0, 1e-3), (3e-4, 0, 1e-3), (1e-4, 0, 1.2e-3)):
-        given.plane.displacement = place
+        given.surface.displacement = place
         given.problem.solve()
         free = {0: (), 2e-4: ("n",), 3e-4: ("t1", "n"), 1e-4: ()}[place[0]]
-        scene.plane.free = free
-        start = scene.plane.displacement
-        stays = [name in free for name in scene.plane.directions]
-        scene.plane.displacement = np.where(stays, start, place)
+        scene.surface.free = free
+        start = scene.surface.displacement
+        stays = [name in free for name in scene.surface.directions]
+        scene.surface.displacement = np.where(stays, start, place)
         scene.push(*given.force())
         assert scene.moved() == pytest.approx(place, abs=1e-10)
         assert scene.force() == pytest.approx(given.force(), abs=1e-8 * E * 1e-3)
@@ -327,7 +327,7 @@ def test_ranks_do_not_change_the_motion():
             scene = free_block(("t1", "n"), mu=0.3, p=None, solver=solver, comm=comm)
             for part in (0.0, 0.25, -0.1):
                 scene.push(part * 1e-3 * E, 0, 1e-3 * E)
-            found.append(scene.plane.displacement)
+            found.append(scene.surface.displacement)
         assert found[0] == pytest.approx(found[1], rel=1e-8)
 
 
@@ -339,14 +339,14 @@ def test_a_body_on_soft_springs():
             scene = build(spring=spring, mu=0.5)
             problem = problem_of(scene, tol=1e-8, **options)
             scene.move_top((0, 0, 0))
-            scene.plane.free = ("t1", "n")
+            scene.surface.free = ("t1", "n")
             for part in (0.0, 0.2):
-                scene.plane.force = 1e-3 * spring * E * np.array([part, 0, 1.0])
+                scene.surface.force = 1e-3 * spring * E * np.array([part, 0, 1.0])
                 problem.solve()
             force = scene.contact.force()
-            assert force[[0, 2]] == pytest.approx(scene.plane.force[[0, 2]], rel=1e-7)
+            assert force[[0, 2]] == pytest.approx(scene.surface.force[[0, 2]], rel=1e-7)
             # springs of the top, per area: they carry all of it
-            assert scene.plane.displacement[2] == pytest.approx(1e-3, rel=2 * spring + 1e-6)
+            assert scene.surface.displacement[2] == pytest.approx(1e-3, rel=2 * spring + 1e-6)
 
 
 MISTAKES = {
@@ -359,8 +359,8 @@ MISTAKES = {
     "stiffness not finite": (dict(stiffness=np.inf), "NaN or infinity"),
     "two stiffnesses": (dict(free=("n",), force=(0, 0, 1), stiffness=(1, 2)), "2 numbers"),
     "drive of two numbers": (dict(drive=(0, 1)), "vector of 3"),
-    "no force": (dict(free=("n",)), "set plane.force"),
-    "nothing for one direction": (dict(free=("t1", "n"), stiffness=(0, 1)), "set plane.force"),
+    "no force": (dict(free=("n",)), "set surface.force"),
+    "nothing for one direction": (dict(free=("t1", "n"), stiffness=(0, 1)), "set surface.force"),
     "pulled off": (dict(free=("n",), force=(0, 0, -1)), "does not press"),
     "no weight": (dict(free=("t1", "n"), force=(1, 0, 0)), "does not press"),
 }
@@ -373,9 +373,9 @@ def test_nonsense_is_refused(mistake):
     scene = free_block((), mu=0.3, p=None)
     with pytest.raises(ValueError, match=message):
         for name, value in given.items():
-            setattr(scene.plane, name, value)
+            setattr(scene.surface, name, value)
         scene.problem.solve()
-    scene.plane.free, scene.plane.stiffness = ("n",), 0.0
+    scene.surface.free, scene.surface.stiffness = ("n",), 0.0
     scene.push(0, 0, E * 1e-3)
 
 
@@ -388,7 +388,7 @@ def test_a_force_that_drives_nothing_is_told_of_once():
     assert len(said) == 1 and not scene.force().any()
     scene = free_block(("n",), mu=0.3, p=None)
     for free in (("n",), ()):
-        scene.plane.free = free
+        scene.surface.free = free
         scene.push(0, 0, E * 1e-3)
 
 
@@ -397,7 +397,7 @@ def test_nothing_holds_a_plane_without_friction():
     scene = free_block(("t1", "n"), mu=0.0, p=None)
     with pytest.raises(ValueError, match="nothing holds the plane"):
         scene.push(0, 0, E * 1e-3)
-    scene.plane.stiffness = (E, 0)
+    scene.surface.stiffness = (E, 0)
     scene.push(E * 1e-3, 0, E * 1e-3)
     assert scene.moved()[0] == pytest.approx(1e-3, rel=1e-9)
 
@@ -418,7 +418,7 @@ def test_a_plane_beyond_the_body_comes_to_it(solver, free):
     scene = free_block(free, mu=0.3, p=None, nu=0.0, solver=solver)
     for far in (-3.0, -1e-18, 0.0, 0.02):
         scene.problem.reset()
-        scene.plane.displacement = (0, 0, far)
+        scene.surface.displacement = (0, 0, far)
         scene.push(0, 0, E * 1e-3)
         assert scene.force()[2] == pytest.approx(E * 1e-3, rel=1e-9)
         assert 0 < scene.moved()[2] < 1e-3
@@ -429,4 +429,4 @@ def test_tables_have_the_motion_of_driven_planes(tmp_path):
     scene = free_block(("n",), mu=0.3, p=None)
     history = dc.History(scene.problem)
     history.record(scene.push(0, 0, E * 1e-3))
-    assert history.column("contact0_plane_z")[0] == scene.plane.displacement[2]
+    assert history.column("contact0_plane_z")[0] == scene.surface.displacement[2]

@@ -103,7 +103,7 @@ def test_sliding_force_is_the_sum_of_what_each_place_carries():
     """A block that slides as a whole is resisted by the sum of mu r_n."""
     scene = pushed(dc.Friction(mu=rough))
     for stroke in (0.5, 1.0):
-        scene.plane.displacement = (stroke, 0, 0)
+        scene.surface.displacement = (stroke, 0, 0)
         scene.problem.solve()
     carried = COMM.allreduce((rough(scene.contact.x.T) * scene.contact.reaction[:, 2]).sum())
     assert scene.contact.force()[0] == pytest.approx(carried, rel=1e-9)
@@ -159,7 +159,7 @@ def test_fields_that_make_no_sense_are_refused(mistake):
         scene.contact.friction = law(scene)
     assert scene.contact.friction is before
     with pytest.raises(ValueError, match=message):
-        dc.Contact(scene.V, scene.facets, scene.plane, law(scene))
+        dc.Contact(scene.V, scene.facets, scene.surface, law(scene))
 
 
 def test_a_mistake_on_one_rank_is_raised_on_all():

@@ -64,7 +64,7 @@ def block(
         return problem.solve()
 
     return SimpleNamespace(
-        V=V, u=u, F=F, bc=bc, held=held, plane=plane, contact=contact, problem=problem, step=step
+        V=V, u=u, F=F, bc=bc, held=held, surface=plane, contact=contact, problem=problem, step=step
     )
 
 
@@ -184,7 +184,7 @@ def test_work_of_friction_is_that_of_both_ends():
 def test_force_may_drive_the_plane(solver):
     """A stroke under dead weight: friction is the sum of mu(p) p over the nodes, and the weight is carried."""
     scene = block(weak, nu=0.3, solver=solver)
-    scene.plane.free, scene.plane.force = ("n",), (0, 0, 8.0)
+    scene.surface.free, scene.surface.force = ("n",), (0, 0, 8.0)
     for way in (0.0, 0.02, 0.04):
         scene.held.value = (way, 0, 0)
         scene.problem.solve()

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
-from dolfinx_contact.statics import Statics
+from dolfinx_contact.step.statics import Statics
 
 pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
@@ -134,7 +134,7 @@ def test_a_block_above_its_plane_comes_down(dim, kind):
 def test_plates_clamp_a_block(dim, kind, driven):
     """Pressed by a plate, held by friction at both: forces balance a side force; a plate driven by force has its force."""
     scene = Loose(dim, kind, faces=("low", "high"))
-    plate = scene.contacts[1].plane
+    plate = scene.contacts[1].surface
     if driven:
         plate.free, plate.force = ("n",), -1e-3 * scene.up
     else:
@@ -151,9 +151,9 @@ def test_plates_clamp_a_block(dim, kind, driven):
 def test_a_plate_below_a_body_that_nothing_holds_is_refused():
     """Body and plate both move along the normal: the step that does not converge says that nothing holds them."""
     scene = Loose(2)
-    plate = scene.contact.plane
+    plate = scene.contact.surface
     plate.free, plate.force = ("n",), 1e-3 * scene.up
-    with pytest.raises(dc.NotConverged, match="leave 'n' out of its plane.free"):
+    with pytest.raises(dc.NotConverged, match="leave 'n' out of its surface.free"):
         scene.problem.solve()
     plate.free, plate.displacement = (), np.zeros(2)
     scene.load(0, -1e-3)
@@ -169,7 +169,7 @@ def test_a_clamped_block_is_pushed_out(dim, kind):
     the fixed point which motion it is.
     """
     scene = Loose(dim, kind, faces=("low", "high"))
-    scene.contacts[1].plane.displacement = -1e-3 * scene.up
+    scene.contacts[1].surface.displacement = -1e-3 * scene.up
     scene.load(*np.zeros(dim))
     most = 2 * 0.3 * (scene.contact.force() @ scene.up)
     scene.load(*0.5 * most * np.eye(dim)[0])
@@ -334,7 +334,7 @@ def test_a_block_comes_to_rest_on_a_tilted_floor(dim, lands, degrees):
     down, tilt = -1e-3 * scene.up, np.radians(degrees)
     if not lands:
         scene.load(*down)
-    scene.contact.plane.rotation = -tilt if dim == 2 else (0.0, tilt, 0.0)
+    scene.contact.surface.rotation = -tilt if dim == 2 else (0.0, tilt, 0.0)
     step = scene.load(*down)
     force, _ = scene.sums()
     local = COMM.allreduce(scene.contact.reaction.sum(axis=0), op=MPI.SUM)
@@ -353,7 +353,7 @@ def test_a_block_goes_with_its_belt(dim, way):
     down = -1e-3 * scene.up
     scene.load(*down)
     before, reaction = scene.u.x.array.reshape(-1, dim).copy(), scene.contact.reaction.copy()
-    scene.contact.plane.displacement = way * np.eye(dim)[0]
+    scene.contact.surface.displacement = way * np.eye(dim)[0]
     scene.problem.solve()
     moved = scene.u.x.array.reshape(-1, dim) - before
     assert np.abs(moved - way * np.eye(dim)[0]).max() < 1e-6 * abs(way)
@@ -417,7 +417,7 @@ def test_more_than_a_gripper_holds_is_refused_at_once(dim):
     """Plates squeeze a block by a force N: 2 mu N hold it; beyond, and where it pushes a plate away, nothing is searched."""
     scene = Loose(dim, mu=0.3, faces=("low", "high"))
     scene.problem.solver = None
-    plate, side = scene.contacts[1].plane, np.eye(dim)[0]
+    plate, side = scene.contacts[1].surface, np.eye(dim)[0]
     plate.free, plate.force = ("n",), -1e-3 * scene.up
     scene.load(*0.95 * 0.6e-3 * side)
     force, _ = scene.sums()

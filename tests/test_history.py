@@ -27,7 +27,7 @@ def drag(scene, strokes):
     scene.move_top(0, 0, -0.001)
     scene.problem.solve()
     for stroke in strokes:
-        scene.plane.displacement = (stroke, 0, 0)
+        scene.surface.displacement = (stroke, 0, 0)
         scene.problem.solve()
 
 
@@ -37,7 +37,7 @@ def test_dissipation_of_a_dragged_block_is_force_times_path():
     drag(scene, [1.0, 3.0, 5.0])  # the elastic body follows within the first strokes
     c = scene.contact
     before, path = COMM.allreduce(c.dissipation.sum()), c.slip_path.copy()
-    scene.plane.displacement = (7.0, 0, 0)
+    scene.surface.displacement = (7.0, 0, 0)
     scene.problem.solve()
     work = COMM.allreduce(c.dissipation.sum()) - before
     assert work == pytest.approx(0.3 * c.force()[2] * 2.0, rel=1e-9)
@@ -99,7 +99,7 @@ def test_worn_depth_opens_the_gap_and_conserves_volume(coefficient):
     assert volume > 0
     force = c.force()[2]
     depth, gap0 = c.wear_depth.copy(), c.x[:, 2]
-    scene.plane.displacement = (1.0, 0, 0)
+    scene.surface.displacement = (1.0, 0, 0)
     scene.problem.solve()
     assert c.force()[2] < force  # the same approach presses less on a worn surface
     assert c.gap == pytest.approx(gap0 + depth + c.displacement[:, 2], abs=1e-15)
@@ -132,7 +132,7 @@ def test_wear_of_a_dragged_block_follows_archard():
     drag(scene, [1.0])
     c = scene.contact
     before, normal = COMM.allreduce(c.wear_depth @ c.area), c.force()[2]
-    scene.plane.displacement = (2.0, 0, 0)
+    scene.surface.displacement = (2.0, 0, 0)
     scene.problem.solve()
     normal = 0.5 * (normal + c.force()[2])
     volume = COMM.allreduce(c.wear_depth @ c.area) - before
@@ -309,7 +309,7 @@ def test_killed_run_continues_to_the_same_bits(tmp_path):
 def test_nothing_slips_while_nothing_moves(driven, solver):
     """A step without any change calls sticking what touches and works nothing; a millionth of the way slips again."""
     scene = scenes.block(cells=(3, 3, 2), mu=(0.3, 0.3), p=None, solver=solver)
-    plane, contact = scene.plane, scene.contact
+    plane, contact = scene.surface, scene.contact
     if driven:
         plane.free, plane.force = ("n",), (0.0, 0.0, 100.0)
     else:

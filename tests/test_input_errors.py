@@ -80,7 +80,7 @@ def test_a_component_of_what_is_assigned_as_a_whole_is_refused(d, name):
 @pytest.mark.parametrize("value", [(0, 0), (0, 0, np.nan), "far", (0, 0, 1j)])
 def test_plane_refuses_displacement(value):
     """The plane's displacement is a finite vector of the plane's dimension."""
-    with pytest.raises(ValueError, match="plane.displacement"):
+    with pytest.raises(ValueError, match="surface.displacement"):
         plane().displacement = value
 
 
@@ -180,7 +180,7 @@ def test_plane_that_moves_differently_between_ranks_is_refused():
     if COMM.size == 1:
         pytest.skip("needs more than one rank")
     scene = scenes.block(cells=(2, 2, 2))
-    scene.plane.displacement = (0, 0, 0.01 * COMM.rank)
+    scene.surface.displacement = (0, 0, 0.01 * COMM.rank)
     with pytest.raises(ValueError, match="differs between ranks"):
         scene.problem.solve()
 

@@ -12,7 +12,7 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
-from dolfinx_contact.collective import by_first_rank
+from dolfinx_contact.support.collective import by_first_rank
 
 COMM = scenes.COMM
 ALONE = pytest.mark.skipif(COMM.size > 1, reason="a signal reaches one process")

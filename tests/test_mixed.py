@@ -199,12 +199,12 @@ def test_a_block_held_by_contact_alone(compliance, name):
 def test_a_plane_driven_by_force(name):
     """A plane with a force on it moves to where one that is moved there has that force."""
     moved, driven = (block(compliance=0.0, solver=SOLVERS[name], tol=1e-11) for _ in range(2))
-    moved.contact.plane.displacement = (0.0, 0.05)
+    moved.contact.surface.displacement = (0.0, 0.05)
     moved.press(0.0, 0.0)
-    driven.contact.plane.free = ("n",)
-    driven.contact.plane.force = moved.contact.force() * [0, 1]
+    driven.contact.surface.free = ("n",)
+    driven.contact.surface.force = moved.contact.force() * [0, 1]
     driven.press(0.0, 0.0)
-    np.testing.assert_allclose(driven.contact.plane.displacement, [0.0, 0.05], rtol=1e-8)
+    np.testing.assert_allclose(driven.contact.surface.displacement, [0.0, 0.05], rtol=1e-8)
     np.testing.assert_allclose(driven.contact.force(), moved.contact.force(), rtol=1e-7, atol=1e-9)
 
 
@@ -288,7 +288,7 @@ def test_ranks_without_cells(tmp_path, name):
 def test_sub_space_or_whole():
     """A contact may be made on the mixed space or on its displacements; another sub-space is named."""
     scene = block(n=2)
-    facets, plane, law = scene.contact.facets, scene.contact.plane, dc.Friction(0.3)
+    facets, plane, law = scene.contact.facets, scene.contact.surface, dc.Friction(0.3)
     part = dc.Contact(scene.W.sub(0), facets, plane, law)
     np.testing.assert_array_equal(part.points.dofs, scene.contact.points.dofs)
     with dc.ContactProblem(scene.F, scene.w, part, scene.problem.body.bcs) as problem:
@@ -339,15 +339,15 @@ def test_mixed_spaces_without_displacements_are_refused():
     scene = block(n=2)
     scalars = mixed_functionspace(scene.mesh, [("Lagrange", 1)] * 2)
     with pytest.raises(ValueError, match="none of its sub-spaces is continuous Lagrange with 2"):
-        dc.Contact(scalars, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+        dc.Contact(scalars, scene.contact.facets, scene.contact.surface, dc.Friction(0.3))
     (u, p), (v, q) = ufl.split(scene.w), ufl.split(ufl.TestFunction(scene.W))
     apart = (ufl.inner(ufl.grad(u), ufl.grad(v)) + q * p) * ufl.dx
-    contact = dc.Contact(scene.W, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+    contact = dc.Contact(scene.W, scene.contact.facets, scene.contact.surface, dc.Friction(0.3))
     problem = dc.ContactProblem(apart, scene.w, contact, scene.problem.body.bcs)
     with pytest.raises(ValueError, match="act on displacements"):
         problem.solve()
     with pytest.raises(ValueError, match="dc.estimate does not know mixed spaces"):
-        other = dc.Contact(scene.W, scene.contact.facets, scene.contact.plane, dc.Friction(0.3))
+        other = dc.Contact(scene.W, scene.contact.facets, scene.contact.surface, dc.Friction(0.3))
         dc.estimate(
             scene.problem, dc.ContactProblem(scene.F, scene.w, other, scene.problem.body.bcs)
         )

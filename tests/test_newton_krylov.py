@@ -8,8 +8,8 @@ from test_surface_layer import linearised
 
 import dolfinx_contact as dc
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
-from dolfinx_contact.solvers import newton_krylov
-from dolfinx_contact.solvers.newton_krylov import NewtonKrylov, search_by_newton
+from dolfinx_contact.solvers.fixed_point import newton_krylov
+from dolfinx_contact.solvers.fixed_point.newton_krylov import NewtonKrylov, search_by_newton
 from dolfinx_contact.solvers.search import Search
 
 CASE_C = dict(mu=(0.3, 0.15), p=(0.05, 0.2))

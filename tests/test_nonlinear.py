@@ -392,10 +392,10 @@ def test_a_plane_driven_by_force_presses_rubber(solver):
     stretch = 0.9
     force, _ = scenes.pressed(stretch, 2)
     scene = scenes.block(cells=(2, 2), solver=solver)
-    scene.plane.free, scene.plane.force = ("n",), (0.0, force)
+    scene.surface.free, scene.surface.force = ("n",), (0.0, force)
     scenes.move(scene, 0.0, 0.0)
     scene.problem.solve()
-    assert scene.plane.displacement[1] == pytest.approx((1 - stretch) * scenes.HEIGHT, rel=1e-6)
+    assert scene.surface.displacement[1] == pytest.approx((1 - stretch) * scenes.HEIGHT, rel=1e-6)
     assert scene.contact.force()[1] == pytest.approx(force, rel=1e-7)
     scene.problem.solver = dc.SparseNewton()
     with pytest.raises(ValueError, match="SparseNewton"):

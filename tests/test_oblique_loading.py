@@ -28,7 +28,7 @@ def cylinder():
 
 def press(problem, inclination, steps=32):
     """Press with a force of this inclination from nothing; small steps, as a node that lands slips by all of its step."""
-    plane = problem.contacts[0].plane
+    plane = problem.contacts[0].surface
     problem.reset()
     plane.free = ("n",) if inclination == 0.0 else ("t", "n")
     for part in np.arange(1, steps + 1) / steps:
@@ -63,7 +63,7 @@ def test_shear_after_oblique_loading_slips_from_the_edges(cylinder, inclination)
     """The sticking part by second moments is that of the closed form to 0.02 a, under three shear forces."""
     problem, demo = cylinder
     press(problem, inclination)
-    plane = problem.contacts[0].plane
+    plane = problem.contacts[0].surface
     plane.free = ("t", "n")
     for part in (0.3, 0.6, 0.85):  # of what is left to gross sliding
         shear = (inclination + part * (MU - inclination)) * P

@@ -27,8 +27,8 @@ def test_springs_pull_the_motions_that_they_name(given):
     """Body and spring in series share the drive, R = drive / (1 / k + h / (E A)), whatever the order of names."""
     free, stiffness = SPRINGS[given]
     scene = free_block(free, mu=0.3, p=None, nu=0.0)
-    scene.plane.stiffness, scene.plane.drive = stiffness, (0, 0, 1e-3)
-    assert scene.plane.free == free
+    scene.surface.stiffness, scene.surface.drive = stiffness, (0, 0, 1e-3)
+    assert scene.surface.free == free
     scene.push(0, 0, 0)
     assert scene.force()[2] == pytest.approx(1e-3 / (1 / (0.5 * E) + 0.6 / E), rel=1e-8)
 
@@ -38,10 +38,10 @@ def test_springs_of_turning_surfaces_by_name():
     moved = []
     for stiffness in ({"r1": 1e9 * E, "r2": 1e9 * E}, None):
         scene = free_block(("n", "r2", "r1") if stiffness else ("n",), mu=0.0, p=None, nu=0.0)
-        scene.plane.stiffness = stiffness or 0.0
+        scene.surface.stiffness = stiffness or 0.0
         scene.push(0, 0, 1e-3 * E)
         moved.append(scene.moved()[2])
-        assert np.abs(scene.plane.rotation).max() < 1e-9
+        assert np.abs(scene.surface.rotation).max() < 1e-9
     assert moved[0] == pytest.approx(moved[1], rel=1e-7)
 
 
@@ -49,7 +49,7 @@ def test_springs_of_turning_surfaces_by_name():
 def test_springs_that_name_nothing_are_refused(wrong):
     """A name that is no motion, and a number that is no stiffness."""
     plane = dc.RigidPlane((0, 0, 0), (0, 0, 1))
-    with pytest.raises(ValueError, match="plane.stiffness"):
+    with pytest.raises(ValueError, match="surface.stiffness"):
         plane.stiffness = wrong
 
 
@@ -57,14 +57,14 @@ def test_a_driven_surface_belongs_to_one_problem():
     """Two problems that a force drives on one surface would take each other's motion for theirs: the older one is refused."""
     scene = free_block(("n",), mu=0.3, p=None)
     scene.push(0, 0, 1e-3 * E)
-    contact = dc.Contact(scene.V, scene.facets, scene.plane, dc.Friction(0.3))
+    contact = dc.Contact(scene.V, scene.facets, scene.surface, dc.Friction(0.3))
     later = dc.ContactProblem(scene.F, scene.u, [contact], bcs=scene.bcs)
     later.solve()
     for verb in (scene.problem.solve, scene.problem.reset):
         with pytest.raises(ValueError, match="driven by force in another ContactProblem"):
             verb()
     later.solve()
-    scene.plane.free = ()  # where it stands is still what the later problem has found
+    scene.surface.free = ()  # where it stands is still what the later problem has found
     with pytest.raises(ValueError, match="make a surface"):
         scene.problem.solve()
 
@@ -79,16 +79,16 @@ def test_a_surface_that_another_problem_has_driven_since_is_refused(closed):
     first, other = (free_block(("n",), mu=0.3, p=None) for _ in range(2))
 
     def on_its_surface():
-        contact = dc.Contact(other.V, other.facets, first.plane, dc.Friction(0.3))
+        contact = dc.Contact(other.V, other.facets, first.surface, dc.Friction(0.3))
         return contact, dc.ContactProblem(other.F, other.u, [contact], bcs=other.bcs)
 
     _, made_before = on_its_surface()
     first.push(0, 0, 1e-3 * E)
-    first.plane.free = ("t1", "n")
+    first.surface.free = ("t1", "n")
     first.push(2.5e-4 * E, 0, 1e-3 * E)
     if closed:
         first.problem.close()
-    first.plane.free = ("n",)
+    first.surface.free = ("n",)
     with pytest.raises(ValueError, match="driven by force in another ContactProblem"):
         made_before.solve()
     contact, made_after = on_its_surface()
@@ -103,12 +103,12 @@ def test_a_surface_driven_by_displacement_may_be_shared():
         first = free_block((), mu=0.3, p=None)
         second = free_block((), mu=0.3, p=None)
         if together:
-            contact = dc.Contact(second.V, second.facets, first.plane, dc.Friction(0.3))
+            contact = dc.Contact(second.V, second.facets, first.surface, dc.Friction(0.3))
             second.problem = dc.ContactProblem(second.F, second.u, [contact], bcs=second.bcs)
             second.contact = contact
         for place in ((0, 0, 1e-3), (3e-4, 0, 1e-3), (1e-4, 0, 1e-3)):
             for scene in (first, second):
-                scene.contact.plane.displacement = place
+                scene.contact.surface.displacement = place
                 scene.problem.solve()
         forces[together] = [scene.contact.force() for scene in (first, second)]
     assert np.allclose(forces[True], forces[False], rtol=1e-9, atol=1e-9 * E)
@@ -154,13 +154,13 @@ def test_reset_returns_surfaces_to_where_the_problem_found_them(moved_before):
     """The same programme after a reset has the same forces, on a surface moved and turned by hand, and by force."""
     scene = free_block((), mu=0.3, p=None)
     if moved_before:
-        scene.plane.displacement, scene.plane.rotation = (0, 0, -2e-4), (0, 0, 0.1)
-        contact = dc.Contact(scene.V, scene.facets, scene.plane, dc.Friction(0.3))
+        scene.surface.displacement, scene.surface.rotation = (0, 0, -2e-4), (0, 0, 0.1)
+        contact = dc.Contact(scene.V, scene.facets, scene.surface, dc.Friction(0.3))
         scene.contact, scene.problem = (
             contact,
             dc.ContactProblem(scene.F, scene.u, [contact], bcs=scene.bcs),
         )
-    start, runs = (scene.plane.displacement, scene.plane.rotation), []
+    start, runs = (scene.surface.displacement, scene.surface.rotation), []
     for _ in range(2):
         forces = []
         for place, turn, free in (
@@ -169,17 +169,17 @@ def test_reset_returns_surfaces_to_where_the_problem_found_them(moved_before):
             ((0, 0, 0), 0.2, ()),
             (None, 0, ("n",)),
         ):
-            scene.plane.free = free
+            scene.surface.free = free
             if place is not None:
-                scene.plane.displacement = start[0] + np.array(place)
-                scene.plane.rotation = start[1] + np.array((0, 0, turn))
-            scene.plane.force = (0, 0, 1e-3 * E) if free else None
+                scene.surface.displacement = start[0] + np.array(place)
+                scene.surface.rotation = start[1] + np.array((0, 0, turn))
+            scene.surface.force = (0, 0, 1e-3 * E) if free else None
             scene.problem.solve()
             forces.append(scene.contact.force())
         runs.append(forces)
         scene.problem.reset()
-        assert np.array_equal(scene.plane.displacement, start[0])
-        assert np.array_equal(scene.plane.rotation, start[1])
+        assert np.array_equal(scene.surface.displacement, start[0])
+        assert np.array_equal(scene.surface.rotation, start[1])
     assert np.allclose(runs[1], runs[0], rtol=0, atol=1e-9 * E)
 
 

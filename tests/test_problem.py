@@ -148,7 +148,7 @@ def test_dragged_block_pulls_along_its_slip_rule():
     scene.problem.solve()
     d = np.array([3.0, 1.0])
     for k in range(1, 4):
-        scene.plane.displacement = (k * d[0], k * d[1], 0)
+        scene.surface.displacement = (k * d[0], k * d[1], 0)
         step = scene.problem.solve()
     assert step.counts.slip == 25
     direction = p**2 * d
@@ -166,7 +166,7 @@ def test_plane_moves_as_if_the_body_moved_the_other_way():
     reference, _ = run(programme=[(0, 0, -0.005), (0.001, 0, -0.008)])
     scene = scenes.block()
     for displacement in [(0, 0, 0.005), (-0.001, 0, 0.008)]:
-        scene.plane.displacement = displacement
+        scene.surface.displacement = displacement
         scene.problem.solve()
     other = scenes.gathered(scene.contact)[1]
     assert other == pytest.approx(reference[-1], abs=1e-8 * np.abs(reference).max())

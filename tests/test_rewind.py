@@ -18,7 +18,7 @@ PROGRAMME = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006), (0
 def left(scene):
     """All that a step leaves, but gaps, which are rounding: displacements, reactions, statuses, sums, planes."""
     c = scene.contact
-    return [a.copy() for a in (scene.u.x.array, c.reaction, c.status, c.displacement, c.dissipation, c.slip_path, c.plane.displacement)]  # fmt: skip
+    return [a.copy() for a in (scene.u.x.array, c.reaction, c.status, c.displacement, c.dissipation, c.slip_path, c.surface.displacement)]  # fmt: skip
 
 
 def step(scene, *top):
@@ -34,7 +34,7 @@ def test_a_step_taken_back_leaves_nothing(solver):
         step(plain, *top)
         if k == 2:
             before = left(tried)
-            tried.plane.displacement = (0.01, 0.02, 0.001)
+            tried.surface.displacement = (0.01, 0.02, 0.001)
             step(tried, 0.01, 0.01, -0.02)
             tried.problem.rewind()
             assert all(map(np.array_equal, left(tried), before))
@@ -47,13 +47,13 @@ def test_a_step_taken_back_leaves_nothing(solver):
 def test_a_plane_driven_by_force_goes_back_with_its_step():
     """The motion that a force made is taken back, too."""
     scene = scenes.block(mu=0.3, p=None)
-    scene.plane.free = ("t1", "n")
+    scene.surface.free = ("t1", "n")
     for part in (0.0, 0.2):
-        scene.plane.force = (part * 210, 0, 210.0)
-        stood = scene.plane.displacement
+        scene.surface.force = (part * 210, 0, 210.0)
+        stood = scene.surface.displacement
         scene.problem.solve()
     scene.problem.rewind()
-    assert (scene.plane.displacement == stood).all()
+    assert (scene.surface.displacement == stood).all()
 
 
 def test_there_is_one_step_to_go_back_by():
@@ -141,11 +141,11 @@ def test_increments_grow_within_an_interval():
 def test_a_step_that_no_increment_solves_is_raised():
     """The last state that converged stays, and the table has the steps up to it."""
     scene = scenes.block()
-    scene.plane.free = ("t1", "n")
+    scene.surface.free = ("t1", "n")
     history = dc.History(scene.problem)
 
     def programme(t):
-        scene.plane.force = (210.0 * t, 0, 210.0)
+        scene.surface.force = (210.0 * t, 0, 210.0)
 
     with pytest.raises(dc.NotConverged, match="the plane slides away"):
         dc.advance(scene.problem, programme, [0.1, 1.1], smallest=1 / 8, history=history)

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.solvers.preconditioner import ContactPreconditioner
+from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 
 SHAPES = [(6, 4), (4, 4, 2)]
 

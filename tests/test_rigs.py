@@ -8,7 +8,7 @@ import scenes
 from test_surfaces import E, block
 
 import dolfinx_contact as dc
-from dolfinx_contact.contact.plane_balance import PlaneBalance
+from dolfinx_contact.surfaces.balance import SurfaceBalance
 from mechanics.rigs import Load, build_rig
 
 COMM = scenes.COMM
@@ -198,8 +198,8 @@ def test_a_platen_that_is_lost_is_in_no_state(far, monkeypatch):
     scene, plane = platen(("n", "r1", "r2"))
     scene.step(0, 0, 0)
     step, x = scene.problem.load_step(), scene.u.x.array[: scene.problem.body.size].copy()
-    monkeypatch.setattr(PlaneBalance, "reach", lambda self: None)  # it stays there
-    step.planes.move_to(far * np.array([0.0, 0.0, -1.0]))
+    monkeypatch.setattr(SurfaceBalance, "reach", lambda self: None)  # it stays there
+    step.surfaces.move_to(far * np.array([0.0, 0.0, -1.0]))
     assert not step.measure(x).error < 1e-3
 
 
@@ -390,7 +390,10 @@ def test_a_surface_stands_where_the_step_was_judged(solver):
 
 
 MISTAKES = {
-    "moment of two": (lambda p: setattr(p, "moment", (1, 2)), "plane.moment must be a vector of 3"),
+    "moment of two": (
+        lambda p: setattr(p, "moment", (1, 2)),
+        "surface.moment must be a vector of 3",
+    ),
     "guides that are not orthonormal": (
         lambda p: setattr(p, "guides", np.ones((3, 3))),
         "right angles",

@@ -33,7 +33,7 @@ def test_what_touches_a_rough_plane_is_glued(cells, solver):
     linear = dc.ContactProblem(glued.F, glued.u, [], [*glued.bcs, support])
     for k, (x, z) in enumerate(PROGRAMME):
         stands.value[0] = 1e-3 * k
-        scene.plane.displacement = stands.value
+        scene.surface.displacement = stands.value
         step = moved(scene, x, z)
         assert (
             step.counts.open == step.counts.slip == 0 and max(step.error, step.slip_error) <= 1e-10
@@ -90,12 +90,12 @@ def test_rough_on_one_side():
 def test_a_rough_plane_cannot_be_dragged_along():
     """By 0.4 of the normal force, which mu = 0.3 cannot carry, a rough plane is moved by the block's shear alone, and back when it ends."""
     scene = scenes.block(cells=(2, 2, 1), mu=INF, p=None)
-    scene.plane.free = ("t1", "n")
+    scene.surface.free = ("t1", "n")
     stood = []
     for part in (0.0, 0.4, 0.0):
-        scene.plane.force = (part * 210, 0, 210.0)
+        scene.surface.force = (part * 210, 0, 210.0)
         assert scene.problem.solve().counts.slip == 0
-        stood.append(scene.plane.displacement[0])
+        stood.append(scene.surface.displacement[0])
     assert abs(stood[1]) > 1e-4 and abs(stood[2] - stood[0]) <= 1e-7 * abs(stood[1])
 
 

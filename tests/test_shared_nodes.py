@@ -193,7 +193,7 @@ def test_two_contacts_with_the_same_plane_carry_together_what_one_does(mu, solve
     found = []
     for count in (1, 2):
         scene = scenes.block(cells=(3, 3, 2), mu=mu, p=None, solver=SOLVERS[solver])
-        contacts = [dc.Contact(scene.V, scene.facets, scene.plane, dc.Friction(mu)) for _ in range(count)]  # fmt: skip
+        contacts = [dc.Contact(scene.V, scene.facets, scene.surface, dc.Friction(mu)) for _ in range(count)]  # fmt: skip
         problem = dc.ContactProblem(scene.F, scene.u, contacts, scene.bcs, solver=SOLVERS[solver], tol=1e-10)  # fmt: skip
         for top in ((0, 0, -1e-3), (5e-4, 2e-4, -1e-3)):
             scene.move_top(*top)
@@ -303,7 +303,7 @@ def test_contacts_that_share_no_node_have_no_nodal_problems():
 def test_a_face_of_the_groove_may_be_driven_by_force(mu):
     """The force of its contact, nodes of the edge among it, is the given one along the normal."""
     scene = build_corner(90, (3, 3), mu=mu)
-    problem, plane = problem_of(scene), scene.contacts[0].plane
+    problem, plane = problem_of(scene), scene.contacts[0].surface
     plane.free = ("n",)
     for force in (50.0, 80.0, 20.0):
         plane.force = force * scene.normals[0]
@@ -363,7 +363,7 @@ def test_walls_may_turn_with_the_body(solver):
         for push in (Push(), Push(across=0.3)):
             scene.apply(Push(across=push.across, turn=turn))
             for contact in scene.contacts:
-                contact.plane.rotation = STRAIN * turn
+                contact.surface.rotation = STRAIN * turn
             problem.solve()
         found.append([contact.force() for contact in scene.contacts])
     size = np.abs(found[0]).max()

@@ -154,6 +154,6 @@ def test_refusals():
     with pytest.raises(ValueError, match="petsc_options must be a dictionary"):
         dc.SNES("-snes_monitor")
     scene = block(hooke, solver=dc.SNES())
-    scene.plane.free, scene.plane.force = ("n",), (0, 0, 0.01)
+    scene.surface.free, scene.surface.force = ("n",), (0, 0, 0.01)
     with pytest.raises(ValueError, match=r"SNES\(\) does not know planes driven by force"):
         scene.problem.solve()

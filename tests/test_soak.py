@@ -35,7 +35,7 @@ class Run:
         """On the same body."""
         scene, old = self.scene, self.scene.contact
         plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), (1, 0, 0))
-        scene.plane = plane
+        scene.surface = plane
         scene.contact = dc.Contact(scene.V, scene.facets, plane, old.friction, wear=old.wear)
         scene.problem = dc.ContactProblem(
             scene.F, scene.u, scene.contact, bcs=scene.bcs, tol=scene.problem.tol
@@ -46,7 +46,7 @@ class Run:
         scene, angle = self.scene, 2 * math.pi * k / CYCLE
         scene.move_top(0, 0, -0.01 - 0.002 * math.cos(0.37 * angle))
         scene.force.value[:] = (0.0, 500.0 * math.sin(0.61 * angle), 0.0)
-        scene.plane.displacement = (0.004 * math.sin(angle), 0.001 * math.sin(2 * angle), 0.0)
+        scene.surface.displacement = (0.004 * math.sin(angle), 0.001 * math.sin(2 * angle), 0.0)
         if k % 10 == 0:
             self.exchange(k)
 

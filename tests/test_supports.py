@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.error import contact_defects
+from dolfinx_contact.step.errors import contact_defects
 
 pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
@@ -83,7 +83,7 @@ def test_a_block_pushed_by_its_side_has_the_friction_of_its_weight(kind, by):
         if by == "support":
             push.value = way
         else:
-            contact.plane.displacement = (-way, 0.0)
+            contact.surface.displacement = (-way, 0.0)
         step = problem.solve()
         worked.append(total(contact.dissipation) / unit)
         r = contact.reaction / unit
@@ -212,7 +212,7 @@ def test_a_foot_moved_as_a_whole_has_the_closed_form(axis):
                 for value, component in zip(pushed, at):
                     value.value = component
             else:
-                contact.plane.displacement = (*-at, 0.0)
+                contact.surface.displacement = (*-at, 0.0)
             problem.solve()
             normal, force = total(contact.reaction[:, -1]), contact.force()
             expected = -normal * drag(np.array([way]), axis, **LAW)[0]
@@ -238,7 +238,7 @@ def test_nodes_free_in_one_direction_follow_the_slip_in_both(law, ways, angle):
         problem.solve()
         for way in ways:
             if name == "plane moved":
-                contact.plane.displacement = (-way, 0.0, 0.0)
+                contact.surface.displacement = (-way, 0.0, 0.0)
                 drive(head, 0.0, 0.25 * way, -0.01)
             else:
                 pushed[0].value = way
@@ -391,7 +391,7 @@ def test_a_plane_on_a_spring_slides_past_held_nodes(solver):
 def test_a_spring_pulls_a_plane_past_held_nodes_in_one_step(nonlinear):
     """Pulled at once, from stick, far beyond mu N: the plane stands where its spring pulls with mu N, of a nonlinear body, too."""
     problem, contact, _ = belt(side=False, nonlinear=nonlinear, wear=None)
-    plane = contact.plane
+    plane = contact.surface
     plane.free, plane.force = ("t",), (0.1, 0.0)
     problem.solve()
     assert np.abs(contact.force() - (0.1, 1.0)).max() < 1e-8
@@ -434,7 +434,7 @@ def test_held_nodes_in_space_share_along_one_or_two_directions(free, force):
     """A foot held as a whole carries what drives the plane, in the cone, each node in proportion to its normal force."""
     axis = (0.6, 0.8, 0.0)
     problem, contact, head, _ = block(dc.CondensedNewton(), axis, held="all")
-    plane = contact.plane
+    plane = contact.surface
     turned = np.array([axis, (-0.8, 0.6, 0.0)])
     plane.free, plane.force = free, (0.0, 0.0, 10.0)
     problem.solve()
@@ -454,9 +454,9 @@ def test_how_guided_nodes_hold_a_driven_plane_is_not_known():
     """Nodes free in another direction, and a plane of symmetry across a free motion: refused, and left out it is solved."""
     problem, contact, head, _ = block(dc.CondensedNewton())
     drive(head, 0.0, 0.0, -0.01)
-    contact.plane.free, contact.plane.force = ("t1", "n"), (0.0, 0.0, 10.0)
+    contact.surface.free, contact.surface.force = ("t1", "n"), (0.0, 0.0, 10.0)
     with pytest.raises(ValueError, match="Leave these motions out"):
         problem.solve()
-    contact.plane.free, contact.plane.force = ("t2", "n"), (0.0, 0.1, 10.0)
+    contact.surface.free, contact.surface.force = ("t2", "n"), (0.0, 0.1, 10.0)
     problem.solve()
     assert np.abs(contact.force()[1:] - (0.1, 10.0)).max() < 1e-8

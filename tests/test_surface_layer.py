@@ -9,8 +9,8 @@ import scenes
 import dolfinx_contact as dc
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
-from dolfinx_contact.solvers.preconditioner import ContactPreconditioner
-from dolfinx_contact.solvers.surface_layer import SurfaceLayer
+from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
+from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 
 LAWS = [(0.0, None), (0.2, None), ((0.3, 0.15), None), ((0.3, 0.15), (0.05, 0.2))]
 
@@ -71,7 +71,7 @@ def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch)
     """Loading and unloading under a strongly non-associated rule take fewer iterations with the tangent."""
 
     def iterations(every):
-        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.EVERY", every)
+        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.EVERY", every)
         scene = scenes.block(
             cells=(14, 14, 5), mu=(0.3, 0.15), p=(0.02, 0.3), petsc_options=MULTIGRID,
             solver=dc.FixedPoint(),
@@ -95,7 +95,7 @@ def test_replaced_solvers_give_their_memory_back(monkeypatch):
             return int(file.read().split()[1]) * resource.getpagesize()
 
     monkeypatch.setattr(
-        "dolfinx_contact.solvers.fixed_point.EVERY", 5
+        "dolfinx_contact.solvers.fixed_point.fixed_point.EVERY", 5
     )  # the layers are factorised too
     scene = scenes.block(cells=(12, 12, 8), solver=dc.FixedPoint())
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.contact.ufl_distance import by_ufl
+from dolfinx_contact.surfaces.ufl_distance import by_ufl
 from mechanics.material import elasticity
 
 pytestmark = pytest.mark.ranks

@@ -37,7 +37,7 @@ MISTAKES = {
 KNOWN = {
     "contact.reaction": "ndarray",
     "contact.friction": "Friction",
-    "contact.plane.displacement": "ndarray",
+    "contact.surface.displacement": "ndarray",
     "problem.solve()": "Step",
     "problem.solve().error": "float",
     "problem.solve().counts": "Counts",

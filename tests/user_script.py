@@ -62,7 +62,7 @@ def press(folder: Path) -> NDArray[np.float64]:
     with problem:
         for depth in (0.001, 0.002):
             held.x.array[2::3] = -depth
-            contact.plane.displacement = (depth, 0.0, 0.0)
+            contact.surface.displacement = (depth, 0.0, 0.0)
             step = problem.solve()
             row = history.record(step, depth=depth)
             worst: float = max(step.error, step.slip_error, step.forward_error, step.rounding)

@@ -21,7 +21,7 @@ from benchmarks.report.drawing import OURS, THEIRS, bars, column
 from benchmarks.tables import chosen
 from dolfinx_contact.compat import lagrange_degree
 from dolfinx_contact.solvers.base import SolverResult
-from dolfinx_contact.solvers.condensed_kernel import condensed_operator
+from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from mechanics import judge
 from studies.punch import CASES, Parameters, Punch, programme
 

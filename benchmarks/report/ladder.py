@@ -59,11 +59,11 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
         problem = dc.ContactProblem(scale * punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
     if kind.get("recorded"):
         facets, file = punch.facet_tags.find(1), Path(tempfile.mkdtemp()) / "history.csv"
-        contact = dc.Contact(punch.V, facets, contact.plane, contact.friction, dc.Wear(3e-8))
+        contact = dc.Contact(punch.V, facets, contact.surface, contact.friction, dc.Wear(3e-8))
         problem = dc.ContactProblem(punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
         history = dc.History(problem, file, [(7.5, 0, 0), (0, 7.5, 0)])
     if kind.get("away"):
-        contact.plane.displacement = np.array([0.0, 0.0, -1e3])
+        contact.surface.displacement = np.array([0.0, 0.0, -1e3])
 
     def solved() -> tuple[int, str]:
         if kind.get("bare"):

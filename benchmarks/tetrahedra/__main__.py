@@ -52,7 +52,7 @@ def patch(variant: str, slips: bool, tilted: bool, curved: bool) -> dict:
     """An even stress on a plane; ``curved``: also the edges of the contact facets, in the plane."""
     block = even_block("tetrahedron", slips, tilted, curved)
     if curved:
-        x, turn = block.mesh.geometry.x, block.plane.frame
+        x, turn = block.mesh.geometry.x, block.surface.frame
         along = x @ turn[:2].T
         x += 0.06 * np.outer(np.sin(np.pi * along).prod(axis=1), [1, -0.7]) @ turn[:2]
     V = functionspace(block.mesh, ("Lagrange", 2, (3,)))
@@ -60,14 +60,14 @@ def patch(variant: str, slips: bool, tilted: bool, curved: bool) -> dict:
     held.x.array[:] = block.moved(V.tabulate_dof_coordinates().T).T.ravel()
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, block.top))
     F = elasticity(u, v, E, NU, block.dx) - block.work(v)
-    body = Body(body_of(F, u, [bc], options=DIRECT), block.contact(V).facets, block.plane.frame)
+    body = Body(body_of(F, u, [bc], options=DIRECT), block.contact(V).facets, block.surface.frame)
     points = contact_points(variant, body.X, body.T)
     found = Touching(points, body.S).solve(body.free(), dc.Friction(MU, P))
     forces = even(body.X, body.T)[:, None] * block.traction
     pressure = PRESSURE * points.area
     return dict(
         scene="patch", slips=slips, tilted=tilted, curved=curved, points=len(points.area), failed=found.failed,
-        displacement=np.abs(found.motion - block.moved(body.X.T).T @ block.plane.frame.T).max() * E / PRESSURE,
+        displacement=np.abs(found.motion - block.moved(body.X.T).T @ block.surface.frame.T).max() * E / PRESSURE,
         forces=np.abs(found.forces - forces).max() / np.abs(forces).max(),
         pressure=np.abs(found.reaction[:, 2] - pressure).max() / pressure.max(),
     )  # fmt: skip

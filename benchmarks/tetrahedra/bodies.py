@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.compat import cell_nodes
-from dolfinx_contact.solvers.compliance import Rows, compliance
-from dolfinx_contact.solvers.condensed_kernel import condensed_operator
+from dolfinx_contact.solvers.condensed.compliance import Rows, compliance
+from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 
 # isort: split
 import numpy as np

@@ -10,15 +10,15 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies import checks, rigid_motion
+from dolfinx_contact.bodies import rigid_motion, stiffness_checks
 from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.bodies.unknowns import Unknowns
-from dolfinx_contact.collective import OverRanks, raised_together
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
+from dolfinx_contact.support.collective import OverRanks, raised_together
 
 _instances = count()
 
@@ -76,15 +76,15 @@ class ElasticBody(Unknowns, OverRanks):
             How often it was assembled so far: a number that changes with the matrix.
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
-        checks.agree_on_values(given, self.comm)
+        stiffness_checks.agree_on_values(given, self.comm)
         digest = digest_of(self._parameters)
         if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
             return self._assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
         self._assemble()
         with raised_together(self.comm):
-            checks.check_diagonal(self.diagonal(), self.displacements)
-        checks.check_dilation(self)
+            stiffness_checks.check_diagonal(self.diagonal(), self.displacements)
+        stiffness_checks.check_dilation(self)
         self._hold()
         self.soft, self.loose = rigid_motion.soft_motions(self)
         self._digest = digest
@@ -170,7 +170,7 @@ class ElasticBody(Unknowns, OverRanks):
             self._load_digest = digest
         external = self._external.copy()
         b = external - self.carried(lift)
-        checks.check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)
+        stiffness_checks.check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)
         external[self.fixed] = 0.0
         b[self.fixed] = lift[self.fixed]
         return b, external
@@ -227,7 +227,7 @@ class ElasticBody(Unknowns, OverRanks):
             self._elastic = self.anchors.solver if self.loose else self.solver(self.K)
             if self.options is not None and not self._said:
                 self._said = True
-                checks.warn_of_unread(self._elastic.unread)
+                stiffness_checks.warn_of_unread(self._elastic.unread)
         return self._elastic
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:

@@ -10,8 +10,8 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
-from dolfinx_contact.collective import raised_together
-from dolfinx_contact.numbering import original_cells
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.support.numbering import original_cells
 
 
 class InternalVariables:

@@ -8,11 +8,11 @@ import numpy as np
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
-from dolfinx_contact.bodies.checks import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.forms import check_meshes, derivative_of
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.bodies.stiffness_checks import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.petsc.linear_solver import preconditioner
+from dolfinx_contact.support.collective import raised_together
 
 
 def body_of(

@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies.loose import LooseMotions, LoosePart
+from dolfinx_contact.step.loose import LooseMotions, LoosePart
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13

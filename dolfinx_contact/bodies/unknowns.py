@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact import compat
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.support.collective import raised_together
 
 
 class Unknowns:

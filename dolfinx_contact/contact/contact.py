@@ -14,25 +14,25 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.attributes import frozen
-from dolfinx_contact.collective import raised_together
-from dolfinx_contact.contact.checks import (
+from dolfinx_contact.contact.displacements import Displacements
+from dolfinx_contact.contact.fields import contact_nodes, weight_on
+from dolfinx_contact.contact.input import (
     check_law,
     check_space,
     check_wear,
     checked_facets,
 )
-from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.contact.fields import contact_nodes, weight_on
-from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.interface import add_to
 from dolfinx_contact.contact.kinematics import ContactKinematics
-from dolfinx_contact.contact.surface import Surface
-from dolfinx_contact.error import NodalStiffness
+from dolfinx_contact.contact.state import Status
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.law.wear import Wear
+from dolfinx_contact.step.errors import NodalStiffness
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import Surface
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
 CLEAR = 1e-9
@@ -80,7 +80,7 @@ class Contact(ContactKinematics):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, plane: Surface, friction: Friction | float, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, surface: Surface, friction: Friction | float, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh, friction = V.mesh, as_friction(friction)
@@ -91,16 +91,16 @@ class Contact(ContactKinematics):
         with raised_together(mesh.comm):
             check_space(V)
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
-            check_law(plane, friction, gdim)
+            check_law(surface, friction, gdim)
             check_wear(wear)
-        self.V, self.comm, self.plane = V, mesh.comm, plane
+        self.V, self.comm, self.surface = V, mesh.comm, surface
         self.displacements = Displacements(V)
         with raised_together(mesh.comm):
             self._weight = weight_on(self.displacements.V, weight)
         self.nodes = frozen(contact_nodes(self.displacements.V, facets, self._weight))
         self.x = frozen(self.displacements.x[self.nodes])
         with raised_together(mesh.comm):
-            plane.check_at(plane.relative(self._at))
+            surface.check_at(surface.relative(self._at))
         self.place()
         self.friction, self.wear, self.rho = friction, wear, None
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
@@ -119,7 +119,7 @@ class Contact(ContactKinematics):
 
     def __repr__(self) -> str:
         friction = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
-        return f"<Contact of {self.nodes.size} nodes on this rank, {self.plane!r}, {friction}, wear={self.wear!r}>"
+        return f"<Contact of {self.nodes.size} nodes on this rank, {self.surface!r}, {friction}, wear={self.wear!r}>"
 
     def belong_to(self, problem) -> None:
         """From now on ``problem`` makes this contact's history."""

@@ -13,8 +13,8 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.checks import finite
-from dolfinx_contact.collective import raised_together
+from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.collective import raised_together
 
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
 ZERO = 1e-10
@@ -76,17 +76,17 @@ def facing_areas(contact, weight) -> np.ndarray:
         contact: The contact.
         weight: Of the surface measure, as ``weight_on`` returns it.
     """
-    V, plane = contact.displacements.V, contact.plane
+    V, surface = contact.displacements.V, contact.surface
     dim = V.mesh.geometry.dim
     towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
     at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)
     x = V.tabulate_dof_coordinates()[at, :dim]
-    frames = plane.frames(plane.relative(x) if plane.curved else x)
+    frames = surface.frames(surface.relative(x) if surface.curved else x)
     towards.x.array.reshape(-1, dim)[at] = frames[..., -1, :]
-    density = -ufl.inner(n_f, v) if not plane.curved else v[0]
+    density = -ufl.inner(n_f, v) if not surface.curved else v[0]
     faces = ufl.conditional(ufl.lt(ufl.inner(n_f, towards), 0.0), density, 0.0)
     rows = _assembled(faces, V, contact.facets, weight).reshape(-1, dim)[contact.nodes]
-    found = rows[:, 0].copy() if plane.curved else rows @ frames[-1]
+    found = rows[:, 0].copy() if surface.curved else rows @ frames[-1]
     largest = contact.comm.allreduce(np.abs(found).max(initial=0.0), op=MPI.MAX)
     with raised_together(contact.comm):
         if not np.isfinite(found).all() or (found < -ZERO * largest).any():

@@ -10,8 +10,8 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
-from dolfinx_contact.checks import finite
 from dolfinx_contact.law.friction import Friction, is_field, rough
+from dolfinx_contact.support.checks import finite
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -118,7 +118,7 @@ def _axes(contact, friction: Friction):
     frame = contact.own_frame if of_surface else contact.frame
     if len(values) == 2:
         along = values
-    elif contact.plane.curved:
+    elif contact.surface.curved:
         along = np.einsum("nij,jn->in", frame[:, :2], values)
     else:
         along = frame[:2] @ values

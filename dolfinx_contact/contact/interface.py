@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact.error import EPSILON, NodalStiffness
+from dolfinx_contact.step.errors import EPSILON, NodalStiffness
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
 FREE, STILL = 1e-12, 64 * EPSILON

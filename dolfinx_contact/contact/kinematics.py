@@ -18,16 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from dolfinx import fem
 
-from dolfinx_contact.attributes import frozen
-from dolfinx_contact.collective import raised_together
 from dolfinx_contact.contact.friction_field import guided
-from dolfinx_contact.contact.history import ContactHistory, State, Status
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.results import ContactResults
-from dolfinx_contact.contact.surface import cross
-from dolfinx_contact.error import EPSILON
+from dolfinx_contact.contact.state import ContactHistory, State, Status
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.supported import supported
+from dolfinx_contact.step.errors import EPSILON
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import cross
 
 
 class Placed(NamedTuple):
@@ -43,7 +43,7 @@ class Placed(NamedTuple):
 
 
 class ContactKinematics(ContactResults):
-    """Motion of the nodes of a ``Contact``, which has ``V``, ``displacements``, ``nodes``, ``x`` and ``plane``."""
+    """Motion of the nodes of a ``Contact``, which has ``V``, ``displacements``, ``nodes``, ``x`` and ``surface``."""
 
     _placed: Any = None  # ``Placed``
     _free_friction: Any = None  # with what it was made of
@@ -79,7 +79,7 @@ class ContactKinematics(ContactResults):
     @property
     def _wanders(self) -> bool:
         """Whether it matters where on the surface nodes are."""
-        return self.plane.varies or self.textured
+        return self.surface.varies or self.textured
 
     @property
     def _at(self) -> np.ndarray:
@@ -89,7 +89,7 @@ class ContactKinematics(ContactResults):
     def arms(self) -> np.ndarray:
         """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
         arms = self._placed.arms
-        return self._at - self.plane.point - self.plane.displacement if arms is None else arms
+        return self._at - self.surface.point - self.surface.displacement if arms is None else arms
 
     # -- frames --------------------------------------------------------------------------------
 
@@ -98,25 +98,25 @@ class ContactKinematics(ContactResults):
 
         ``there`` are positions in space, with None those of the undeformed body, for lever arms.  Collective.
         """
-        plane, x = self.plane, self._at
+        surface, x = self.surface, self._at
         if home is None:
-            home = plane.relative(x) if self._wanders else x
+            home = surface.relative(x) if self._wanders else x
         with raised_together(self.comm):  # the user's functions
-            own = plane.frames(home)
-            frame, flat = plane.turned(own), plane.distance(home)
+            own = surface.frames(home)
+            frame, flat = surface.turned(own), surface.distance(home)
         if home is not x:
             flat = flat - _times(own, home - x)[:, -1]
         before = self._placed
         arms = None
-        if plane.spins:
-            arms = frozen((x if there is None else there) - plane.point - plane.displacement)
-        stands = not plane.curved and arms is None
-        if before and stands and np.array_equal(before.rotation, plane.rotation):
+        if surface.spins:
+            arms = frozen((x if there is None else there) - surface.point - surface.displacement)
+        stands = not surface.curved and arms is None
+        if before and stands and np.array_equal(before.rotation, surface.rotation):
             points = before.points
         else:
             points = self._points_of(frame)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
-        self._placed = Placed(home, plane.rotation, own, frame, flat, points, arms)
+        self._placed = Placed(home, surface.rotation, own, frame, flat, points, arms)
 
     def _points_of(self, frame: np.ndarray) -> ContactPoints:
         n, gdim = self._at.shape
@@ -126,11 +126,11 @@ class ContactKinematics(ContactResults):
     @property
     def follows(self) -> bool:
         """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
-        plane = self.plane
+        surface = self.surface
         return (
             self._wanders
-            or plane.spins
-            or not np.array_equal(plane.rotation, self._placed.rotation)
+            or surface.spins
+            or not np.array_equal(surface.rotation, self._placed.rotation)
         )
 
     def follow(self, u: np.ndarray) -> None:
@@ -141,11 +141,11 @@ class ContactKinematics(ContactResults):
         Args:
             u: Displacement of owned degrees of freedom with which nodes stand there, that of the last step.
         """
-        (placed, last), plane = self._settled, self.plane
+        (placed, last), surface = self._settled, self.surface
         there = self._at + u[self.points.dofs]
-        self.place(plane.relative(there) if self._wanders else placed.home, there)
+        self.place(surface.relative(there) if self._wanders else placed.home, there)
         now = self._placed
-        if plane.curved:
+        if surface.curved:
             moved = _turned_back(placed.own, last.displacement)
             last = last._replace(displacement=frozen(_times(now.own, moved)))
         if now.points is not placed.points:
@@ -181,7 +181,7 @@ class ContactKinematics(ContactResults):
 
     def _carried(self) -> np.ndarray:
         """Motion of the surface at the nodes, global frame: ``shape=(gdim,)`` if it is the same for all."""
-        motion, spin = self.plane.motion(self._at), self.plane.spin
+        motion, spin = self.surface.motion(self._at), self.surface.spin
         return motion if spin is None else motion + cross(spin, self._placed.arms)
 
     def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
@@ -190,7 +190,7 @@ class ContactKinematics(ContactResults):
         if turns:
             return _times(self.frame, cross(axis, self._placed.arms))
         along = self.frame @ axis  # the axes of a plane are those of its frame
-        return np.broadcast_to(along if self.plane.curved else np.rint(along), shape)
+        return np.broadcast_to(along if self.surface.curved else np.rint(along), shape)
 
     def move(self, u: fem.Function | np.ndarray) -> None:
         """Gaps and slip increments for a displacement, from the last converged step on.
@@ -267,7 +267,7 @@ class ContactKinematics(ContactResults):
 
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
-        lengths = (self.x, self.plane.point, self.plane.displacement, self.points.motion(u))
+        lengths = (self.x, self.surface.point, self.surface.displacement, self.points.motion(u))
         return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
 
     def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -283,7 +283,7 @@ class ContactKinematics(ContactResults):
             np.abs(self.frame) @ motion if motion.ndim == 1 else _times(np.abs(self.frame), motion)
         )
         terms = self.points.magnitudes(u) + felt
-        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.plane.point))
+        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.surface.point))
         gap = terms[:, -1] + coordinates + self.wear_depth
         slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
         if self._known is None:
@@ -311,8 +311,8 @@ class ContactKinematics(ContactResults):
     ) -> None:
         """See ``ContactHistory``; with what a rotation found in the step is beyond the first order."""
         super().settle(work, path, depth, kept)
-        if self.plane.spin is not None:
-            ended = copy(self.plane)
+        if self.surface.spin is not None:
+            ended = copy(self.surface)
             ended.end_step()
             moved = _turned_back(self.frame, self.displacement) + self._carried()
             turned = ended.moved_past(self._at, moved)
@@ -328,29 +328,29 @@ class ContactKinematics(ContactResults):
     def save(self) -> dict[str, np.ndarray]:
         """See ``ContactLaws``; with what the frames were taken for."""
         saved, placed = super().save(), self._placed
-        if self.plane.varies:
+        if self.surface.varies:
             saved["home"] = placed.home
         if placed.rotation.any():
             saved["rotation_of_plane"] = placed.rotation
-        if self.plane.spins:
-            saved["found_rotation_of_plane"] = self.plane.rotation
+        if self.surface.spins:
+            saved["found_rotation_of_plane"] = self.surface.rotation
         return saved
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """See ``ContactLaws``."""
         super().check_saved(saved)
-        if self.plane.varies and "home" not in saved:
-            raise ValueError(f"checkpoint: it was written with another plane: here {self.plane}.")
+        if self.surface.varies and "home" not in saved:
+            raise ValueError(f"checkpoint: it was written with another plane: here {self.surface}.")
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """See ``ContactLaws``."""
-        plane, self._settled = self.plane, None
-        plane.rotation = saved.get("rotation_of_plane", np.zeros_like(plane.rotation))
+        surface, self._settled = self.surface, None
+        surface.rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
         if self.follows:
-            self.place(np.array(saved["home"]) if plane.varies else self._placed.home)
+            self.place(np.array(saved["home"]) if surface.varies else self._placed.home)
         super().load(saved)
         self._settle_here()
-        plane.rotation = saved.get("found_rotation_of_plane", plane.rotation)
+        surface.rotation = saved.get("found_rotation_of_plane", surface.rotation)
 
     def history(self) -> tuple:
         """See ``ContactHistory``; with the frames."""

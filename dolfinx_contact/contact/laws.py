@@ -8,17 +8,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dolfinx_contact.collective import raised_together
-from dolfinx_contact.contact.checks import (
+from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
+from dolfinx_contact.contact.input import (
     check_coefficients,
     check_law,
     check_wear,
     warn_of_percent,
 )
-from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
-from dolfinx_contact.contact.history import ContactHistory
+from dolfinx_contact.contact.state import ContactHistory
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.law.wear import Wear
+from dolfinx_contact.support.collective import raised_together
 
 
 class ContactLaws(ContactHistory):
@@ -42,7 +42,7 @@ class ContactLaws(ContactHistory):
             field = friction
             friction = self._evaluated(field, empty="_present" not in self.__dict__)
         else:
-            check_law(self.plane, friction, gdim)
+            check_law(self.surface, friction, gdim)
             warn_of_percent(friction)
             friction = at_most_rough(friction)
         self._field, self._begun, self._rested = field, None, None
@@ -53,7 +53,7 @@ class ContactLaws(ContactHistory):
         state, gdim = self._state(followed(field), empty), self.V.mesh.geometry.dim
         with raised_together(self.comm):
             friction = on_nodes(self, field, state, axes)
-            check_law(self.plane, friction, gdim, directed(field, gdim))
+            check_law(self.surface, friction, gdim, directed(field, gdim))
         return at_most_rough(friction)
 
     @property
@@ -114,10 +114,12 @@ class ContactLaws(ContactHistory):
 
     def described(self) -> dict[str, str]:
         """Plane and laws, but coefficients per node, in words: the same on all ranks."""
-        driven = self.plane.driven() if self.plane.free else "by displacement"
+        driven = self.surface.driven() if self.surface.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
-        moved, turned = (repr(v.tolist()) for v in (self.plane.displacement, self.plane.rotation))
-        return {"plane": repr(self.plane), "plane.displacement": moved, "plane.rotation": turned, "plane.free": driven, "friction": law, "wear": repr(self.wear)}  # fmt: skip
+        moved, turned = (
+            repr(v.tolist()) for v in (self.surface.displacement, self.surface.rotation)
+        )
+        return {"surface": repr(self.surface), "surface.displacement": moved, "surface.rotation": turned, "surface.free": driven, "friction": law, "wear": repr(self.wear)}  # fmt: skip
 
     def check(self, first: dict[str, str]) -> None:
         """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""
@@ -131,7 +133,7 @@ class ContactLaws(ContactHistory):
 
     def save(self) -> dict[str, np.ndarray]:
         """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
-        saved = super().save() | self._laws() | {"plane": self.plane.displacement}
+        saved = super().save() | self._laws() | {"plane": self.surface.displacement}
         if self._settled_by is not None:
             saved["law_of_last_step"] = self._rows(self._settled_by)
         return saved
@@ -145,14 +147,14 @@ class ContactLaws(ContactHistory):
                     name
                 ]
                 raise ValueError(
-                    f"checkpoint: it was written with another {what}: here {self.friction}, {self.plane}, "
+                    f"checkpoint: it was written with another {what}: here {self.friction}, {self.surface}, "
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         super().load(saved)
-        self.plane.displacement = saved["plane"]
+        self.surface.displacement = saved["plane"]
         if self._field is not None:
             self._take_law(
                 self._evaluated(self._field)
@@ -176,7 +178,7 @@ class ContactLaws(ContactHistory):
                 texture = {"texture": directions(self, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else self.wear.coefficient
-        parts = (self.plane.described(), np.broadcast_to(wear, 2))
+        parts = (self.surface.described(), np.broadcast_to(wear, 2))
         return {"laws": self._rows(law), "rigid_plane": np.concatenate(parts)} | texture
 
     def _rows(self, law: Friction) -> np.ndarray:

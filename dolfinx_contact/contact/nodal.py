@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.error import EPSILON
 from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.step.errors import EPSILON
 
 # Newton's steps at most, those in which a residual has to halve, and sweeps over the contacts after one that does not help.
 MOST, PATIENCE, SWEEPS = 30, 8, 4

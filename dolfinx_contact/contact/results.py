@@ -10,10 +10,10 @@ import numpy as np
 from dolfinx import fem
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import frozen
 from dolfinx_contact.contact import fields
-from dolfinx_contact.contact.history import Status
 from dolfinx_contact.contact.laws import ContactLaws
+from dolfinx_contact.contact.state import Status
+from dolfinx_contact.support.attributes import frozen
 
 
 class ContactResults(ContactLaws):
@@ -59,7 +59,7 @@ class ContactResults(ContactLaws):
 
         With axial symmetry its axial component alone is a force; the other one is the sum of radial forces, which balance.
         """
-        if self.plane.curved:
+        if self.surface.curved:
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
 
@@ -67,7 +67,7 @@ class ContactResults(ContactLaws):
         """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
 
         With the lever arms of the step: from where the point was put before it to where the nodes were then.  After a
-        step it is ``plane.moment`` about the axes that are free.
+        step it is ``surface.moment`` about the axes that are free.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
         arms = self.arms

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
-from dolfinx_contact.attributes import Guarded, frozen
-from dolfinx_contact.checks import finite
+from dolfinx_contact.support.attributes import Guarded, frozen
+from dolfinx_contact.support.checks import finite
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.attributes import Guarded, frozen
-from dolfinx_contact.checks import finite
+from dolfinx_contact.support.attributes import Guarded, frozen
+from dolfinx_contact.support.checks import finite
 
 
 class Wear(Guarded):

@@ -17,9 +17,9 @@ from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import FreeState
-from dolfinx_contact.checks import number
-from dolfinx_contact.collective import raised_together
-from dolfinx_contact.numbering import original_cells, original_nodes
+from dolfinx_contact.support.checks import number
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.support.numbering import original_cells, original_nodes
 
 # Of what is written.  Files of before 27 November 2026 have none.
 VERSION = 1

@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.collective import by_first_rank, raised_together
 from dolfinx_contact.results.record import Step
+from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
@@ -66,7 +66,7 @@ class History:
             if not isinstance(resume, (int, np.integer)) or resume < 0:
                 raise ValueError(f"resume must be a number of rows, 0 or more, got {resume!r}.")
         self._tracked = problem.contacts[contact]
-        self._driven = [bool(contact.plane.free) for contact in problem.contacts]
+        self._driven = [bool(contact.surface.free) for contact in problem.contacts]
         at, gdim = np.asarray(points, dtype=float), self._tracked.points.dim
         if at.size and (at.ndim != 2 or at.shape[1] != gdim):
             raise ValueError(f"points must have shape (m, {gdim}), got {at.shape}.")
@@ -94,7 +94,7 @@ class History:
         row.update(step.counts._asdict())
         for k, contact in enumerate(self.problem.contacts):
             row.update((f"contact{k}_{name}", value) for name, value in self._totals(contact))
-            moved = zip("xyz", contact.plane.displacement if self._driven[k] else ())
+            moved = zip("xyz", contact.surface.displacement if self._driven[k] else ())
             row.update((f"contact{k}_plane_{axis}", float(value)) for axis, value in moved)
         for k, node in enumerate(self._nodes):
             row.update((f"node{k}_{name}", value) for name, value in self._state(node))

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.checks import RoundingWarning
-from dolfinx_contact.error import ROUNDED
+from dolfinx_contact.step.errors import ROUNDED
+from dolfinx_contact.support.checks import RoundingWarning
 
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3

@@ -7,12 +7,12 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact.solvers.base import SolverResult
-from dolfinx_contact.solvers.compliance import fits
-from dolfinx_contact.solvers.condensed import ASTRAY, components
-from dolfinx_contact.solvers.condensed_newton import CondensedNewton
-from dolfinx_contact.solvers.fixed_point import FixedPoint
-from dolfinx_contact.solvers.linearised import Linearised
-from dolfinx_contact.solvers.sparse_newton import SparseNewton
+from dolfinx_contact.solvers.condensed.body import ASTRAY, components
+from dolfinx_contact.solvers.condensed.compliance import fits
+from dolfinx_contact.solvers.condensed.newton import CondensedNewton
+from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
+from dolfinx_contact.solvers.newton.linearised import Linearised
+from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton
 
 
 def most_nodes(unknowns: int, friction: bool) -> int:
@@ -51,7 +51,7 @@ class BoundAutomatic:
     def _choose_nonlinear(self) -> None:
         body, self._components = self._arguments[0], None
         self._solvers, self._why = [Linearised(FixedPoint())], "F is not linear in u"
-        if body.factorised and not any(c.plane.free for c in self._arguments[1]):
+        if body.factorised and not any(c.surface.free for c in self._arguments[1]):
             self._solvers.insert(0, SparseNewton())
 
     def _choose_linear(self) -> None:

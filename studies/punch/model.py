@@ -167,7 +167,7 @@ class Punch:
         tangential = np.linalg.norm(contact.reaction[:, :2], axis=1).sum()
         return {
             "displacement": displacement,
-            "normal_reaction": self.parts * float(contact.force() @ contact.plane.normal),
+            "normal_reaction": self.parts * float(contact.force() @ contact.surface.normal),
             "tangential_reaction_sum": self.parts * float(self.comm.allreduce(tangential)),
             **{name: int(count) for name, count in step.counts._asdict().items()},
             "error": float(step.error),

@@ -1,0 +1,166 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Cells divided where the error is, one mesh after another, until a quantity is as accurate as asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from dolfinx import fem
+
+from dolfinx_contact import compat
+from dolfinx_contact.analysis.estimate import QUANTITIES, Estimate, estimate, largest
+from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.collective import agree, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+# Squares that differ by less, as of cells that symmetry makes equal, are divided together.
+TIES = 1e-6
+
+Pair = tuple["ContactProblem", "ContactProblem"]
+
+
+class Tried(NamedTuple):
+    """A mesh that ``adapt`` has tried: number of its cells, value, and estimated error over its size."""
+
+    cells: int
+    value: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """What ``adapt`` returns.
+
+    Attributes:
+        value: The quantity of the better problem on the last mesh.
+        error: Estimated for the other problem on that mesh, over its value: for ``value`` on the safe side.
+        reached: Whether ``error`` is at most what was asked for.
+        problem, reference: On the last mesh, in the state at the programme's end.
+        estimate: Of all quantities on the last mesh.
+        tried: A ``Tried`` for each mesh.
+
+    Example:
+        >>> dc.Adapted.__name__
+        'Adapted'
+    """
+
+    value: float
+    error: float
+    reached: bool
+    problem: ContactProblem
+    reference: ContactProblem
+    estimate: Estimate
+    tried: tuple[Tried, ...]
+
+
+def adapt(
+    compute: Callable[[Any], Pair],
+    mesh: Any,
+    accuracy: float,
+    quantity: str,
+    meshes: int = 12,
+    share: float = 0.5,
+    quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,
+) -> Adapted:
+    """Divide the cells of a mesh where the error is until a quantity is accurate enough.  Collective.
+
+    On each mesh ``compute`` takes the whole programme from its beginning: no history is carried from mesh to mesh.
+    ``estimate`` gives the error of the quantity and the energy norm of the difference on each cell; the cells with the largest
+    norms, which together have the part ``share`` of their sum of squares, are divided (W. Doerfler, SIAM J. Numer. Anal. 33 (1996)
+    1106).  Estimates, no bounds; the error of increments is not seen.  New nodes on a curved boundary halve its old edges.
+
+    Args:
+        compute: From a mesh two problems on it, of lower and of higher order, at the programme's end.
+        mesh: Of triangles or tetrahedra, to begin with.
+        accuracy: Of the quantity, relative.
+        quantity: Name of one of ``estimate``'s quantities, ``pressure`` and ``shear`` excepted, or of ``quantities``, which are as there.
+        meshes: At most so many.
+        share: Between 0 and 1; less makes more meshes, each better adapted.
+
+    Returns:
+        An ``Adapted``; ``reached`` says whether the meshes sufficed.
+
+    Raises:
+        ValueError: other cells, an unknown quantity, numbers out of range, problems that are not on the mesh.
+
+    Example:
+        >>> def press(cube, order):  # and all steps of the programme
+        ...     V = functionspace(cube, ("Lagrange", order, (3,)))
+        ...     U, ends = fem.Function(V), [mesh.locate_entities_boundary(cube, 2, lambda x: x[2] == z) for z in (0, 1)]
+        ...     top = fem.dirichletbc(np.array([0, 0, -1e-3]), fem.locate_dofs_topological(V, 2, ends[1]), V)
+        ...     form = ufl.inner(ufl.grad(U), ufl.grad(ufl.TestFunction(V))) * ufl.dx
+        ...     made = dc.ContactProblem(form, U, [dc.Contact(V, ends[0], plane, friction)], [top])
+        ...     return made.solve() and made
+        >>> cube = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2)
+        >>> found = dc.adapt(lambda of: (press(of, 1), press(of, 2)), cube, 0.05, "normal_force")
+    """
+    mine = {**QUANTITIES, **(quantities or {})}
+    with raised_together(mesh.comm):
+        accuracy, share = positive("accuracy", accuracy, finite=True), positive("share", share)
+        _check(mesh, share, quantity, mine, meshes)
+    agree(mesh.comm, accuracy=accuracy, share=share, quantity=quantity, meshes=meshes)
+    tried: list[Tried] = []
+    while True:
+        problem, reference = _pair(compute, mesh)
+        found = estimate(problem, reference, quantities)
+        value, error = found[quantity].value, found[quantity].relative
+        tried.append(Tried(_cell_map(mesh).size_global, value, error))
+        reached = error <= accuracy
+        if reached or len(tried) == meshes:
+            better = largest(mine[quantity](reference))
+            return Adapted(better, error, reached, problem, reference, found, tuple(tried))
+        mesh = compat.refined(mesh, _largest(found.cells, share))
+        problem.close(), reference.close()
+
+
+def _pair(compute: Callable[[Any], Pair], mesh: Any) -> Pair:
+    with raised_together(mesh.comm):
+        pair = compute(mesh)
+    with raised_together(mesh.comm):
+        if (
+            not isinstance(pair, (tuple, list))
+            or len(pair) != 2
+            or not all(_is_on(mesh, of) for of in pair)
+        ):
+            raise ValueError(
+                f"compute must return two ContactProblems on the mesh that it is given, of lower and of higher order, got {pair!r}."
+            )
+    return tuple(pair)
+
+
+def _is_on(mesh: Any, problem: Any) -> bool:
+    return hasattr(problem, "contacts") and problem.body.V.mesh is mesh
+
+
+def _check(mesh, share: float, quantity: str, quantities: Mapping, meshes: int) -> None:
+    if mesh.topology.cell_name() not in ("triangle", "tetrahedron"):
+        raise ValueError(
+            f"mesh must have triangles or tetrahedra, got {mesh.topology.cell_name()}s: DOLFINx divides no other cells. "
+            "dc.converge takes a list of meshes of any cells."
+        )
+    if share > 1:
+        raise ValueError(f"share must be between 0 and 1, got {share!r}.")
+    if quantity not in quantities:
+        raise ValueError(f"quantity must be one of {sorted(quantities)}, got {quantity!r}.")
+    if meshes < 1:
+        raise ValueError(f"meshes must be at least 1, got {meshes!r}.")
+
+
+def _cell_map(mesh):
+    return mesh.topology.index_map(mesh.topology.dim)
+
+
+def _largest(cells: fem.Function, share: float) -> np.ndarray:
+    """Owned cells with the largest values, which together have this part of the sum of squares of all ranks' cells."""
+    comm = cells.function_space.mesh.comm
+    squares = cells.x.array[: _cell_map(cells.function_space.mesh).size_local] ** 2
+    falling = np.sort(np.concatenate(comm.allgather(squares)))[::-1]
+    sums = np.cumsum(falling)
+    least = (1 - TIES) * falling[np.searchsorted(sums, share * sums[-1])]
+    return np.flatnonzero((squares >= least) & (squares > 0)).astype(np.int32)

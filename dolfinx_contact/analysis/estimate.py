@@ -1,0 +1,252 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""How far results are off because of the mesh: by a second problem with a better space, stepped along the same programme."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import ArrayLike
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import KDTree
+
+from dolfinx_contact import compat
+from dolfinx_contact.contact.fields import per_area
+from dolfinx_contact.support.checks import finite, positive
+from dolfinx_contact.support.collective import agree, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+
+class Estimated(NamedTuple):
+    """A quantity of a problem and the estimate of its error, in its own unit."""
+
+    value: float
+    error: float
+
+    @property
+    def relative(self) -> float:
+        """Error over the size of the value; 0 where both are nothing."""
+        return 0.0 if self.error == 0 else float(np.divide(self.error, abs(self.value)))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What ``estimate`` returns.
+
+    Attributes:
+        quantities: By name, ``Estimated``.
+        energy_norm: Of the difference of displacements over that of the reference's, dimensionless: the error of
+            stresses in the mean.  None if the two problems have different meshes.
+        cells: Function of degree 0, the energy norm of the difference on each cell; their squares sum up to that of the
+            body.  None with ``energy_norm``.
+
+    Example:
+        What ``estimate`` returns, made by hand:
+
+        >>> found = dc.Estimate(quantities={}, energy_norm=0.01, cells=None)
+        >>> found.energy_norm
+        0.01
+    """
+
+    quantities: dict[str, Estimated]
+    energy_norm: float | None
+    cells: fem.Function | None
+
+    def __getitem__(self, name: str) -> Estimated:
+        return self.quantities[name]
+
+
+def _sum(problem, of) -> float:
+    return sum(problem.body.comm.allreduce(float(of(contact))) for contact in problem.contacts)
+
+
+def _peak(problem) -> float:
+    tops = [contact.pressure.max(initial=0.0) for contact in problem.contacts]
+    return max(problem.body.comm.allgather(float(max(tops))))
+
+
+QUANTITIES = {
+    "normal_force": lambda problem: _sum(problem, lambda of: of.reaction[:, -1].sum()),
+    "tangential_force": lambda problem: _sum(problem, lambda of: np.linalg.norm(of.reaction[:, :-1], axis=1).sum()),
+    "dissipation": lambda problem: _sum(problem, lambda of: of.dissipation.sum()),
+    "peak_pressure": _peak,
+}  # fmt: skip
+
+
+def estimate(
+    problem: ContactProblem,
+    reference: ContactProblem,
+    quantities: Mapping[str, Callable[[ContactProblem], ArrayLike]] | None = None,
+    share: float = 1.0,
+) -> Estimate:
+    """Estimate the discretisation's error of a problem's present state.  Collective.
+
+    ``reference`` is the same body with a better space, which was taken through the same programme: of second order on the
+    same mesh, of a finer mesh, of smaller increments.  The difference of a quantity is its estimated error,
+    ``abs(J(u) - J(U)) * share``, which is the error itself if the reference's own is small beside it (saturation;
+    R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
+    all that depends on history are estimated as accumulated.  A surface that is driven by displacement may belong to both; one driven
+    by force moves in each problem in its own way: make one for each.
+
+    Args:
+        problem: Whose error is asked for.
+        reference: The better one.  On the same mesh object, with a space that contains the problem's, tractions are compared,
+            and cells get indicators.
+        quantities: Functions of a problem that return a number, the same on all ranks, by name; or several, such as the force
+            after each step so far: then the value is the largest, and the error the largest of theirs.  They come beside
+            ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
+            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object, or where all
+            contacts are with planes, there are also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of
+            the nodal normal and tangential tractions, reaction over area, with those of the differences as errors.
+        share: The error over the difference.  ``1 / (1 - 2**-p)`` for a reference on cells of half the size where errors fall
+            with order p.
+
+    Raises:
+        ValueError: problems that do not belong together, or quantities that are not finite numbers.
+
+    Example:
+        >>> W = functionspace(block, ("Lagrange", 2, (3,)))  # the same body in second order
+        >>> U = fem.Function(W)
+        >>> finer_F = ufl.replace(F, {u: U, v: ufl.TestFunction(W)})
+        >>> finer_bc = fem.dirichletbc(held, fem.locate_dofs_topological(W, 2, head), W)
+        >>> finer_contact = dc.Contact(W, foot, plane, friction)
+        >>> finer = dc.ContactProblem(finer_F, U, [finer_contact], bcs=[finer_bc])
+        >>> step = finer.solve()  # and all other steps of the programme
+        >>> off = dc.estimate(problem, finer)["normal_force"].relative
+    """
+    comm = problem.body.comm
+    with raised_together(comm):
+        share = positive("share", share, finite=True)
+        _check_pair(problem, reference)
+    agree(comm, share=share, quantities=sorted(quantities or ()))
+    found = {}
+    for name, of in {**QUANTITIES, **(quantities or {})}.items():
+        with raised_together(comm):
+            value, better = _numbers(name, of(problem), of(reference))
+        agree(comm, **{f"quantity {name!r}": (value.tolist(), better.tolist())})
+        found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
+    same_mesh = problem.body.V.mesh is reference.body.V.mesh
+    if same_mesh or not any(contact.surface.curved for contact in problem.contacts):
+        for name, of in tractions(problem, reference).items():
+            found.setdefault(name, of._replace(error=share * of.error))
+    if not same_mesh:
+        return Estimate(found, None, None)
+    norm, cells = indicators(problem, reference)
+    return Estimate(found, share * norm, cells)
+
+
+def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
+    """Energy norm of the difference of displacements, over that of the reference's, and on each cell.  Collective.
+
+    With the tangent ``a(v, w)`` of the reference at its displacement ``U`` the square on a cell K is ``a_K(e, e)``,
+    ``e = U - u``.  Terms on facets count for their cells.
+    """
+    body = reference.body
+    e, square = fem.Function(body.V), fem.Function(compat.functionspace(body.V.mesh, ("DG", 0)))
+    e.interpolate(problem.u)
+    e.x.array[:] = body.u.x.array - e.x.array
+    test, trial = body.tangent.arguments()
+    q = ufl.TestFunction(square.function_space)
+    form = compat.compiled(ufl.replace(body.tangent, {test: e * q, trial: e}), body.entity_maps)
+    own = square.function_space.dofmap.index_map.size_local
+    compat.assemble_into(square.x, form)
+    of_difference = square.x.array.copy()
+    e.x.array[:] = body.u.x.array
+    compat.assemble_into(square.x, form)
+    sums = body.comm.allreduce(np.array([of_difference[:own].sum(), square.x.array[:own].sum()]))
+    square.x.array[:] = np.sqrt(np.maximum(of_difference, 0.0))
+    square.x.scatter_forward()
+    part, whole = np.maximum(sums, 0.0)
+    return float(np.sqrt(part / whole)) if part > 0 else 0.0, square
+
+
+def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, Estimated]:
+    """Root mean squares, over the contact surfaces, of pressure and shear and of their differences.  Collective.
+
+    Nodal tractions of the problem, in the local frame, are interpolated at the reference's contact nodes, whose areas are the weights:
+    of second order Simpson's rule on edges and quadrilaterals, the middles of the edges on triangles.
+    """
+    sums, area = np.zeros((2, 2)), 0.0
+    for contact, better in zip(problem.contacts, reference.contacts):
+        own, other = interpolated(contact, better), per_area(better.reaction, better.area)
+        area += better.area.sum()
+        for row, of in zip(sums, (own, other - own)):
+            row += better.area @ of[:, -1] ** 2, better.area @ (of[:, :-1] ** 2).sum(axis=1)
+    comm = problem.body.comm
+    means = np.sqrt(comm.allreduce(sums) / comm.allreduce(area)).T
+    return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
+
+
+def interpolated(contact, better) -> np.ndarray:
+    """Nodal tractions of a contact at the nodes of another, local frame.  Collective.
+
+    On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.
+    """
+    tractions, dim = per_area(contact.reaction, contact.area), contact.reaction.shape[1]
+    if contact.V.mesh is better.V.mesh:
+        here, there = (fem.Function(of.displacements.V) for of in (contact, better))
+        here.x.array.reshape(-1, dim)[contact.nodes] = tractions
+        here.x.scatter_forward()
+        there.interpolate(here)
+        return there.x.array.reshape(-1, dim)[better.nodes]
+    along = contact.surface.frame[:-1, :dim].T
+    x, y = (of.x[:, :dim] @ along for of in (contact, better))
+    x, values = map(np.concatenate, zip(*contact.comm.allgather((x, tractions))))
+    if dim == 2:
+        order = np.argsort(x[:, 0])
+        return np.array([np.interp(y[:, 0], x[order, 0], of[order]) for of in values.T]).T
+    found = LinearNDInterpolator(x, values)(y)
+    outside = np.isnan(found[:, 0])
+    found[outside] = values[KDTree(x).query(y[outside])[1]]
+    return found
+
+
+def largest(numbers: ArrayLike) -> float:
+    """The number of the largest size."""
+    numbers = np.ravel(numbers)
+    return float(numbers[np.abs(numbers).argmax()])
+
+
+def _check_pair(problem, reference) -> None:
+    if reference is problem or not hasattr(reference, "contacts"):
+        raise ValueError(
+            "reference must be another ContactProblem: the same body with a space of higher order or a finer mesh."
+        )
+    if len(reference.contacts) != len(problem.contacts):
+        raise ValueError(f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
+                         f"{len(reference.contacts)}.")  # fmt: skip
+    same_mesh = problem.body.V.mesh is reference.body.V.mesh
+    pairs = zip(problem.contacts, reference.contacts)
+    if same_mesh and any(set(of.facets) != set(other.facets) for of, other in pairs):
+        raise ValueError(
+            "on the same mesh contacts of problem and reference must have the same facets, in the same order of contacts."
+        )
+    if same_mesh and any(of.body.displacements.mixed for of in (problem, reference)):
+        raise ValueError(
+            "on the same mesh dc.estimate does not know mixed spaces, which have no energy norm of their own: give a "
+            "reference on a finer mesh, whose quantities alone are compared."
+        )
+    orders = [compat.lagrange_degree(of.body.V) for of in (problem, reference)]
+    if same_mesh and orders[0] >= orders[1]:
+        raise ValueError(
+            f"on the same mesh the reference must be of higher order, got degrees {orders[0]} and {orders[1]}: give the "
+            "problem of lower order first, or a reference on a finer mesh."
+        )
+
+
+def _numbers(name: str, *of) -> list[np.ndarray]:
+    value, better = found = [np.ravel(finite(f"quantity {name!r}", numbers)) for numbers in of]
+    if value.size == 0:
+        raise ValueError(f"quantity {name!r} must be a finite number or several, got {of[0]!r}.")
+    if value.size != better.size:
+        raise ValueError(
+            f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."
+        )
+    return found

@@ -1,0 +1,136 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A programme of loading in increments that are halved where a step fails, and grow again."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dolfinx_contact.results.history import History
+from dolfinx_contact.results.record import NotConverged, Step
+from dolfinx_contact.support.checks import finite, number, positive
+from dolfinx_contact.support.collective import agree, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+LOG = logging.getLogger("dolfinx_contact")
+
+# Steps in a row after which an increment is doubled again.
+EASY = 2
+
+
+def advance(
+    problem: ContactProblem,
+    programme: Callable[[float], object],
+    points: Sequence[float],
+    start: float = 0.0,
+    smallest: float = 1 / 64,
+    history: History | None = None,
+    monitor: Callable[[float, Step], object] | None = None,
+) -> History:
+    """Solve load steps along a programme, from ``start`` through all ``points``.
+
+    An increment from one point to the next is tried as a whole.  A step that does not converge is tried again with half
+    of it, from the last converged state; after two steps that converge increments are doubled again.  Every point is the end of a step.
+    ``logging.getLogger("dolfinx_contact")`` tells of halved increments; on a terminal there is a progress bar if tqdm is installed.
+
+    Args:
+        problem: The ContactProblem.  Collective.
+        programme: Function of the programme's parameter, a time for instance, that sets loads, boundary values and planes.
+        points: Values of the parameter, rising.
+        start: Its value for the problem's present state.
+        smallest: Smallest increment, over the distance of its two points.
+        history: Table to record every step in, with the column ``t``; None makes one.
+        monitor: None, or a function of parameter and record, called after every step.
+
+    Returns:
+        The table.
+
+    Raises:
+        NotConverged: a step with the smallest increment did not converge; problem and table are at the last one that did.
+        ValueError: points that do not rise.
+
+    Example:
+        >>> def programme(t): held.value = (0, 0, -0.01 * t)
+        >>> table = dc.advance(problem, programme, points=[0.5, 1.0])
+    """
+    comm = problem.body.comm
+    ends, start, smallest = _checked(comm, programme, points, start, smallest, monitor)
+    history = History(problem) if history is None else history
+    bar, now = _bar(comm.rank, ends[-1] - start), start
+
+    def accepted(at: float, step: Step) -> None:
+        nonlocal now
+        history.record(step, t=at)
+        if monitor is not None:
+            with raised_together(comm):
+                monitor(at, step)
+        if bar is not None:
+            bar.update(at - now)
+        now = at
+
+    try:
+        for end in ends:
+            _in_increments(problem, programme, now, end, smallest, accepted)
+    finally:
+        if bar is not None:
+            bar.close()
+    return history
+
+
+def _checked(comm, programme, points, start, smallest, monitor) -> tuple[list, float, float]:
+    """Points, start and smallest increment as numbers, the same on all ranks.  Collective."""
+    with raised_together(comm):
+        start, ends = number("start", start), np.atleast_1d(finite("points", points))
+        if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
+            raise ValueError(f"points must rise from start = {start!r}, got {points!r}.")
+        smallest = positive("smallest", smallest, finite=True)
+        if not callable(programme):
+            raise ValueError(f"programme must be a function of one number, got {programme!r}.")
+        if not (monitor is None or callable(monitor)):
+            raise ValueError(
+                f"monitor must be a function of parameter and record, got {monitor!r}."
+            )
+    agree(comm, points=ends.tolist(), start=start, smallest=smallest)
+    return ends.tolist(), start, smallest
+
+
+def _in_increments(problem, programme, now: float, end: float, smallest: float, accepted) -> None:
+    """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
+    whole, begun = end - now, now
+    # Increments are the whole over ``parts``, of which so many are done.
+    parts, done, easy = 1, 0, 0
+    while done < parts:
+        at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
+        with raised_together(problem.body.comm):
+            programme(at)
+        try:
+            step = problem.solve()
+        except NotConverged as failure:
+            if 0.5 / parts < smallest:
+                raise
+            parts, done, easy = 2 * parts, 2 * done, 0
+            if problem.body.comm.rank == 0:
+                LOG.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
+            continue
+        now, done, easy = at, done + 1, easy + 1
+        accepted(at, step)
+        if easy >= EASY and parts > 1 and done % 2 == 0:
+            parts, done, easy = parts // 2, done // 2, 0
+
+
+def _bar(rank: int, total: float):
+    """A progress bar, on a terminal and if tqdm is installed."""
+    if rank != 0 or not sys.stderr.isatty():
+        return None
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return None
+    return tqdm(total=total)

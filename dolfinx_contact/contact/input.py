@@ -1,0 +1,113 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What users give to a contact, checked: space, facets, plane, friction and wear."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from dolfinx_contact import compat
+from dolfinx_contact.contact.displacements import displacement_part
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.wear import Wear
+from dolfinx_contact.surfaces.surface import Surface
+
+# Coefficients of friction between these are hardly meant.
+PERCENT = 10.0, 1000.0
+
+
+def check_space(V) -> None:
+    mesh = V.mesh
+    gdim, tdim = mesh.geometry.dim, mesh.topology.dim
+    part = displacement_part(V)
+    components = compat.value_size(V) if part is None else gdim
+    if gdim != tdim or gdim not in (2, 3):
+        raise ValueError(
+            f"V lives on a mesh of dimension {tdim} in {gdim}-D space: need 2 or 3 in both. Of a mesh from gmsh: a body "
+            "without a physical group of its own is left out, and a mesh in the plane needs gdim=2."
+        )
+    if components != gdim:
+        raise ValueError(
+            f"V has {components} component(s) on a {gdim}-D mesh: a displacement has one per "
+            f'dimension, functionspace(mesh, ("Lagrange", 1, ({gdim},))).'
+        )
+    if compat.lagrange_degree(V if part is None else part) is None:
+        raise ValueError(f"V must be continuous Lagrange, got {V.ufl_element()}.")
+
+
+def checked_facets(facets, index_map, boundary) -> np.ndarray:
+    array = np.asarray(facets)
+    if hasattr(facets, "indices") or (array.ndim == 0 and np.issubdtype(array.dtype, np.integer)):
+        given = "facet tags" if hasattr(facets, "indices") else f"the number {facets}"
+        raise ValueError(
+            f"facets must be an array of facets, got {given}: pass facet_tags.find(tag), the facets that have a tag."
+        )
+    if array.size == 0:
+        return np.zeros(0, dtype=np.int32)
+    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(
+            f"facets must be a one-dimensional array of integers, got shape {array.shape} of "
+            f"{array.dtype}."
+        )
+    available = index_map.size_local + index_map.num_ghosts
+    if array.min() < 0 or array.max() >= available:
+        raise ValueError(
+            f"facets range from {array.min()} to {array.max()}, but this rank has facets "
+            f"0 to {available - 1}: pass local indices, of the mesh's own facets."
+        )
+    inside = np.setdiff1d(array[array < index_map.size_local], boundary)
+    if inside.size:
+        raise ValueError(
+            f"facets {inside[:5].tolist()} ({inside.size} in all) are not on the boundary: pass "
+            "facets of dimension tdim - 1 found by locate_entities_boundary or facet tags."
+        )
+    return array.astype(np.int32)
+
+
+def check_law(surface, friction, gdim: int, directed: bool = False) -> None:
+    """``directed``: directions of friction are given in space."""
+    if not isinstance(surface, Surface):
+        raise ValueError(
+            f"plane must be a RigidPlane or another rigid surface, got {type(surface).__name__}: {surface!r}."
+        )
+    if not isinstance(friction, Friction):
+        raise ValueError(
+            f"friction must be a Friction or a number, got {type(friction).__name__}: {friction!r}."
+        )
+    if surface.point.size != gdim:
+        raise ValueError(f"{surface} has {surface.point.size} dimensions, the mesh {gdim}.")
+    if friction.field:
+        return  # until its values are known
+    friction.law(gdim)  # refuses what has no meaning in two dimensions
+    if gdim == 3 and surface.axis is None and not friction.isotropic and not directed:
+        raise ValueError(
+            f"plane.axis is None, but {friction} depends on the direction: give {type(surface).__name__} the "
+            "first principal friction direction, axis=(...)."
+        )
+
+
+def warn_of_percent(friction) -> None:
+    """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
+    largest = friction.mu.max() if friction.mu.ndim == 1 else 0.0  # not per node
+    if PERCENT[0] < largest < PERCENT[1]:
+        warnings.warn(
+            f"a coefficient of friction of {largest:g}: it is force over force, so that 30 % is 0.3 and an angle of 30 degrees is "
+            f"tan(30 degrees) = 0.577. For what never slips take inf.",
+            stacklevel=4,
+        )
+
+
+def check_coefficients(friction, n: int) -> None:
+    for name in ("mu", "p", "axes"):
+        shape = np.shape(getattr(friction, name))
+        if len(shape) == 2 and shape[0] != n:
+            raise ValueError(
+                f"friction.{name} has {shape[0]} rows, this rank owns {n} contact nodes."
+            )
+
+
+def check_wear(wear) -> None:
+    if not (wear is None or isinstance(wear, Wear)):
+        raise ValueError(f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}.")

@@ -1,0 +1,379 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The body condensed to its contact nodes: W, the compliance of the nodes to each other's reactions."""
+
+from __future__ import annotations
+
+import warnings
+from collections import deque
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact.contact.shared import any_shared, mean_laws
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.condensed.compliance import (
+    Rows,
+    bytes_needed,
+    check_memory,
+    compliance,
+    tie,
+)
+from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
+from dolfinx_contact.solvers.condensed.kernel import condensed_operator
+from dolfinx_contact.solvers.condensed.result import CondensedNotConverged
+from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
+from dolfinx_contact.solvers.newton.contact_tangent import next_change
+from dolfinx_contact.support.checks import RoundingWarning
+from dolfinx_contact.support.collective import by_first_rank, raised_together
+
+# Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
+FEW, MANY, ASTRAY = 3000, 6000, 1e-3
+
+# Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
+RIGID = 1e-9
+
+KEPT = 64  # earlier steps: more than a cycle has
+
+
+class CondensedBody:
+    """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
+
+    ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
+    sparse right-hand sides; it is held by rank 0 alone.  Directions that a boundary condition fixes have no friction here:
+    it moves nothing, and follows from the answer.  Where a support moves a node across its free direction, both take
+    part in the law, with next to no compliance along the prescribed one.  Without friction at any contact there are
+    normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
+    forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
+    planes that force drives, see ``CondensedPlanes``.
+
+    Args:
+        options: ``CondensedNewton``, which solves the condensed problem.
+        body: The elastic body, its stiffness assembled.
+        contacts: Its contacts.
+        stiffness: ``NodalStiffness`` of each contact, in which errors are measured.
+        memory: Keeps earlier steps, from which the next ones start.
+
+    Attributes:
+        past: The last steps' q and forces, flat, and how many of these are of anchors.
+
+    Raises:
+        MemoryError: on all ranks, if ``W`` and what Newton's method needs beside it would not fit.
+    """
+
+    def __init__(self, options, body, contacts, stiffness, memory):
+        self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
+        self.comm, self._body, self._contacts = body.comm, body, list(contacts)
+        self.dim = components(self._contacts)
+        self._held_by, self._shared = body.anchors or body, any_shared(self._contacts)
+        self._stiffness = stiffness
+        self._set_up()
+
+    def _set_up(self) -> None:
+        """``W`` and the law, as supports move nodes at present.  Collective."""
+        body, contacts, stiffness = self._body, self._contacts, self._stiffness
+        guided = any(contact.points.along.any() for contact in contacts)
+        self._guided = self.dim == 3 and self.comm.allreduce(guided, op=MPI.LOR)
+        self._moved = [moved_across(contact) for contact in contacts]
+        self._laws = self._acting()
+        nodes, anchored = self._rows(), self._anchor_rows()
+        self._parts = [nodes, anchored]
+        self.nodes, self._anchored = nodes.size // self.dim, anchored.size
+        normal = self.gather(np.concatenate([of.normal for of in stiffness]))
+        self._surfaces = CondensedSurfaces(body, contacts, self._turns, normal)
+        self._tied = anchored.size + self._surfaces.tied
+        check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
+        W, (prescribed, blocks) = self.compliance(), self._prescribed()
+        a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
+        self.operator, size = None, nodes.size
+        with raised_together(self.comm):
+            if self.comm.rank == 0:
+                # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
+                inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
+                share = 1 - len(inert) / size
+                usual = np.diag(W)[:size].mean() / max(share, 1 / size)
+                inert = np.setdiff1d(inert, prescribed)
+                W[inert, inert] = usual
+                for rows, block in zip(prescribed, blocks):
+                    W[np.ix_(rows, rows)] += RIGID * usual * block
+                tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
+                W = self._surfaces.border(W, size)
+                self.operator = condensed_operator(W, self.dim, self._tied)
+                del W  # copied
+                self.operator.prepare()  # pays after some ten iterations
+        self.friction = joint_friction(self._laws, self._contacts, self.gather)
+        self._scales = self._gathered_stiffness(stiffness) | {
+            "tied_stiffness": np.append(a, np.ones(self._surfaces.tied))
+        }
+
+    def destroy(self) -> None:
+        """Nothing to free: the body owns the factorisation."""
+
+    def _acting(self) -> list[Friction]:
+        """Friction of each contact as it acts on this problem.  Collective."""
+        laws = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        return mean_laws(laws, self._contacts)
+
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""
+        now = self._acting()
+        turned = not all(np.array_equal(a.axes, b.axes) for a, b in zip(now, self._laws))
+        if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
+            return False
+        self._laws = now
+        self.friction = joint_friction(self._laws, self._contacts, self.gather)
+        return True
+
+    def _begin(self, step) -> np.ndarray:
+        """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
+        free = self._held_by.solve(step.b) if self._anchored else step.free_state()
+        self._surfaces.begin(step, free)
+        if self._guided:
+            for contact in self._contacts:
+                contact.move(free)
+            now = map(moved_across, self._contacts)
+            if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):
+                self._set_up()
+        return free
+
+    def solve(self, step, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:
+        """One load step by Newton's method on the condensed problem.
+
+        Args:
+            step, start: The ``LoadStep``; not used: reactions of earlier steps are better starts.
+            fallbacks: Whether a body that may slide is searched by all methods where Newton's fails.
+        """
+        self._until = perf_counter() + self._options.max_seconds  # of all searches together
+        held, first, free = self._held_by.solve, self.dim * self.nodes, self._begin(step)
+        acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
+        q = rows = self._motion(step, free)
+        placed, starts = np.zeros(q.size), self._starts(q)
+        if step.statics is not None:
+            q, placed = self._placed(step, free)
+            starts += [step.statics.share() * last for last in starts[:1]]
+        iterations, error, rounding, best = 0, np.inf, 0.0, None
+        base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
+        for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
+            previous = error
+            for limits in _searches(step, fallbacks):
+                goal = factor * step.tol
+                if not limits and step.statics is not None:
+                    limits = self._limited(step)
+                near = [start - placed for start in starts]
+                result = self._reactions(step, q + rounding, goal, near, acting, limits)
+                iterations += result.iterations
+                force = placed + np.concatenate((result.reaction.ravel(), result.tied))
+                x = self.displacement(base, force - known)
+                self._surfaces.move(step, force)
+                if self._shared:
+                    self._tell_shares(result.reaction)
+                error = step.measure(x).largest
+                solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
+                if solved or (step.surfaces is not None and step.surfaces.beyond()):
+                    break
+            if best is not None and not error < previous:
+                break
+            change = result.change
+            if self._shared and error <= step.tol < change:
+                # The kernel's moves reactions between contacts of a node, which changes nothing else.
+                change = min(change, next_change(step, x))
+            best = x, force, result, change
+            lost = step.may_slide and result.error > max(ASTRAY, goal)
+            if lost or max(error, change) <= step.tol:
+                break
+            # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
+            # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
+            left = step.b + self._nodal(force) - self._held_by.multiply(x)
+            left[self._body.fixed] = 0.0
+            base, known, starts = x + held(left), force, [force]
+            self._surfaces.move(step, force)
+            anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
+            moved = (result.displacement.ravel(), anchored, self._surfaces.driving(step))
+            rounding = rounding + self._motion(step, base) - np.concatenate(moved)
+        x, force, result, change = best
+        self._surfaces.move(step, force)
+        forward = max(change, step.measure(x).largest)
+        if fallbacks or forward <= step.tol:  # else another search follows, from the same steps
+            self.past.append((rows, force, self._tied))
+        return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+
+    def _limited(self, step) -> dict:
+        """Limits of the search for a loose body.  Collective."""
+        most = FEW if step.statics.slides(step) else MANY
+        return {"max_iterations": min(most, self._options.max_iterations)}
+
+    def _tell_shares(self, reaction: np.ndarray) -> None:
+        """Give contacts their reactions: at nodes of several ``x`` tells no more than the sums."""
+        counts = self.comm.allgather(len(self._turns))
+        first = sum(counts[: self.comm.rank])
+        mine = reaction[first : first + len(self._turns)]
+        local, of = np.einsum("nij,ni->nj", self._turns, mine), 0
+        for contact in self._contacts:
+            contact.take(reaction=local[of : of + contact.points.count])
+            of += contact.points.count
+
+    def _placed(self, step, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of a loose body: q where it stands at first, and the forces of all rows that hold it there."""
+        first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
+        anchors, rows = slice(first, first + self._anchored), self._parts[1]
+        placed = np.zeros(first + self._tied)
+        held = rows.gather(rows.of(step.statics.start))
+        placed[anchors] = stiffness[: self._anchored] * held
+        q = self._motion(step, self.displacement(free, placed))
+        q[anchors] -= held
+        return q, placed
+
+    def compliance(self) -> np.ndarray:
+        """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
+        return compliance(self._held_by, self._parts, self._body.K.getOwnershipRange()[0])
+
+    def _rows(self) -> Rows:
+        """One row per local direction of a node: its global components, none at fixed dofs."""
+        gdim = self._contacts[0].points.dim
+        dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, gdim))]
+        turns = [np.zeros((0, self.dim, gdim))]
+        for contact, law in zip(self._contacts, self._laws):
+            points = contact.points
+            free = ~np.isin(points.dofs, self._body.fixed)
+            dofs.append(np.repeat(points.dofs, self.dim, axis=0))
+            turns.append(principal_axes(law, points.count, gdim)[:, -self.dim :])
+            rows = turns[-1] @ points.frames * free[:, None, :]
+            rows[np.linalg.norm(rows, axis=2) < 1e-12] = 0.0  # fixed but for rounding
+            frames.append(rows.reshape(-1, gdim))
+        self._turns = np.concatenate(turns)
+        return Rows(self.comm, np.concatenate(dofs), np.concatenate(frames))
+
+    def _prescribed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Tangential rows of nodes that supports move in one direction, and that direction's dyads, in the order of rows."""
+        if self.dim < 3:
+            return np.zeros((0, 2), int), np.zeros((0, 2, 2))
+        moved, across = np.concatenate(self._moved), []
+        for contact in self._contacts:
+            f = np.zeros((contact.points.count, 2))
+            f[contact.points.supported] = contact.points.along
+            across.append(np.column_stack((-f[:, 1], f[:, 0])))
+        turned = np.einsum("nij,nj->ni", self._turns[:, :2, :2], np.concatenate(across))[moved]
+        first = self.dim * np.flatnonzero(self.gather(moved))
+        return first[:, None] + np.arange(2), self.gather(turned[:, :, None] * turned[:, None, :])
+
+    def _anchor_rows(self) -> Rows:
+        """One row per anchor, of all components of its node, as blocks of right-hand sides want them."""
+        dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
+        node = self._body.displacements.beside(dofs)
+        return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
+
+    def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
+        """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
+        rows = [np.zeros((0, self._turns.shape[2]))]
+        for contact, moved in zip(self._contacts, self._moved):
+            contact.move(displacement)
+            slip = contact.slip_increment - np.where(moved[:, None], 0.0, contact.known_slip)
+            rows.append(np.column_stack((slip, contact.gap)))
+        local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
+        nodes, anchored = self._parts
+        held = anchored.gather(anchored.of(displacement))
+        return np.concatenate((nodes.gather(local), held, self._surfaces.driving(step)))
+
+    def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Displacement of owned dofs with more forces of all rows than ``base`` has."""
+        correction = self._held_by.solve(self._nodal(force))
+        correction[self._body.fixed] = 0.0
+        return base + correction
+
+    def _nodal(self, force: np.ndarray) -> np.ndarray:
+        """Forces of all rows on owned degrees of freedom."""
+        forces = np.zeros(self._body.size)
+        self._parts[0].add_forces(force[: self.dim * self.nodes], forces)
+        self._parts[1].add_forces(
+            force[self.dim * self.nodes :], forces
+        )  # those of planes act on no node
+        return forces
+
+    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):
+        """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
+        left = {"max_seconds": max(self._until - perf_counter(), 1e-9)}
+        options = type(self._options)(**vars(self._options) | left | limits)
+
+        def solve(monitor):
+            try:
+                with warnings.catch_warnings():  # the body's own rounding counts
+                    warnings.simplefilter("ignore", RoundingWarning)
+                    return options.solve_condensed(
+                        self.operator, self.friction, q, max(tol, 1e-14), starts,
+                        monitor=monitor, external=acting, **self._scales,
+                    )  # fmt: skip
+            except CondensedNotConverged as failure:
+                return failure.best
+
+        return by_first_rank(self.comm, solve, step.tell if step.monitored else None)
+
+    # -- starts ----------------------------------------------------------------------------------
+
+    def _starts(self, q: np.ndarray) -> list[np.ndarray]:
+        """Reactions to start from: last step's, extrapolated, those of the most similar step, and last
+        step's with the change that led to the most similar one."""
+        past = [(a, b) for a, b, _ in self.past if a.size == q.size]
+        if not past:
+            return []
+        last = past[-1]
+        before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
+        starts = [last[1], 2 * last[1] - before]
+        if self._surfaces.tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
+            starts.append(q[-1] / last[0][-1] * last[1])
+        scale = np.abs(q[: q.size - self._surfaces.tied]).max()
+        distances = self._surfaces.distances([other for other, _ in past], q)
+        similar = int(np.argmin(distances))
+        if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
+            starts.append(past[similar][1])
+            if similar > 0:
+                starts.append(last[1] + past[similar][1] - past[similar - 1][1])
+        return starts
+
+    # -- gathered from all ranks -----------------------------------------------------------------
+
+    def gather(self, local: np.ndarray) -> np.ndarray:
+        """Rows of all nodes, in the order of ranks and contacts, on all ranks."""
+        return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
+
+    def _gathered_stiffness(self, stiffness) -> dict[str, np.ndarray]:
+        """Normal and tangential blocks of all nodes along the principal axes, for rank 0's errors."""
+        gathered = {"stiffness": self.gather(np.concatenate([k.normal for k in stiffness]))}
+        if self.dim > 1:
+            blocks = np.concatenate([k.tangential for k in stiffness])
+            turns = self._turns[:, :-1, :-1]
+            turned = np.einsum("nij,njk,nlk->nil", turns, blocks, turns)
+            gathered["tangential_stiffness"] = self.gather(turned)
+        return gathered
+
+
+def _searches(step, fallbacks: bool) -> tuple[dict, ...]:
+    """Options of one search after another: where something may slide Newton's method alone first."""
+    return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
+
+
+def moved_across(contact) -> np.ndarray:
+    """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
+    points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
+    rows = points.supported
+    moved[rows] = points.along.any(axis=1) & contact.known_slip[rows].any(axis=1)
+    return moved
+
+
+def acting(contact, moved: np.ndarray) -> Friction:
+    """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
+    free, whole = contact.free_friction, contact.friction
+    if free is whole or not moved.any():
+        return free
+    mu, p = (np.where(moved[:, None], a, b) for a, b in ((whole.mu, free.mu), (whole.p, free.p)))
+    axes = np.tile([1.0, 0.0], (moved.size, 1)) if whole.axes is None else whole.axes
+    return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
+
+
+def components(contacts) -> int:
+    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
+    smooth = all(contact.friction.frictionless for contact in contacts)
+    if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
+        return 1
+    return contacts[0].points.dim

@@ -1,0 +1,173 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The compliance of a body at its contact nodes: rows of the inverse of its stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from dolfinx_contact.petsc.linear_solver import check_solved, mumps_factors
+from dolfinx_contact.support.checks import free_memory
+
+UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
+_BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
+_MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
+
+
+class Rows:
+    """Linear functionals of the displacement, in the order of ranks: one row a direction of a node.
+
+    Args:
+        comm: MPI communicator.
+        dofs: Local degrees of freedom of each row, ``shape=(rows, k)``, all different.
+        values: Their factors, ``shape=(rows, k)``, dimensionless.  Collective.
+    """
+
+    def __init__(self, comm, dofs: np.ndarray, values: np.ndarray):
+        self.comm, self.dofs, self.values = comm, dofs, values
+        self._counts = comm.allgather(len(dofs))
+        self.size = sum(self._counts)
+
+    def of(self, u: np.ndarray) -> np.ndarray:
+        """Values of this rank's rows for displacements of owned dofs, ``shape=(dofs, ...)``."""
+        return np.einsum("rk,rk...->r...", self.values, u[self.dofs])
+
+    def add_forces(self, force: np.ndarray, forces: np.ndarray) -> None:
+        """Add what a force on each row of all ranks is on owned degrees of freedom."""
+        first = sum(self._counts[: self.comm.rank])
+        mine = force[first : first + len(self.dofs)]
+        terms = mine[:, None] * self.values
+        forces += np.bincount(self.dofs.ravel(), terms.ravel(), forces.size)
+
+    def gather(self, local: np.ndarray) -> np.ndarray:
+        """Values of all rows, on all ranks."""
+        return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
+
+
+def compliance(solver, rows: list[Rows], first: int) -> np.ndarray:
+    """Motion of all rows by a unit force on each, ``A^-1`` between them.
+
+    Args:
+        solver: What has the PETSc solver of ``A`` as its ``ksp``.
+        rows: In the order of the result.
+        first: Global number of this rank's first degree of freedom.
+
+    Returns:
+        Symmetric, on rank 0; an empty array on the others.  Collective.
+    """
+    comm, size = rows[0].comm, sum(part.size for part in rows)
+    columns = np.concatenate([part.gather(part.dofs + first) for part in rows])
+    values = np.concatenate([part.gather(part.values) for part in rows])
+    W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
+    solve_block = block_solver(solver.ksp)
+    for start in range(0, size, _BLOCK):
+        block = slice(start, min(start + _BLOCK, size))
+        answer = solve_block(columns[block], values[block])  # (owned dofs, right-hand sides)
+        found = [comm.gather(part.of(answer), root=0) for part in rows]
+        if comm.rank == 0:
+            # Symmetric, but not to the last bit as it is computed: the mean of both halves.
+            found = np.concatenate([np.concatenate(part) for part in found])
+            found[block] = (found[block] + found[block].T) / 2
+            found[:start] = (found[:start] + W[block, :start].T) / 2
+            W[:, block], W[block, :start] = found, found[:start].T
+    return W
+
+
+def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
+    """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
+
+    Where all springs are at motions without energy their block has to vanish.  What is left for it is put along motions
+    of the anchors that no node feels, which keeps those where they are.
+    """
+    last = slice(size, len(W))
+    W[last, last] -= np.diag(1 / a)
+    if loose:
+        root = np.sqrt(a)
+        _, values, vectors = np.linalg.svd(np.linalg.qr(W[:size, last] * root, mode="r"))
+        values = np.append(values, np.zeros(len(a) - len(values)))
+        unfelt = vectors[values <= UNFELT * values[0]].T / root[:, None]
+        W[last, last] = -unfelt @ unfelt.T
+
+
+def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
+    """Bytes that W and its inverse take, with what is needed beside them: an upper bound, docs/solvers.md.
+
+    W is copied once; with its inverse it then needs a third of that, and a Jacobian with its factors the rest.  Beside W, solving for a block was measured
+    to take six times what its solutions take.
+    """
+    return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
+
+
+def _available_first(comm) -> float:
+    """What rank 0 has free, which holds W, on all ranks.  Collective."""
+    return comm.bcast(free_memory() if comm.rank == 0 else None)
+
+
+def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
+    """Whether W would fit into half of the memory that rank 0 has free."""
+    return 2 * bytes_needed(nodes, dim, unknowns) <= _available_first(comm)
+
+
+def check_memory(comm, needed: int) -> None:
+    available = _available_first(comm)
+    if needed > available:
+        raise MemoryError(
+            f"the condensed operator needs about {needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are "
+            "free: use solver=dc.FixedPoint(), which needs none of it."
+        )
+
+
+def block_solver(ksp):
+    """A function that solves for blocks of sparse right-hand sides with the solver of ``ksp``.
+
+    With MUMPS the block goes to it as it is, which leaves out the zeros of the right-hand sides in
+    the forward substitution; any other solver takes one column after another.
+
+    Returns:
+        ``solve(columns, values)``: right-hand side k has ``values[k]`` at the global dofs
+        ``columns[k]``; both are the same on all ranks.  Gives ``shape=(owned dofs, k)``.
+    """
+    A = ksp.getOperators()[0]
+    comm, (owned, size) = A.comm, A.getSizes()[0]
+    ksp.setUp()
+    factors = mumps_factors(ksp) if ksp.getType() == "preonly" else None
+
+    def by_block(columns, values):
+        count = len(columns)
+        # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
+        mine = comm.rank == 0
+        transposed = PETSc.Mat().createAIJ(
+            ((count if mine else 0, count), (size if mine else 0, size)),
+            csr=(
+                np.arange(count + 1 if mine else 1, dtype=np.int32) * columns.shape[1],
+                columns[: count if mine else 0].ravel().astype(np.int32),
+                values[: count if mine else 0].ravel(),
+            ),
+            comm=comm,
+        )
+        rhs = PETSc.Mat().createTranspose(transposed)
+        result = np.empty((owned, count), order="F")
+        answer = PETSc.Mat().createDense(((owned, size), (None, count)), array=result, comm=comm)
+        answer.assemble()
+        if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen how many at once
+            factors.setMumpsIcntl(*_MUMPS_BLOCK)
+        factors.matSolve(rhs, answer)
+        for matrix in (rhs, transposed, answer):
+            matrix.destroy()
+        return result
+
+    def by_column(columns, values):
+        right, left = A.createVecs()
+        first, last = A.getOwnershipRange()
+        result = np.empty((owned, len(columns)))
+        for k, (column, value) in enumerate(zip(columns, values)):
+            here = (column >= first) & (column < last)
+            left.array_w[:] = 0.0
+            left.array_w[column[here] - first] = value[here]
+            ksp.solve(left, right)
+            check_solved(ksp)
+            result[:, k] = right.array_r
+        return result
+
+    return by_column if factors is None else by_block

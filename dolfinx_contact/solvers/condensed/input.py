@@ -1,0 +1,105 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The arrays of a condensed problem, checked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.law.friction import Friction, as_friction
+from dolfinx_contact.support.checks import finite, free_memory
+
+
+def checked_problem(q, W, friction, r0) -> tuple:
+    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together, and a ``Friction`` with them."""
+    q = finite("q", q)
+    dim = q.shape[1] if q.ndim == 2 else 3
+    if dim not in (2, 3) or q.ndim not in (1, 2) or q.size % dim:
+        raise ValueError(f"q must have shape (n, 3), (n, 2) or (3n,), not {q.shape}.")
+    if q.size == 0:
+        raise ValueError(f"q is empty, of shape {q.shape}: there is no contact to solve for.")
+    q = q.reshape(-1, dim)
+    W = checked_compliance(W)
+    if W.shape != (q.size, q.size):
+        raise ValueError(
+            f"W must have shape {(q.size, q.size)} for q of {len(q)} contacts, not {W.shape}."
+        )
+    if isinstance(friction, (np.ndarray, list, tuple)):
+        mu = finite("friction", friction)
+        if mu.shape != (len(q),):
+            raise ValueError(
+                f"friction as an array has one coefficient per contact, shape {(len(q),)}, not "
+                f"{mu.shape}; those of two directions are a Friction((mu_1, mu_2))."
+            )
+        friction = Friction(np.column_stack((mu, mu)))
+    friction = as_friction(friction)
+    if not isinstance(friction, Friction):
+        raise ValueError(f"friction must be a Friction, a number or an array, not {friction!r}.")
+    if friction.field:
+        raise ValueError(
+            f"{friction!r}: give numbers for the contacts, there are no positions here."
+        )
+    for name, rows in (("coefficients", friction.mu), ("axes", friction.axes)):
+        if rows is not None and rows.ndim == 2 and len(rows) != len(q):
+            raise ValueError(f"friction has {name} for {len(rows)} contacts, q has {len(q)}.")
+    friction.law(dim)  # refuses what has no meaning in two dimensions
+    diagonal = W.diagonal()
+    if (diagonal < 0).any():
+        at = max(np.flatnonzero(diagonal < 0), key=lambda k: k % dim)  # a normal one, if there is
+        direction = "normal" if at % dim == dim - 1 else "tangential"
+        raise ValueError(
+            f"W has a negative {direction} diagonal entry, {diagonal[at]:g} at contact {at // dim}: a contact must give "
+            "way to its reaction."
+        )
+    if r0 is not None:
+        r0 = finite("r0", r0)
+        if r0.size != q.size:
+            raise ValueError(f"r0 must have the shape of q, {q.shape}, not {r0.shape}.")
+    return q, W, friction, r0
+
+
+def checked_compliance(W) -> np.ndarray:
+    """``W`` as an array, that of the user if it is of the type; a sparse one with its zeros."""
+    if not hasattr(W, "tocsc"):
+        return finite("W", W, copy=False)
+    needed, free = 8 * 5 * W.shape[0] * W.shape[1], free_memory()
+    if needed > free:
+        raise MemoryError(
+            f"W is solved as a dense matrix, which takes about {needed / 1e9:.1f} GB with its factors, {free / 1e9:.1f} GB "
+            "are free: piles of thousands of rigid contacts need a solver that is made for them, as Siconos is."
+        )
+    return finite("W", W.toarray(), copy=False)
+
+
+def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
+    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
+    turns = np.tile(np.eye(dim), (nodes, 1, 1))
+    if friction.axes is not None:
+        cos, sin = friction.axes.T
+        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
+        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
+    return turns
+
+
+def joint_friction(laws, contacts, gather) -> Friction:
+    """The law of all nodes; contacts with the same coefficients stay one uniform law.
+
+    Args:
+        laws: Friction of each contact.
+        contacts: The contacts of a body.
+        gather: Function that gathers rows of nodes from all ranks.  Collective.
+    """
+    first = laws[0]
+    uniform = first.mu.ndim == 1 and all(
+        np.array_equal(f.mu, first.mu) and np.array_equal(f.p, first.p) for f in laws
+    )
+    if gather(np.array([uniform])).all():
+        return Friction(first.mu, np.where(first.mu > 0, first.p, 1.0))
+    sizes = [len(contact.nodes) for contact in contacts]
+    mu, p = (
+        gather(
+            np.concatenate([np.broadcast_to(getattr(f, name), (n, 2)) for f, n in zip(laws, sizes)])
+        )
+        for name in ("mu", "p")
+    )
+    return Friction(mu, np.where(mu > 0, p, 1.0))

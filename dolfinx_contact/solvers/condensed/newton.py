@@ -1,0 +1,256 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Newton's method on the contact problem condensed to the contact nodes, w = q + W r."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.solvers.condensed.input import (
+    checked_problem,
+    principal_axes,
+)
+from dolfinx_contact.solvers.condensed.kernel import condensed_operator
+from dolfinx_contact.solvers.condensed.result import (
+    Attempt,
+    CondensedNotConverged,
+    CondensedResult,
+)
+from dolfinx_contact.support.checks import RoundingWarning, positive
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.base import BoundSolver
+
+
+class CondensedNewton:
+    """Options of the globalised semismooth Newton method and its fallbacks.
+
+    Args:
+        slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
+        max_iterations: Iterations of all methods together.
+        newton_iterations: Newton iterations of one attempt.
+        max_seconds: Wall time after which the search ends, seconds.
+        fallbacks: Try other methods where Newton's fails.
+
+    Raises:
+        ValueError: an option is not a positive number.
+
+    Example:
+        >>> solver = dc.CondensedNewton(max_seconds=60)  # for ContactProblem(..., solver=solver)
+    """
+
+    def __init__(
+        self,
+        *,
+        slip_tol: float | None = None,
+        max_iterations: int = 200_000,
+        newton_iterations: int = 60,
+        max_seconds: float = math.inf,
+        fallbacks: bool = True,
+    ) -> None:
+        self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol, finite=True)
+        self.max_iterations = int(positive("max_iterations", max_iterations, whole=True))
+        self.newton_iterations = int(positive("newton_iterations", newton_iterations, whole=True))
+        self.max_seconds = positive("max_seconds", max_seconds)
+        self.fallbacks = bool(fallbacks)
+
+    def __repr__(self) -> str:
+        return f"CondensedNewton({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
+
+    def solve_condensed(
+        self, operator, friction: Friction, q, tol, starts=(), monitor=None, **scales
+    ) -> CondensedResult:
+        """Solve with a kernel operator; ``solve_condensed`` is the public entry.
+
+        Args:
+            q, starts: With the tied rows of the operator, if it has any, at the end.
+            monitor: None, or a function of residual and contacts open, sticking and slipping of every iterate.
+            scales: Of the errors: ``stiffness`` (n,), ``tangential_stiffness`` (n, T, T),
+                ``tied_stiffness`` (tied,), force per length, and ``external``, a force that acts
+                beside the reactions.
+
+        Raises:
+            CondensedNotConverged: nothing that was tried reached ``tol`` or, if that is larger, the
+                rounding of the errors; the latter is a ``RoundingWarning``.
+        """
+        tangents = operator.dim - 1
+        # Friction(0) has no slip rule; a frictionless node of a field gets one that does not matter.
+        p = None if friction.frictionless else np.where(friction.mu > 0, friction.p, 1.0)
+        found = operator.solve(
+            mu=friction.mu[..., :tangents],
+            p=None if p is None else p[..., :tangents],
+            q=q,
+            starts=list(starts),
+            tol=tol,
+            slip_tol=self.slip_tol or tol,
+            max_seconds=self.max_seconds,
+            max_iterations=self.max_iterations,
+            newton_iterations=self.newton_iterations,
+            fallbacks=self.fallbacks,
+            monitor=monitor,
+            **scales,
+        )
+        tried = tuple(
+            Attempt(a.branch, a.converged, a.iterations, a.seconds, a.error, a.slip_error)
+            for a in found.tried
+        )
+        result = CondensedResult(
+            found.reaction, found.displacement, found.status, found.error, found.slip_error,
+            found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
+            found.tied, found.local_error,
+        )  # fmt: skip
+        if not found.converged:
+            raise CondensedNotConverged(result)
+        if found.error > tol or found.slip_error > (self.slip_tol or tol):
+            warnings.warn(
+                f"error {found.error:.1e}, slip error {found.slip_error:.1e} instead of tol "
+                f"{tol:.1e}: limited by rounding, {found.rounding:.1e}.",
+                RoundingWarning,
+                stacklevel=2,
+            )
+        return result
+
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+        """See ``solver.Solver``."""
+        from dolfinx_contact.solvers.condensed.body import (
+            CondensedBody,  # arrays alone do without DOLFINx
+        )
+
+        return CondensedBody(self, body, contacts, stiffness, memory)
+
+
+def solve_condensed(
+    W: Any,
+    q: ArrayLike,
+    friction: Friction | float | ArrayLike,
+    solver: CondensedNewton | None = None,
+    tol: float = 1e-8,
+    r0: ArrayLike | None = None,
+    max_seconds: float | None = None,
+) -> CondensedResult:
+    """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
+
+    No body and no DOLFINx is needed: ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without
+    reactions; per contact (t1, t2, n), in two dimensions (t, n): ``w_n`` the gap at the end of the step, ``w_t`` the slip.
+
+    The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
+
+    - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |r|`` with
+      ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
+    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector along ``P^-2 r_t``),
+      ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that vector.
+
+    Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the
+    load ``|kappa (q_t, min(q_n, 0))|``, they are relative to that.  An answer whose errors are above ``tol``
+    but below ``rounding`` is returned with a ``RoundingWarning``: double precision has no better one.
+
+    Args:
+        W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
+            rank-deficient and slightly unsymmetric.
+        q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
+        friction: A ``Friction``, or a number, of coefficients for all contacts, or ``shape=(n, 2)`` for each; or an array of one
+            coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
+        solver: ``CondensedNewton(...)``; None is one with default options.
+        tol: Largest error and, unless the solver says otherwise, slip error.
+        r0: Reactions to start from, of the shape of ``q``.
+        max_seconds: Wall time after which the search ends, seconds.
+
+    Returns:
+        Reactions, displacements, status, errors and how they were found.
+
+    Raises:
+        ValueError: input that makes no sense.
+        CondensedNotConverged: no method reached ``tol``, or there is no solution; carries the best state.
+
+    Example:
+        >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
+        array([[-0.3,  1. ]])
+    """
+    q, W, friction, r0 = checked_problem(q, W, friction, r0)
+    solver, tol = _checked_options(solver, tol, max_seconds)
+    turns = principal_axes(friction, *q.shape)
+    starts = () if r0 is None else [_turned(r0.reshape(q.shape), turns)]
+    if friction.axes is not None:
+        W, q = _turned_matrix(W, turns), _turned(q, turns)
+    operator = condensed_operator(W, q.shape[1])
+    try:
+        found = solver.solve_condensed(operator, friction, q, tol, starts)
+        return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
+    except CondensedNotConverged as failure:
+        raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
+
+
+def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
+    solver = CondensedNewton() if solver is None else solver
+    if not isinstance(solver, CondensedNewton):
+        raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
+    if max_seconds is not None:
+        solver = CondensedNewton(**vars(solver) | {"max_seconds": max_seconds})
+    tol = positive("tol", tol, finite=True)
+    if tol < 1e-13:
+        raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
+    return solver, tol
+
+
+def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
+    """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
+
+    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off; where contacts are unlike
+    each other, those of some.  Large problems are not searched by all methods again: where W is rank deficient reactions
+    stay open anyway.
+    """
+    cheap = solver.fallbacks and q.size <= 100
+    most = min(solver.max_iterations, 100 * solver.newton_iterations)
+    left = max(solver.max_seconds - found.seconds, 1e-3)
+    options = {"slip_tol": None, "max_iterations": most, "max_seconds": left}
+    finer = CondensedNewton(**vars(solver) | options)
+
+    def again(tol, fallbacks, **limits):
+        finer.fallbacks = fallbacks
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RoundingWarning)
+            nearer = finer.solve_condensed(operator, friction, q, tol, [found.reaction], **limits)
+        return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
+
+    try:
+        for factor in (1e-2, 1e-4):
+            if found.change <= tol or found.error <= 10 * found.rounding:
+                break
+            if max(found.error, found.slip_error) > factor * tol:
+                change, found = found.change, again(max(factor * tol, 1e-14), cheap)
+                if found.change > 0.1 * change:  # no smaller error tells them
+                    break
+        if found.local_error > tol:
+            found = again(tol, False, local_tol=tol)
+    except CondensedNotConverged as failure:
+        best = failure.best
+        if max(best.error, best.slip_error) <= tol and best.local_error < found.local_error:
+            found = replace(best, branch=found.branch, tried=found.tried + best.tried)
+    return found
+
+
+def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Vectors of contacts along the principal axes, ``shape=(n, dim)``."""
+    return np.einsum("nij,nj->ni", turns, vectors)
+
+
+def _turned_matrix(W: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """``W`` along the principal axes."""
+    n, dim, _ = turns.shape
+    blocks = W.reshape(n, dim, n, dim)
+    return np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)
+
+
+def _turned_back(result: CondensedResult, turns: np.ndarray) -> CondensedResult:
+    back = {
+        name: np.einsum("nji,nj->ni", turns, getattr(result, name))
+        for name in ("reaction", "displacement")
+    }
+    return replace(result, **back)

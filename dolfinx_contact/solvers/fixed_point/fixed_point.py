@@ -1,0 +1,190 @@
+"""Predictor and corrector as a fixed point of the displacement alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.fixed_point.anderson import Anderson
+from dolfinx_contact.solvers.fixed_point.newton_krylov import search_by_newton
+from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
+from dolfinx_contact.solvers.search import Search
+from dolfinx_contact.support.checks import positive
+
+# Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
+# the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
+PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
+
+# The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
+# and easy steps are nearly over. Where that does not converge it is tried SOONER: the second number. If the error
+# then grows by more than GROWTH, it was too early; if it is still more than USELESS of what it was when the next one is due,
+# the iterations until then do without.
+EVERY, SOONER, GROWTH, USELESS = 20, 10, 100.0, 0.9
+
+# Of a loose body, which may slide away, the error has to halve within so many iterations.
+PATIENCE = 60
+
+# Corrections that grow by this mislead.
+ASTRAY = 1e3
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Predictor and corrector in every iteration, without a condensed operator.
+
+    One iteration takes the reactions that the body asks for, ``K u - f`` at the contact nodes,
+    does the predictor and the projection on the friction cone [dSFMH07, Section 2], puts the new
+    reactions into the residual, and corrects the displacement by one back-solve with the
+    stiffness plus springs at the contact nodes.  The zero of the residual
+    does not depend on the augmentation parameter rho.  Anderson's method accelerates the sequence.  Every twenty
+    iterations the contact is linearised, and the layers next to the plane are then corrected with that
+    tangent before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
+
+    If the error does not fall any more, Newton's method on the same residual is tried, see ``search_by_newton``: an
+    iteration is then one of GMRES with the same correction.  If that fails, too, the fixed point goes on with another rho.
+
+    Attributes:
+        map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
+            ``Contact.update``.  The law is the same; with strongly non-associated friction "return"
+            needs fewer iterations.
+        rho: Augmentation parameter over the nodal normal stiffness; None finds it: the next value of a short list is
+            tried where one does not converge, at the cost of a factorisation.
+        depth: Number of previous corrections that Anderson's method mixes.
+        newton: Whether Newton's method may be tried, with the first rho.
+        max_iterations: Iterations with one rho; those of Newton's method come on top.
+        max_seconds: Wall time after which the search ends, seconds.
+
+    Raises:
+        ValueError: an unknown map, or a rho, depth or number of iterations that is not positive.
+
+    Example:
+        >>> solver = dc.FixedPoint(max_iterations=2000)  # for ContactProblem(..., solver=solver)
+    """
+
+    map: str = "return"
+    rho: float | None = None
+    depth: int = 12
+    newton: bool = True
+    max_iterations: int = 400
+    max_seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.map not in PARAMETERS:
+            raise ValueError(f"map must be one of {', '.join(PARAMETERS)}, got {self.map!r}.")
+        if self.rho is not None:
+            positive("rho", self.rho, finite=True)
+        positive("depth", self.depth, whole=True)
+        positive("max_iterations", self.max_iterations, whole=True)
+        positive("max_seconds", self.max_seconds)
+
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+        """See ``Solver``."""
+        return BoundFixedPoint(self, body, contacts, stiffness)
+
+
+def _slides(step, x: np.ndarray, tried: bool = False) -> bool:
+    """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
+    if step.surfaces is None and not (tried and step.statics is not None):
+        return False
+    step.measure(x)
+    return step.slides() if tried else bool(step.surfaces.beyond())
+
+
+class BoundFixedPoint:
+    """The fixed point for one body; keeps the preconditioner of the rho used last."""
+
+    def __init__(self, options: FixedPoint, body, contacts, stiffness):
+        self._options, self._body, self._contacts = options, body, contacts
+        self._stiffness = stiffness
+        self.preconditioner: ContactPreconditioner | None = None
+        self._factor = 0.0
+
+    def destroy(self) -> None:
+        """Free the preconditioner.  Collective."""
+        if self.preconditioner is not None:
+            self.preconditioner.destroy()
+        self.preconditioner, self._factor = None, 0.0
+
+    def renew_law(self) -> bool:
+        """See ``BoundSolver``: of the law the preconditioner knows its springs alone."""
+        if self.preconditioner is not None and not self.preconditioner.same_springs():
+            self.destroy()
+        return True
+
+    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+        """Iterate until the errors are at most the tolerance, or every rho has been tried.
+
+        Args:
+            step: The ``LoadStep``.
+            start: Where to begin; None asks the step.
+        """
+        options = self._options
+        search = Search(step, step.start() if start is None else start, options.max_seconds)
+        newton = options.newton
+        for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
+            self._fall(search, factor, EVERY)
+            if not search.over and _slides(step, search.best):
+                break
+            if not search.over and self.preconditioner.soften():
+                self._fall(search, factor, EVERY)
+            if not search.over and options.max_iterations > EVERY:
+                self._fall(search, factor, SOONER)
+            if newton and not search.over:
+                search_by_newton(search, self.preconditioner, search.best)
+                newton = False
+            if search.over or _slides(step, search.best, tried=True):
+                break
+        return SolverResult(search.best, search.iterations, search.forward_error, "FixedPoint")
+
+    def _fall(self, search, factor: float, every: int) -> None:
+        """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
+        patience = math.inf if search.step.statics is None else PATIENCE
+        search.begin(self._options.max_iterations, patience)
+        while search.goes_on:
+            self._accelerate(search, self._set(factor), search.best, every)
+
+    def _set(self, factor: float) -> list:
+        """The maps with a rho, and a preconditioner that belongs to them."""
+        bipotential = self._options.map == "bipotential"
+        parameters = [factor * of.normal for of in self._stiffness]
+        maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]
+        if self._factor != factor:
+            self.destroy()  # one factorisation at a time: memory counts more than time
+            self.preconditioner = ContactPreconditioner(self._body, self._contacts, maps)
+            self._factor = factor
+        self.preconditioner.forget_tangent()
+        return maps
+
+    def _accelerate(self, search, maps, x: np.ndarray, every: int) -> None:
+        """Anderson's method from ``x``, until the search ends or a tangent misleads."""
+        step, tangent = search.step, np.inf  # error at the last tangent
+        anderson = Anderson(x.size, self._options.depth, step.total)
+        smallest, due = np.inf, search.left - every
+        while True:
+            x = self.preconditioner.rigid.balanced(x, step, maps)
+            x, residual = search.residual(x, maps)
+            if not search.goes_on or search.error > GROWTH * tangent:
+                return
+            if search.left <= due:
+                due = search.left - every
+                useless = search.error > USELESS * tangent
+                # not where the end is as near as the last tangent is behind
+                if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
+                    self.preconditioner.forget_tangent()
+                    if not useless:
+                        self.preconditioner.linearise(step.derivatives(x, maps))
+                    anderson.restart()
+                    smallest = np.inf
+                tangent = np.inf if useless else search.error
+            following, norm = anderson.step(x, self.preconditioner.correct(residual))
+            search.count(1)
+            if norm > ASTRAY * smallest:  # the differences mislead: start again from the best
+                anderson.restart()
+                following, smallest = search.best, np.inf
+            smallest = min(smallest, norm)
+            x = following

@@ -1,0 +1,120 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The correction of an iteration: body with springs at its contact nodes, and the contact tangent next to the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.solvers.fixed_point.border import Border
+from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
+from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
+
+
+class ContactPreconditioner:
+    """Corrects a displacement for forces out of balance; every application is one cycle or back-solve.
+
+    Args:
+        body: The body, its stiffness assembled.
+        contacts: Its contacts.
+        maps: Of each contact; their springs are added to the stiffness.  Collective.
+
+    Attributes:
+        rigid: ``RigidBalance`` of the motions that the springs stiffen too much.
+        stiffened: What applies the preconditioner of the stiffness with springs.
+    """
+
+    def __init__(self, body, contacts, maps):
+        self._body, self._contacts, self._maps = body, contacts, maps
+        self._spring_rates = self._rates()
+        self._layer, self._linearised = None, False
+        with stage("contact: set-up of springs"):
+            S, A = self._springs(), (body.anchors.A if body.loose else body.K).copy()
+            A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
+            self._softened = False
+            self.stiffened = body.stiffened(A, S)
+        self._A = A
+        followed = body.loose is not None or any(contact.surface.motions for contact in contacts)
+        self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)
+        S.destroy()
+
+    def soften(self) -> bool:
+        """Look for more soft motions, of a step that does not converge; whether there are any new ones.  Collective."""
+        if self._softened:
+            return False
+        self._softened, known = True, len(self.rigid)
+        modes = (self._body.rigid_modes(), patch_motions(self._body, self._contacts))
+        rigid = RigidBalance(self._body, self._contacts, self._A, np.concatenate(modes, axis=1))
+        self.rigid = rigid if len(rigid) > known else self.rigid
+        return len(rigid) > known
+
+    def destroy(self) -> None:
+        """Free factors and levels.  Collective."""
+        self.stiffened.destroy()
+        self._A.destroy()
+        if self._layer is not None:
+            self._layer.destroy()
+
+    def _rates(self) -> list[np.ndarray]:
+        """The maps' springs under the present laws, of each contact."""
+        both = zip(self._contacts, self._maps)
+        return [map.springs(contact.friction, contact.points.dim) for contact, map in both]
+
+    def same_springs(self) -> bool:
+        """Whether the present laws have the springs that are set up.  Collective."""
+        same = all(map(np.array_equal, self._rates(), self._spring_rates))
+        return self._body.comm.allreduce(same, op=MPI.LAND)
+
+    def _springs(self):
+        """The maps' springs, a PETSc matrix with entries at contact nodes alone."""
+        K, S = self._body.K, None
+        for contact, springs in zip(self._contacts, self._spring_rates):
+            blocks = springs[:, :, None] * np.eye(contact.points.dim)
+            matrix = contact.points.matrix(blocks).tocsr()
+            S = matrix if S is None else S + matrix
+        S = sparse.csr_matrix((self._body.size,) * 2) if S is None else S
+        S.resize(self._body.size, K.getSize()[1])
+        indices = K.getOwnershipRange()[0] + S.indices
+        csr = (S.indptr.astype(PETSc.IntType), indices.astype(PETSc.IntType), S.data)
+        return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
+
+    def linearise(self, derivatives) -> None:
+        """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.
+
+        Args:
+            derivatives: As ``LoadStep.derivatives`` returns them.
+        """
+        if self._layer is None:
+            prefix = f"{self._body.prefix}layer_"
+            self._layer = SurfaceLayer(self._body, self._contacts, prefix)
+        with stage("contact: surface layer"):
+            self._layer.linearise(derivatives)
+        self._linearised = True
+
+    def forget_tangent(self) -> None:
+        """Corrections by springs alone again."""
+        self._linearised = False
+
+    def tangent(self, x: np.ndarray) -> np.ndarray:
+        """Minus the derivative of the forces out of balance along ``x``, where they were linearised."""
+        return self._layer.multiply(x, self._body.multiply(x))
+
+    def correct(self, residual: np.ndarray) -> np.ndarray:
+        """Displacement that removes the residual while the springs hold the contact nodes.
+
+        After ``linearise`` the layers next to the plane are corrected first.
+        """
+        residual, near = residual.copy(), 0.0
+        residual[self._body.fixed] = 0.0
+        if self._linearised:
+            near, residual = self._layer.correct(residual)
+        correction = near + self.stiffened.apply(residual)
+        if self._border:
+            correction += self._border.correct(residual)
+        correction[self._body.fixed] = 0.0
+        return correction

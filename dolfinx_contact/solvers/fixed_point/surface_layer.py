@@ -1,0 +1,128 @@
+"""The contact tangent on the layers of nodes next to the plane: what a fixed preconditioner does not know."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+from scipy import sparse
+
+from dolfinx_contact import compat
+from dolfinx_contact.contact.interface import assembled
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
+from dolfinx_contact.surfaces.driven import driven_surfaces
+
+LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
+
+
+class SurfaceLayer:
+    """The fixed point linearised at the contact nodes, and its exact solution near the plane.
+
+    The fixed point ``R(K u - f, u) - (K u - f) = 0`` at the contact nodes has the derivative
+    ``-J``, ``J = (I - R_r) K - R_u`` with the derivatives ``R_r, R_u`` of the nodal map, and is ``K`` inside
+    the body.  Where nodes slip against a rule that is not associated, ``J`` is far from symmetric, and
+    no springs resemble it.  Its block on the contact nodes and the nodes next to them is factorised.
+
+    Args:
+        body: The elastic body, its stiffness assembled.
+        contacts: Its contacts.
+        prefix: Of the PETSc options of the factorisation, MUMPS by default.
+
+    Attributes:
+        dofs: Owned free degrees of freedom of the layers.
+    """
+
+    def __init__(self, body, contacts, prefix: str):
+        self._body, self._contacts, self._prefix = body, contacts, prefix
+        self.dofs = _near(body, contacts)
+        first, last = body.K.getOwnershipRange()
+        rows, layer = (
+            PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), body.comm)
+            for dofs in (np.arange(first, last), first + self.dofs)
+        )
+        # K on displacements of the layers: a product with all of K would cost a tenth of a cycle more.
+        self._columns = body.K.createSubMatrix(rows, layer)
+        self._near, self._forces = self._columns.createVecs()
+        self._offset = self._columns.getOwnershipRangeColumn()[0]
+        width = self._columns.getSizes()[1]
+        indptr, indices, values = self._columns.getValuesCSR()
+        stiffness = sparse.csr_matrix((values, indices, indptr), shape=(body.size, width[1]))
+        self._stiffness = stiffness[self.dofs]
+        self._size = (width, width)
+        self._solver = None
+        self._surfaces = driven_surfaces(body, contacts)
+        self._pushing = None if self._surfaces is None else self._surfaces.columns()
+
+    def destroy(self) -> None:
+        """Free the factorisation and the columns of K.  Collective."""
+        self._columns.destroy()
+        if self._solver is not None:
+            self._solver.destroy()
+
+    def linearise(self, derivatives) -> None:
+        """Factorise the block at new derivatives of the nodal maps.  Collective.
+
+        Args:
+            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
+        """
+        points = [contact.points for contact in self._contacts]
+        self._by_forces, self._by_motion = assembled(points, derivatives, self._body.size)
+        if self._surfaces is not None:
+            self._pushed = self._by_motion @ self._pushing
+            self._resisting = self._surfaces.tangent(derivatives)
+        near = sparse.csr_matrix(
+            (np.ones(self.dofs.size), (np.arange(self.dofs.size), self.dofs)),
+            (self.dofs.size, self._body.size),
+        )
+        mix, motion = (near @ part @ near.T for part in (self._by_forces, self._by_motion))
+        motion.resize(motion.shape[0], self._stiffness.shape[1] - self._offset)
+        shifted = sparse.csr_matrix(
+            (motion.data, motion.indices + self._offset, motion.indptr), self._stiffness.shape
+        )
+        block = (self._stiffness - mix @ self._stiffness - shifted).tocsr()
+        csr = (block.indptr.astype(PETSc.IntType), block.indices.astype(PETSc.IntType), block.data)
+        A = PETSc.Mat().createAIJ(self._size, csr=csr, comm=self._body.comm)
+        if self._solver is not None:
+            self._solver.destroy()
+        self._solver = LinearSolver(A, DIRECT, self._prefix, None)
+        A.destroy()  # the solver has its own reference
+
+    def correct(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Remove the residual of the layers while the body beyond is held.
+
+        Returns:
+            The displacement, zero beyond the layers, and the residual that it leaves.
+        """
+        near = self._solver.solve(residual[self.dofs])
+        correction = np.zeros_like(residual)
+        correction[self.dofs] = near
+        self._near.array_w[:] = near
+        self._columns.mult(self._near, self._forces)
+        return correction, residual - self.multiply(correction, self._forces.array_r.copy())
+
+    def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
+        change = self._by_forces @ forces + self._by_motion @ x
+        product = forces - change
+        if self._surfaces is not None:  # which follow
+            pushed = self._body.total(self._pushing.T @ change)
+            product -= self._pushed @ np.linalg.solve(self._resisting, pushed)
+        product[self._body.fixed] = 0.0
+        return product
+
+
+def _near(body, contacts) -> np.ndarray:
+    """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
+    of = body.displacements
+    gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)
+    for contact in contacts:
+        near.x.array[gdim * contact.nodes[:, None] + np.arange(gdim)] = 1.0
+    for _ in range(LAYERS - 1):
+        near.x.scatter_forward()
+        marked = near.x.array[::gdim] > 0.0
+        reached = nodes[marked[nodes].any(axis=1)]
+        near.x.array[(gdim * reached[:, :, None] + np.arange(gdim)).ravel()] = 1.0
+        compat.add_to_owners(near.x)
+    free = of.vectors(near.x.array[: gdim * of.count].reshape(of.count, gdim, 1))[:, 0] > 0.0
+    free[body.fixed] = False
+    return np.flatnonzero(free)

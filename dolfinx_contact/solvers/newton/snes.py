@@ -1,0 +1,172 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""PETSc's SNES on the forces out of balance of body and contact together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from petsc4py import PETSc
+
+from dolfinx_contact.bodies.stiffness_checks import warn_of_unread
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
+from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
+from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
+from dolfinx_contact.solvers.search import Search
+
+DEFAULT = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
+MOST = 10_000  # iterations, far more than snes_max_it
+REASONS = {
+    value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] in "CD"
+}
+
+
+@dataclass(frozen=True, eq=False)  # a dictionary has no hash
+class SNES:
+    """PETSc's SNES on the equations of ``SparseNewton``, with its types, line searches, monitors and options.
+
+    One step of Newton's method brings supports to their places and finds who touches; SNES goes on from there.  It ends
+    when the errors of the step are at most ``tol`` of the problem, so that ``snes_rtol`` and the like are not asked.  The
+    prefix of its options is the problem's ``petsc_options_prefix``; linear systems are factorised, the prefix of their options ends
+    in ``tangent_``.
+
+    Attributes:
+        petsc_options: Of SNES, without prefix.  PETSC_OPTIONS and the command line go before them.
+
+    Raises:
+        ValueError: options that are no dictionary.
+
+    Example:
+        >>> solver = dc.SNES({"snes_linesearch_type": "l2"})  # for ContactProblem(..., solver=solver)
+    """
+
+    nonlinear: ClassVar[bool] = True
+    petsc_options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.petsc_options, dict):
+            raise ValueError(
+                f'petsc_options must be a dictionary such as {{"snes_monitor": None}}, got {self.petsc_options!r}.'
+            )
+
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+        """See ``Solver``."""
+        return BoundSNES(self, body, contacts)
+
+
+class BoundSNES(OnTangent):
+    """SNES for one body."""
+
+    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+        """Let SNES iterate until the errors are at most the tolerance, or it gives up.
+
+        Args:
+            step: The ``LoadStep``.
+            start: Where to begin; None asks the step.
+        """
+        x = step.start() if start is None else start
+        search = Search(step, x, math.inf)
+        search.begin(MOST)
+        maps = [ReturnMap(NORMAL * of.normal, of.normal) for of in step.stiffness]
+        said = "converged at its start"
+        with np.errstate(all="ignore"):  # a trial may turn elements inside out
+            if step.held(x):
+                search.residual(x, maps)
+            if not search.over:
+                try:
+                    x = self._supports_moved(step, x, maps, search, stands=start is None)
+                    said = self._iterate(_Equations(step, self._tangent, maps, search), x)
+                except LinearSolverError as failure:
+                    said = str(failure)
+        return SolverResult(search.best, search.iterations, search.forward_error, f"SNES: {said}")
+
+    def _supports_moved(self, step, x: np.ndarray, maps, search, stands: bool) -> np.ndarray:
+        """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""
+        descent, length = Descent(step, self._tangent, stands), 1.0
+        descent.begin(maps)
+        while length > 0.0:
+            x, length = descent.advance(x, chord=False)
+            search.count(1)
+            if step.held(x):
+                return x
+        raise LinearSolverError("no part of Newton's step brings the supports to their places.")
+
+    def _iterate(self, equations: _Equations, x: np.ndarray) -> str:
+        """What PETSc says of its method and of how it ended."""
+        X, residual = self._tangent.matrix.createVecs()
+        X.array_w[:] = x
+        snes = PETSc.SNES().create(self._body.comm)
+        snes.setOptionsPrefix(self._body.prefix)
+        snes.setKSP(self._tangent.ksp)
+        snes.setFunction(equations.calls(equations.function), residual)
+        snes.setJacobian(equations.calls(equations.jacobian), self._tangent.matrix)
+        snes.setConvergenceTest(equations.calls(equations.test))
+        given = self._options.petsc_options
+        try:
+            with options_given(self._body.prefix, DEFAULT | given) as unread:
+                snes.setFromOptions()
+                snes.solve(None, X)
+            warn_of_unread([name for name in unread if name in given])
+            equations.search.count(snes.getIterationNumber())
+            reason = snes.getConvergedReason()
+            return f"{snes.getType()}, {REASONS.get(reason, reason)}"
+        except PETSc.Error as failure:  # since 3.25 what a callback raises is hidden behind one
+            raise equations.failure or failure from None
+        finally:
+            for part in (snes, X, residual):
+                part.destroy()
+
+
+class _Equations:
+    """Forces that are too much at a displacement, their derivative, and whether they are small enough.
+
+    Attributes:
+        search: The ``Search``, which knows the best iterate.
+        failure: What a callback has raised.
+    """
+
+    def __init__(self, step, tangent: ContactTangent, maps, search: Search):
+        self.search, self.failure = search, None
+        self._step, self._tangent, self._maps, self._x = step, tangent, maps, None
+
+    def calls(self, work: Callable) -> Callable:
+        """A callback of PETSc that leaves what it raises in ``failure``."""
+
+        def call(*arguments):
+            try:
+                return work(*arguments)
+            except BaseException as failure:
+                self.failure = failure
+                raise
+
+        return call
+
+    def _at(self, X: PETSc.Vec) -> np.ndarray:
+        """The displacement, the same array as long as it is the same: its forces are known."""
+        if self._x is None or not self._step.body.same(X.array_r, self._x):
+            self._x = X.array_r.copy()
+        return self._x
+
+    def function(self, snes, X, residual) -> None:
+        """Forces that are too much; zero at fixed degrees of freedom."""
+        step = self._step
+        residual.array_w[:] = -step.free(step.out_of_balance(self._at(X), self._maps))
+
+    def jacobian(self, snes, X, J, P) -> None:
+        """Their derivative, written into the tangent's matrix."""
+        x, body = self._at(X), self._step.body
+        if body.nonlinear:
+            body.linearise(x)
+        self._tangent.linearise(self._step.derivatives(x, self._maps))
+
+    def test(self, snes, iteration: int, norms) -> int:
+        """Judge the iterate by the errors of the step."""
+        self.search.residual(self._at(snes.getSolution()), self._maps)
+        done = self.search.over
+        return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE if done else 0

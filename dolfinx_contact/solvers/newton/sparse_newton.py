@@ -1,0 +1,184 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Newton's method on body and contact together: one sparse factorisation an iteration."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from itertools import cycle
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.petsc.linear_solver import LinearSolverError
+from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
+from dolfinx_contact.solvers.search import Search
+from dolfinx_contact.support.checks import positive
+
+NAME = "SparseNewton"
+
+# Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT.
+NORMAL, TANGENTIAL, SHORT = 10.0, (1.0, 0.3, 0.1), 0.1
+
+# Of the parameter along the normal: with so little predictors are the reactions that the body asks for.
+TINY = 1e-12
+
+# Of a step is taken the largest half, quarter, ... after which the residual is smaller than the largest of the last
+# BEFORE ones; below SHORTEST there is none. Iterations in which the smallest error has to halve.
+BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
+
+
+@dataclass(frozen=True)
+class SparseNewton:
+    """Newton's method on forces out of balance of body and contact together, see ``ContactTangent``.
+
+    One iteration assembles the tangent of the body, puts the derivatives of predictor and corrector into its rows of
+    contact nodes, and factorises it (MUMPS).  Bodies that are linear in ``u`` are not assembled again.
+
+    Attributes:
+        max_iterations: Iterations at most.
+        max_seconds: Wall time after which the search ends, seconds.
+
+    Raises:
+        ValueError: a number that is not positive.
+
+    Example:
+        >>> solver = dc.SparseNewton()  # for ContactProblem(..., solver=solver)
+    """
+
+    nonlinear: ClassVar[bool] = True
+    max_iterations: int = 60
+    max_seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        positive("max_iterations", self.max_iterations, whole=True)
+        positive("max_seconds", self.max_seconds)
+
+    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+        """See ``Solver``."""
+        return BoundSparseNewton(self, body, contacts)
+
+
+class BoundSparseNewton(OnTangent):
+    """The method for one body."""
+
+    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+        """Iterate until the errors are at most the tolerance, or nothing helps any more.
+
+        Args:
+            step: The ``LoadStep``.
+            start: Where to begin; None asks the step.
+        """
+        x = step.start() if start is None else start
+        search = Search(step, x, self._options.max_seconds)
+        search.begin(self._options.max_iterations, PATIENCE)
+        descent = Descent(step, self._tangent, stands=start is None)
+        for tangential in cycle(TANGENTIAL):
+            maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
+            try:
+                with np.errstate(all="ignore"):  # a trial may turn elements inside out
+                    x = self._fall(search, descent, x, maps)
+            except LinearSolverError:
+                break
+            if not search.goes_on:
+                break
+        return SolverResult(search.best, search.iterations, search.forward_error, NAME)
+
+    def _fall(self, search, descent, x: np.ndarray, maps) -> np.ndarray:
+        """Steps with the same maps until the search ends or one gets short."""
+        descent.begin(maps)
+        while True:
+            if search.step.held(x):
+                x, _ = search.residual(x, maps)
+                if not search.goes_on:
+                    return x
+            x, length = descent.advance(x, chord=search.error <= search.step.tol)
+            search.count(1)
+            if length < SHORT:
+                return x
+
+
+class Descent:
+    """Steps of Newton's method, each no longer than it helps.
+
+    Supports that are not where they should be are moved with the step: where ``d`` is missing, ``J d`` is part of the
+    residual, and a step of length t leaves ``1 - t`` of it.
+    """
+
+    def __init__(self, step, tangent: ContactTangent, stands: bool):
+        self._step, self._body, self._tangent = step, step.body, tangent
+        self._stands = stands  # the body's tangent is good enough
+
+    def begin(self, maps) -> None:
+        """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
+        self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
+
+    def advance(self, x: np.ndarray, chord: bool) -> tuple[np.ndarray, float]:
+        """The next iterate, and the part of the step that leads to it: 0 if none helps.
+
+        Args:
+            x: Displacement of owned degrees of freedom.
+            chord: Whether the last tangent is good enough.
+        """
+        step, maps = self._step, self._maps
+        if not chord or self._tangent.matrix is None:
+            if self._body.nonlinear and not self._stands:
+                self._body.linearise(x)
+            maps = self._following(x) if self._stands else maps
+            self._stands = False
+            closing = self._closing(x, maps) if self._free else maps
+            self._tangent.linearise(step.derivatives(x, closing))
+        left, carried = step.free(step.out_of_balance(x, maps)), np.zeros_like(x)
+        missing = step.missing(x)
+        if not step.held(x):
+            carried = self._tangent.multiply(missing, self._body.carried(missing))
+        dx = self._tangent.solve(left - carried)
+        dx[self._body.fixed] = missing[self._body.fixed]
+        self._sizes.append(step.size(left - carried))
+        most, self._free = np.inf if self._free else max(self._sizes), False
+        length = 1.0
+        while length >= SHORTEST:
+            following = x + length * dx
+            if length == 1.0:
+                following[self._body.fixed] = step.b[self._body.fixed]
+            left = step.out_of_balance(following, self._maps) - (1 - length) * carried
+            if step.size(left) < (1 - 1e-4 * length) * most:
+                return following, length
+            length /= 2
+        return x, 0.0
+
+    def _following(self, x: np.ndarray) -> list:
+        """Maps for which nodes under load stay pressed where their plane moves off: Newton's step closes their gaps.
+
+        Let go, all would spring back at once. Where gaps close does not depend on the augmentation parameter ``rho``, as
+        long as the predictor ``r - rho g`` is positive. With friction they are let go, along the plane, too: held, steps
+        that turn back took more iterations.
+        """
+        self._step.out_of_balance(x, [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps])
+        maps = []
+        for contact, map in zip(self._step.contacts, self._maps):
+            pressed, gap = contact.reaction[:, -1], contact.gap
+            off = (gap > 0.0) & (pressed > 0.0) & (pressed < 2 * map.normal * gap)
+            off &= contact.friction.frictionless
+            normal = np.where(off, 0.5 * pressed / np.where(off, gap, 1.0), map.normal)
+            maps.append(ReturnMap(normal, map.tangential))
+        return maps
+
+    def _closing(self, x: np.ndarray, maps) -> list:
+        """Maps for which nodes that just touch do so under load: a body at rest on a plane is not to fall through."""
+        both = zip(self._step.contacts, maps)
+        return [_Closing(map, contact.gap_rounding(x)) for contact, map in both]
+
+
+class _Closing(NamedTuple):
+    """The derivatives of a map at smaller gaps."""
+
+    map: ReturnMap
+    depth: float  # length
+
+    def linearised(self, law, reaction, gap, slip):
+        return self.map.linearised(law, reaction, gap - self.depth, slip)

@@ -1,0 +1,166 @@
+r"""The errors of a step: dimensionless numbers, defined here and nowhere else; see docs/errors.md.
+
+For a displacement ``u`` with nodal reactions ``r`` in the friction cone all errors are forces that are not as they
+should be, over the forces that act in that same state,
+
+.. math:: S = \max(|r|, |f|, |R|),
+
+Euclidean over nodes: reactions, external forces, and what the supports carry.
+
+- ``error``: the largest of three. Equilibrium, ``|f - F(u) + r| / S`` on free degrees of freedom, F assembled by
+  DOLFINx, equations of pressures as forces (``bodies/unknowns.py``), and of planes that force drives, along their free
+  directions; where supports are not at their boundary
+  values, what is missing times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
+  paper's projection equation [dSFMH07, Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration,
+  ``|kappa max(-x_n, 0)| / S``. The metric ``kappa`` is the normal diagonal entry of the stiffness at the node, never the rho of a solver.
+- ``slip_error``: ``|K_t (Delta u_t + |Delta u_t| d)| / S`` over slipping nodes, ``d`` the unit vector along
+  ``P^-2 r_t``, and ``|K_t Delta u_t|`` over sticking ones; none where mu = 0. ``K_t`` is the tangential block of the
+  stiffness at the node. The projection equation weights slip by ``Q^2`` and does not see it where p is small.
+- ``rounding``: what double precision leaves of the above, estimated from the size of the terms that cancel in
+  ``f - K u + r``, in the gaps and in the slips. No smaller error can be asked for.
+
+Where nothing acts, ``S`` is no larger than rounding, an estimate, may make of nothing. The state is then right if what is left is below rounding, and
+the numbers are relative to the terms that cancel instead.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dolfinx_contact.contact.state import Status
+
+EPSILON = np.finfo(float).eps / 2  # of one operation
+
+# Rounding is an estimate: errors up to this many times as large may be no more than that.
+ROUNDED = 2.0
+
+# Part of the forces that act above which rounding may hide that loads are not balanced.
+BLIND = 1e-3
+
+
+class NodalStiffness(NamedTuple):
+    """Blocks of the stiffness at the contact nodes, local frame, force per length."""
+
+    normal: np.ndarray  # kappa, (n,)
+    tangential: np.ndarray  # (n, gdim - 1, gdim - 1)
+
+
+class Errors(NamedTuple):
+    """Errors of a state, dimensionless; ``change`` is that of the reactions since the state before, over S, the ``scale``."""
+
+    error: float
+    slip_error: float
+    rounding: float
+    change: float = np.inf
+    acts: bool = True  # forces above rounding do
+    scale: float = 0.0  # S, in the unit of force of the sums
+    share: float = 1.0  # |r| / S, of the reactions in the forces that act
+
+    @property
+    def largest(self) -> float:
+        """The larger one of both errors; NaN if either is."""
+        return float(np.maximum(self.error, self.slip_error))
+
+    def of_contact(self, forward: float) -> float:
+        """The largest of all errors over the reactions in place of all forces that act; 0 without reactions."""
+        return max(self.largest, forward) / self.share if self.share > 0.0 else 0.0
+
+    @property
+    def blind(self) -> bool:
+        """Whether rounding may hide that loads are not balanced."""
+        return not self.acts or self.rounding > BLIND
+
+    def within(self, tol: float) -> bool:
+        """Whether both are at most ``tol``, or as small as double precision allows."""
+        rounding = ROUNDED * self.rounding
+        return self.largest <= (max(tol, rounding) if self.acts else rounding)
+
+
+def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
+    """Residual of the projection equation, penetration and defect of the slip rule, as forces.
+
+    Args:
+        contact: Contact with its present reaction, gap and slip increment.
+        stiffness: Of its nodes.
+
+    Returns:
+        ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
+    """
+    projected, _ = contact.law.bipotential_map(
+        contact.reaction, contact.gap, _felt(contact), stiffness.normal
+    )
+    penetration = stiffness.normal * np.maximum(-contact.gap, 0.0)
+    slip = np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_residual)
+    return contact.reaction - projected, penetration, slip
+
+
+def _felt(contact) -> np.ndarray:
+    """Slips as the law's residual has them, ``shape=(n, gdim - 1)``: of nodes that stick over mu, where it exceeds 1.
+
+    The residual has ``kappa mu |Delta u_t|``.  Where the law asks for no slip, what there is counts by the force that it makes,
+    not mu times.
+    """
+    slip, mu = contact.slip_increment, contact.friction.mu.max(axis=-1, initial=0.0)
+    if not (mu > 1.0).any():
+        return slip
+    sticks = contact.status == int(Status.STICK)
+    return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
+
+
+def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
+    """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
+
+    On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
+
+    Args:
+        contact: Contact with its present state.
+        stiffness: Of its nodes.
+        unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
+    """
+    slip = contact.slip_kept + contact.slip_increment  # else what is slow would never slip
+    made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, slip), axis=1)
+    rough = (np.broadcast_to(contact.friction.mu, (made.size, 2)) > 0.0).any(axis=1)
+    return rough & (contact.status == int(Status.SLIP)) & (made <= unknown)
+
+
+def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
+    """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
+
+    Args:
+        contact: Contact that has been moved to ``u``.
+        stiffness: Of its nodes.
+        u: Displacement of owned degrees of freedom, length units.
+    """
+    normal, tangential = contact.motion_rounding(u)
+    stiff = np.abs(stiffness.tangential).sum(axis=2)
+    mu = contact.friction.mu[..., : tangential.shape[1]]
+    if (mu > 1.0).any():  # the law's residual has mu times the slip
+        slips = contact.status == int(Status.SLIP)
+        normal = normal + slips * (mu * tangential).sum(axis=1)
+    return np.column_stack((stiff * tangential, stiffness.normal * normal))
+
+
+def as_errors(sums: np.ndarray) -> Errors:
+    """Errors from squares of norms, in any unit of force.
+
+    Args:
+        sums: Of equilibrium, law, penetration, slip rule, reactions, external forces, supports, rounding of
+            the body, rounding at the contacts, and change of the reactions.
+    """
+    equilibrium, law, penetration, slip, r, f, R, body, contact, change = np.sqrt(sums)
+    rounding, acting = max(body, contact), max(r, f, R)
+    acts = bool(acting > ROUNDED * rounding)
+    if not acts:
+        acting = rounding / EPSILON
+    left = np.array([max(equilibrium, law, penetration), slip, rounding, change])
+    if acting > 0.0:
+        left /= acting
+    elif not np.isnan(left).any():
+        left = np.where(left > 0.0, np.inf, 0.0)
+    error, slip_error, rounding, change = map(float, left)
+    if np.isnan([equilibrium, law, penetration]).any():
+        error = np.nan
+    share = float(r / acting) if acts else 0.0
+    return Errors(error, slip_error, rounding, change, acts, float(acting), share)

@@ -1,0 +1,321 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A load step as solvers see it: forces out of balance, their errors, and where to start."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.contact.shared import shared_nodes
+from dolfinx_contact.contact.state import Status
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.results.record import Counts, counts
+from dolfinx_contact.step.errors import (
+    EPSILON,
+    ROUNDED,
+    Errors,
+    NodalStiffness,
+    as_errors,
+    at_rest,
+    contact_defects,
+    contact_rounding,
+)
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.driven import driven_surfaces
+from dolfinx_contact.surfaces.sliding import lost_far_away, nothing_holds
+
+
+def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
+    """Stiffness at the nodes of each contact, and a unit of force; contacts take their ``rho``.  Collective."""
+    stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
+    for contact, of in zip(contacts, stiffness):
+        contact.rho = of.normal
+    size = body.largest(np.abs(body.displacements.x))
+    # Any unit that keeps squares within the range of double precision.
+    return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
+
+
+class LoadStep:
+    """Equilibrium of a body under new loads, its contacts, and the errors of a displacement.
+
+    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``maps.py`` for each contact.
+
+    Args:
+        body: The body, its stiffness assembled.
+        contacts: Its contacts; their reactions, gaps and statuses are those of the displacement asked for last.
+        stiffness: ``NodalStiffness`` of each contact.
+        b: ``b - K u`` are the forces out of balance for a ``u`` with the boundary values, which ``b`` holds.
+        external: External forces.
+        starts: Displacements near which the solution may lie.
+        tol: Largest error.
+        unit: Of force, any that keeps squares within the range of double precision.
+        monitor: None, or the user's function of iteration, largest error and ``Counts``.
+
+    Attributes:
+        planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
+        holding: ``HeldPlanes``, None where held nodes hold none of them.
+        statics: ``Statics`` of a body that contact alone holds, else None.
+        alone: The displacement without reactions, None where it was not asked for or not found exactly.
+    """
+
+    def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
+        self.body, self.contacts, self.stiffness = body, contacts, stiffness
+        self.b, self.external, self.tol = b, external, tol
+        self.surfaces = driven_surfaces(body, contacts)
+        self._shared = shared_nodes(contacts, stiffness, body.fixed)
+        self.statics = self.alone = self.holding = None
+        self._starts, self.unit, self._monitor = starts, unit, monitor
+        self._before, self._told = None, 0  # reactions of the state judged before, states told
+        self._known = None  # a displacement, and the forces b - K x that it leaves
+        self._measured = None  # displacement and contact states whose errors were measured with F
+
+    @property
+    def may_slide(self) -> bool:
+        """Whether a plane, or the body, is held by contact along some direction."""
+        return self.surfaces is not None or self.statics is not None
+
+    def free_state(self) -> np.ndarray:
+        """The displacement without reactions, to all digits.  Collective."""
+        return self.body.free_state(self.b) if self.alone is None else self.alone
+
+    def slides(self) -> bool:
+        """Whether force pushes a plane, or loads a body, by more than friction carries in the present state.  Collective."""
+        slides = self.surfaces is not None and bool(self.surfaces.beyond())
+        return slides or (self.statics is not None and self.statics.slides(self))
+
+    def hidden(self) -> str:
+        """Whether rounding hides the loads of a body that contact alone holds, in words.  Collective."""
+        return "" if self.statics is None else self.statics.hidden(self)
+
+    def no_state(self) -> str:
+        """Why there is no static state, in words; empty where nothing tells.  Collective."""
+        said = "" if self.statics is None else self.statics.said
+        if self.surfaces is not None:
+            said = said or self.surfaces.beyond(True) or self.surfaces.beyond()
+            if not said and self.statics is not None:
+                said = nothing_holds(self.contacts)
+        return said
+
+    def total(self, array) -> np.ndarray:
+        """Sum of an array over all ranks."""
+        return self.body.total(array)
+
+    def start(self) -> np.ndarray:
+        """The start with the smallest error, by the return map: the paper's takes extrapolations for worse than they are."""
+        guesses = [start.copy() for start in self._starts]
+        if self.statics is not None and self.statics.placed:
+            guesses = [self.statics.start.copy()]
+        for guess in guesses:
+            guess[self.body.fixed] = self.b[self.body.fixed]
+        maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
+        best = min(guesses, key=lambda guess: self.residual(guess, maps)[1].largest)
+        self._before = None
+        return best
+
+    # -- forces --------------------------------------------------------------------------------
+
+    def forces(self, x: np.ndarray) -> np.ndarray:
+        """``b - K x``; of the array that was asked for last without another product."""
+        if self._known is None or self._known[0] is not x:
+            self._known = (x, self.b - self.body.multiply(x))
+        return self._known[1]
+
+    def know(self, x: np.ndarray, forces: np.ndarray) -> None:
+        """Take note of the forces at a displacement that were found without a product."""
+        self._known = x, forces
+
+    def free(self, forces: np.ndarray) -> np.ndarray:
+        """Forces without what supports carry."""
+        forces = forces.copy()
+        forces[self.body.fixed] = 0.0
+        return forces
+
+    def missing(self, x: np.ndarray) -> np.ndarray:
+        """What is missing to the boundary values at a displacement, zero at free degrees of freedom."""
+        missing, fixed = np.zeros_like(x), self.body.fixed
+        missing[fixed] = self.b[fixed] - x[fixed]
+        return missing
+
+    def held(self, x: np.ndarray) -> bool:
+        """Whether ``x`` has the boundary values.  Collective."""
+        return self.body.largest(np.abs(self.missing(x))) == 0.0
+
+    def size(self, forces: np.ndarray) -> float:
+        """Norm of forces at free degrees of freedom."""
+        return self.body.norm(self.free(forces))
+
+    def out_of_balance(self, x: np.ndarray, maps) -> np.ndarray:
+        """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``."""
+        return self._left(x, self.forces(x), maps)
+
+    def derivatives(self, x: np.ndarray, maps) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of the new reactions of each contact, by the reactions before and by the motion."""
+        forces = self.forces(x)
+        self._balance_surfaces(x, forces, maps)
+        both = zip(self._asked(x, forces), maps)
+        derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
+        return derivatives if self._shared is None else self._shared.coupled(derivatives)
+
+    def along(self, x: np.ndarray, dx: np.ndarray, maps):
+        """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
+        forces, change = self.forces(x), self.body.multiply(dx)
+
+        def size(length: float) -> float:
+            return self.size(self._left(x + length * dx, forces - length * change, maps))
+
+        return size
+
+    # -- errors --------------------------------------------------------------------------------
+
+    def rest(self) -> None:
+        """Call sticking what slips by less than the tolerance leaves unknown of the state judged last."""
+        errors = self.errors
+        unknown = max(self.tol, ROUNDED * errors.rounding) * errors.scale * self.unit
+        for contact, stiffness in zip(self.contacts, self.stiffness):
+            still = at_rest(contact, stiffness, unknown)
+            if still.any():
+                contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
+
+    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
+        """``out_of_balance`` and the errors of the state.
+
+        The reactions that enter the predictor are those the body asks for, ``K x - b``.  Once the
+        errors fall below the tolerance they are measured again with F itself, assembled by DOLFINx.
+        """
+        left = self.out_of_balance(x, maps)
+        self.errors = self._errors(left, x, self.body.support_forces(x))
+        if self.errors.within(self.tol):
+            change = self.errors.change
+            self._judge(x, self.by_form(x))
+            self.errors = self.errors._replace(change=change)
+        self._tell()
+        return left, self.errors
+
+    def again(self, x: np.ndarray) -> None:
+        """Laws are others now: measure anew, and start from a displacement."""
+        self._measured, self._starts = None, [x]
+
+    def measure(self, x: np.ndarray) -> Errors:
+        """Errors of a displacement by F itself; also takes its reactions, gaps and slips.
+
+        Reactions by the return map: beside large slip their direction is that of the slip, not that of rounding in forces.
+        """
+        if not self._is_measured(x):
+            forces = self.by_form(x)
+            maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
+            self._respond(x, self.free(forces), maps)
+            self._judge(x, forces)
+            self._tell()
+        elif self.surfaces is not None:  # where they were judged
+            self.surfaces.move_to(self._measured[2])
+        return self.errors
+
+    def by_form(self, x: np.ndarray) -> np.ndarray:
+        """``-F(x)``, by which errors are measured."""
+        return -self.body.residual(x)
+
+    def _is_measured(self, x: np.ndarray) -> bool:
+        """Whether the errors are those of ``x``, and nobody has moved the contacts since."""
+        if self._measured is None:
+            return False
+        measured, states, _ = self._measured
+        stand = all(contact.present is state for contact, state in zip(self.contacts, states))
+        return self.body.same(x, measured if stand else None)  # asked on all ranks
+
+    def measure_open(self, x: np.ndarray) -> Errors:
+        """Errors of a displacement without reactions."""
+        for contact in self.contacts:
+            contact.move(x)
+            contact.release()
+        self._judge(x, self.by_form(x))
+        return self.errors
+
+    @property
+    def monitored(self) -> bool:
+        """Whether the user wants to be told."""
+        return self._monitor is not None
+
+    def tell(self, error: float, nodes) -> None:
+        """Tell the user's monitor the error of another iterate, and its nodes by status.  Collective."""
+        with raised_together(self.body.comm):
+            self._monitor(self._told, error, Counts(*nodes))
+        self._told += 1
+
+    def _tell(self) -> None:
+        """Tell the errors of another state of the body."""
+        if self.monitored:
+            self.tell(self.errors.largest, counts(self.body, self.contacts))
+
+    def _asked(self, x: np.ndarray, forces: np.ndarray):
+        """The contacts, each with the reactions that balance the forces at its nodes, of shared ones with its own part."""
+        if self._shared is not None:
+            self._shared.split(x, -forces)
+        for k, contact in enumerate(self.contacts):
+            contact.take_reaction(-forces)
+            if self._shared is not None:
+                self._shared.give(k)
+            yield contact
+
+    def _balance_surfaces(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+        if self.surfaces is not None:
+            self.surfaces.balance(x, maps, lambda: self._asked(x, forces))
+
+    def _respond(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+        """Give contacts the reactions that maps make of those which balance the forces."""
+        self._balance_surfaces(x, forces, maps)
+        for contact, map in zip(self._asked(x, forces), maps):
+            contact.respond(x, map)
+        if self.holding is not None:
+            self.holding.share()
+
+    def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+        self._respond(x, forces, maps)
+        return self.with_reactions(forces)
+
+    def with_reactions(self, forces: np.ndarray) -> np.ndarray:
+        """Forces plus the contacts' present reactions."""
+        forces = forces.copy()
+        for contact in self.contacts:
+            contact.assemble_reaction(forces)
+        return forces
+
+    def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
+        """Errors of the contacts' present state, ``forces = -F(x)``."""
+        self.errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
+        moved = None if self.surfaces is None else self.surfaces.moved
+        self._measured = x.copy(), [contact.present for contact in self.contacts], moved
+
+    def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
+        """Errors of the contacts' present state.
+
+        Args:
+            left: Forces out of balance, ``f - F(u) + r``; at fixed degrees of freedom they do not count.
+            x: Displacement.
+            supports: What the supports carry, at fixed degrees of freedom.
+        """
+        left, acting = self.free(left), np.abs(self.external)
+        left += self.body.cancelling(self.missing(x))
+        columns = [[np.zeros(0)] for _ in range(5)]
+        for contact, stiffness in zip(self.contacts, self.stiffness):
+            contact.points.add_magnitudes(contact.reaction, acting)
+            rounding = contact_rounding(contact, stiffness, x)
+            parts = (*contact_defects(contact, stiffness), rounding, contact.reaction)
+            for column, part in zip(columns, parts):
+                column.append(part.ravel())
+        law, penetration, slip, rounding, reaction = map(np.concatenate, columns)
+        # Where contacts share a node only the sum is the state's; how they share it may jump.
+        acts = reaction if self._shared is None else self.free(self.with_reactions(0.0 * left))
+        before, self._before = self._before, acts
+        change = np.full(1, np.inf) if before is None else acts - before
+        cancelling = EPSILON * (self.body.cancelling(x) + acting)
+        if self.surfaces is not None:
+            on_surfaces, terms = self.surfaces.left()
+            mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
+            left = np.append(left, on_surfaces[mine])
+            cancelling = np.append(cancelling, EPSILON * terms[mine])
+        parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
+        errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
+        lost = errors.blind and lost_far_away(
+            self.body, self.statics, self.surfaces, x, errors.acts
+        )
+        return errors._replace(error=np.inf) if lost else errors

@@ -1,0 +1,63 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Load steps of a nonlinear body, and of the one that is linearised at a displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.step.errors import Errors
+from dolfinx_contact.step.load_step import LoadStep
+
+
+class NonlinearStep(LoadStep):
+    """As ``LoadStep``; forces out of balance are those of the form itself, ``-F(x)``.
+
+    ``b`` has the boundary values at fixed degrees of freedom and is zero elsewhere.  The metric of the errors is the
+    tangent at the last converged displacement.
+    """
+
+    def start(self) -> np.ndarray:
+        """The start from which the least is missing, as forces of the linearised body; with boundary values of its own."""
+        maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
+        sizes, different = [], []
+        for guess in self._starts:
+            if any(self.body.same(guess, other) for other in different):
+                continue
+            left = self.out_of_balance(guess, maps) - self.body.carried(self.missing(guess))
+            sizes.append(self.size(left))
+            different.append(guess)
+        return different[int(np.argmin(np.nan_to_num(sizes, nan=np.inf)))]
+
+    def forces(self, x: np.ndarray) -> np.ndarray:
+        """``-F(x)``, zero at fixed degrees of freedom; of the array that was asked for last without assembly."""
+        if self._known is None or self._known[0] is not x:
+            forces = -self.body.residual(x)
+            self._known = (x, self.free(forces), forces)
+        return self._known[1]
+
+    def by_form(self, x: np.ndarray) -> np.ndarray:
+        self.forces(x)
+        return self._known[2]
+
+    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
+        """``out_of_balance`` and the errors of the state."""
+        left = self.out_of_balance(x, maps)
+        self._judge(x, self.by_form(x))
+        self._tell()
+        return left, self.errors
+
+    def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
+        super()._judge(x, forces)
+        if not self.held(x):
+            self.errors = self.errors._replace(error=np.inf)
+
+
+class LinearisedStep(LoadStep):
+    """As ``LoadStep`` of a linear body; errors are measured with its ``K``, too."""
+
+    def by_form(self, x: np.ndarray) -> np.ndarray:
+        forces = self.forces(x).copy()
+        forces[self.body.fixed] = -self.body.support_forces(x)
+        return forces

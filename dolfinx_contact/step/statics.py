@@ -1,0 +1,376 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Statics of a body that contact alone holds: whether reactions can balance its loads, and whether it can still move."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact.bodies.forms import times_volume
+from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.solvers.condensed.input import principal_axes
+from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
+from dolfinx_contact.surfaces.sliding import nothing_holds
+
+# Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
+ROUNDING, BALANCED, RAYS = 1e-12, 1e-7, 400
+
+# What reactions may leave of loads in a state that is no more than rounding away from a solution.
+ROUGH = 1e-3
+
+# Part of a motion that is none.
+SMALL = 1e-6
+
+# Balance that takes reactions more than so many times the loads, as of a body jammed between planes, counts as none.
+JAMMED = 1e9
+
+# A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
+# body slides away along it if it changes less than the second number, and loads are not balanced.
+UNFELT, SLIDING = 1e-9, 1e-3
+
+# Where a body is moved to before it is taken back out of the planes, over the largest gap.
+FAR = 30.0
+
+# How often a step towards the last state is halved.
+HALVED = 12
+
+
+class Statics:
+    """Loads and reactions of a loose body along its rigid motions ``Z``, which have no elastic energy.
+
+    Args:
+        body: ElasticBody with ``loose`` motions.
+        contacts: Its contacts.
+        step: The ``LoadStep``.
+        last: The last converged displacement, owned degrees of freedom.  Collective.
+
+    Attributes:
+        loads: Their sums along the motions, ``shape=(m,)``; zero where they are rounding.
+        start: Displacement near which the solution may lie; ``placed`` if it is not the last one.
+        said: Why there is no static state, in words; empty where there may be one.
+
+    Raises:
+        ValueError: on all ranks, if no contact node is on a part of the body that nothing holds.
+    """
+
+    def __init__(self, body, contacts, step, last: np.ndarray):
+        self._body, self._contacts, self._modes = body, contacts, body.loose.modes
+        m, self._dim = self._modes.shape[1], body.V.mesh.geometry.dim
+        parts, coefficients = [np.zeros((0, self._dim, m))], [np.zeros((0, self._dim - 1))]
+        for contact in contacts:
+            points = contact.points
+            motion = points.motion(self._modes)
+            points.without_held(motion[:, :-1])
+            motion[points.closed] = 0.0
+            turns = principal_axes(contact.free_friction, points.count, self._dim)
+            parts.append(turns @ motion)
+            mu = contact.free_friction.mu[..., : self._dim - 1]
+            coefficients.append(np.broadcast_to(mu, (points.count, self._dim - 1)))
+        self._motion, self._mu = np.concatenate(parts), np.concatenate(coefficients)
+        self._felt = body.total((self._motion**2).sum(axis=(0, 1)))
+        if not self._felt.all():
+            raise ValueError(
+                f"{body.loose.refusal(np.eye(m)[:, self._felt == 0.0])} No contact node can hold it: fix it by Dirichlet "
+                "conditions, add a soft spring to F, or name the facets that may touch."
+            )
+        b = step.free(step.b)
+        sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
+        self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
+        self.start, self._last, self.placed, self.said = last, last, False, ""
+        escape, self._balancing = self._escape(self._motion, self.loads)
+        if escape is None and step.surfaces is not None:
+            escape, _ = self._escape(*self._with_surfaces(step.surfaces))
+            self.said = "" if escape is None else nothing_holds(contacts)
+        # Planes that move alone are the concern of ``DrivenPlanes.beyond``.
+        if escape is not None and np.linalg.norm(escape[:m]) > SMALL * np.linalg.norm(escape):
+            self.said = self.said or (
+                f"The loads drive {body.loose.words(escape[:m])}, which no reactions of the contact nodes within their friction can "
+                "hold: no static state exists"
+            )
+
+    def _with_surfaces(self, surfaces) -> tuple[np.ndarray, np.ndarray]:
+        """Motions of the contact nodes with those of planes under dead loads behind the body's, and what drives both.
+
+        Of such planes reactions are in balance with their forces: ``D^T r = F``, what they press with is known.
+        """
+        dead, felt = surfaces.springs == 0.0, self._felt.max()
+        driving, parts = surfaces.driving()[dead], [np.zeros((0, self._dim, dead.sum()))]
+        for contact, axes in zip(self._contacts, surfaces.axes):
+            turns = principal_axes(contact.free_friction, contact.points.count, self._dim)
+            parts.append(-turns @ axes[:, :, dead])
+        moved = np.concatenate(parts)
+        sizes = np.sqrt(self._body.total((moved**2).sum(axis=(0, 1))) / felt)
+        sizes[sizes == 0.0] = np.inf  # nothing of it is felt
+        return np.concatenate((self._motion, moved / sizes), axis=2), np.append(
+            self.loads, driving / sizes
+        )
+
+    def _escape(self, motion, loads) -> tuple[np.ndarray | None, np.ndarray]:
+        """A motion along which loads push and no reaction can hold, ``shape=(m,)``, None if there is none; what balances them.
+
+        Args:
+            motion: Of the contact nodes, ``shape=(n, gdim, m)``.
+            loads: Along the motions.
+
+        The sums of forces and moments that reactions in their friction cones can have are a cone.  The loads' nearest
+        point in it leaves a rest: along that motion loads do work, and reactions can only do more.  It is found by
+        the rays that reach farthest along the rest, one after another, and least squares with weights that are not
+        negative.  The last ones are reactions that balance the loads.
+        """
+        unit = float(np.linalg.norm(loads)) or 1.0
+        target, rays, weights = -loads / unit, np.zeros((loads.size, 0)), np.zeros(0)
+        rest, kept, balancing = target, [], np.zeros(motion.shape[:2])
+        for _ in range(RAYS):
+            if np.linalg.norm(rest) <= BALANCED:
+                break
+            reach, ray, *reaction = self._farthest(motion, rest)
+            length = float(np.linalg.norm(ray))
+            if reach <= length * max(1e-14, np.linalg.norm(rest) / JAMMED):
+                return self._along_surfaces(-rest, loads, kept, weights), balancing
+            rays = np.column_stack((rays[:, weights > 0], ray))
+            kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
+            weights, _ = self._body.comm.bcast(
+                _cone_weights(rays, target, float(np.linalg.norm(rest)))
+            )
+            rest = target - rays @ weights
+        for weight, (_, reaction) in zip(weights, kept):
+            balancing += unit * weight * reaction
+        return None, balancing  # or not decided: the solver will
+
+    def _along_surfaces(
+        self, motion: np.ndarray, loads, kept: list, weights: np.ndarray
+    ) -> np.ndarray:
+        """The part of a motion with which the nodes of some reactions stay on their planes, if loads drive that."""
+        normals = [normal for (normal, _), weight in zip(kept, weights) if weight > 0]
+        if normals:
+            along = (
+                motion
+                - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
+            )
+            if along @ loads > SMALL * np.linalg.norm(loads) * np.linalg.norm(motion):
+                return along
+        return motion
+
+    def _farthest(
+        self, motion, along: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Of reactions with ``r_n = 1`` at one node those whose sums reach farthest along a motion.
+
+        Returns:
+            How far; the sums; what ``r_n`` alone makes of them; the reactions of this rank's nodes.
+        """
+        velocity, reaction = motion @ along, np.zeros(motion.shape[:2])
+        tangential = self._mu * velocity[:, :-1]
+        length = np.linalg.norm(tangential, axis=1)
+        reach = velocity[:, -1] + length
+        largest = (float(reach.max(initial=-np.inf)), self._body.comm.rank)
+        reached, owner = self._body.comm.allreduce(largest, op=MPI.MAXLOC)
+        ray = None
+        if self._body.comm.rank == owner:
+            k = int(reach.argmax())
+            way = np.divide(tangential[k], length[k], np.zeros(self._dim - 1), where=length[k] > 0)
+            reaction[k] = np.append(self._mu[k] * way, 1.0)
+            ray = reaction[k] @ motion[k], motion[k, -1]
+        return reached, *self._body.comm.bcast(ray, root=owner), reaction
+
+    def place(self) -> None:
+        """Move the start until it touches, where it can.  Collective.
+
+        A linear programme for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
+        as near as they can be.
+        """
+        for contact in self._contacts:
+            contact.move(self.start)
+        gaps = np.concatenate([np.zeros(0), *(contact.gap for contact in self._contacts)])
+        mine = self._motion[:, -1], gaps, self._balancing[:, -1]
+        parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
+        motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
+        if motion is not None:
+            self.start, self.placed = self.start + self._modes @ motion, True
+
+    def share(self) -> float:
+        """What the loads are of those that the last reactions balance: these may only have to be scaled.  Collective."""
+        forces = np.zeros(self._body.size)
+        for contact in self._contacts:
+            contact.points.add_forces(contact.last.reaction, forces)
+        sums = self._body.total(self._modes.T @ forces)
+        return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
+
+    def _free_motions(self, step, unfelt: float) -> np.ndarray:
+        """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
+
+        Args:
+            step: The ``LoadStep``.
+            unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
+        """
+        changed = [np.zeros((0, self._felt.size))]
+        least = ROUNDING * self._body.largest(self._pressures())
+        for contact, of in zip(self._contacts, step.stiffness):
+            map = ReturnMap(of.normal, of.normal)
+            state = contact.reaction, contact.gap, contact.slip_increment
+            by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
+            by_motion[contact.reaction[:, -1] <= least] = 0.0
+            changed.append(
+                (by_motion @ contact.points.motion(self._modes)).reshape(-1, self._felt.size)
+            )
+        changed = np.concatenate(changed) / np.sqrt(self._felt)
+        if len(changed) > self._felt.size:  # and not empty, as where a rank has no contact nodes
+            changed = np.linalg.qr(changed, mode="r")
+        decomposed = np.linalg.svd(np.concatenate(self._body.comm.allgather(changed)))
+        _, values, vectors = self._body.comm.bcast(decomposed)  # to the same bits on all ranks
+        small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
+        return vectors[small].T / np.sqrt(self._felt)[:, None]
+
+    def slides(self, step) -> bool:
+        """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
+        motions = self._free_motions(step, SLIDING)
+        left, sizes = self._left()
+        driven = (
+            motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
+        )
+        least = ROUGH * np.linalg.norm(driven) * np.linalg.norm(sizes)
+        if np.linalg.norm(left) > np.linalg.norm(self.loads):
+            return False  # reactions of a body that is lost, not of one that slides
+        if driven @ self.loads <= least or abs(driven @ left) <= least:
+            overcome = [along for along in (self.loads, left) if self._overcome(along, sizes)]
+            if not overcome:
+                return False
+            driven = overcome[0]
+        if self._presses(driven):
+            return False
+        self.said = (
+            f"In the best state found the loads drive {self._body.loose.words(driven)} by more than friction carries with its "
+            "normal forces"
+        )
+        return True
+
+    def _presses(self, along: np.ndarray) -> bool:
+        """Whether a motion takes nodes into their planes: normal reactions would grow until they hold it.  Collective."""
+        velocity = self._motion @ along
+        into, fastest = self._body.largest(-velocity[:, -1]), self._body.largest(np.abs(velocity))
+        return into > ROUGH * fastest
+
+    def _overcome(self, along: np.ndarray, sizes: np.ndarray) -> bool:
+        """Whether loads along a motion are more than present normal reactions carry with all their friction.  Collective."""
+        velocity = self._motion @ along
+        friction = np.linalg.norm(self._mu * velocity[:, :-1], axis=1)
+        carried = self._body.total([self._pressures() @ (friction - velocity[:, -1])])[0]
+        least = ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
+        return bool(self.loads @ along - carried > least)
+
+    def _pressures(self) -> np.ndarray:
+        """Present normal reactions of all contacts."""
+        return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
+
+    def hidden(self, step) -> str:
+        """Whether rounding in gaps and slips makes forces as large as the loads, in words.  Collective."""
+        total, unit = self._body.total, step.unit
+        rounding = [np.zeros(0)]
+        for contact, of in zip(self._contacts, step.stiffness):
+            contact.move(self._last)
+            rounding.append(contact_rounding(contact, of, self._last).ravel())
+        forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self._last)
+        hiding = np.sqrt(max(total(np.square(force / unit).sum()) for force in forces))
+        acting = self._body.norm(step.external / unit)
+        if not 0.0 < BLIND * acting <= hiding:
+            return ""
+        return (
+            f"Loads are {unit * acting:.1e}, and rounding of coordinates and displacements alone makes contact forces of "
+            f"{unit * hiding:.1e}: no step can tell what holds the body. Take the load off altogether, or leave a thousand times as much"
+        )
+
+    def balanced(self) -> bool:
+        """Whether reactions balance the loads, roughly: of a body that is lost rounding hides that they do not.  Collective.
+
+        Along motions without loads reactions may be no more than rounding, and say nothing.
+        """
+        left, sizes = self._left()
+        return bool((np.abs(left) <= ROUGH * sizes)[self.loads != 0.0].all())
+
+    def _left(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of loads and present reactions along the motions, and those of their magnitudes."""
+        forces = np.zeros((2, self._body.size))
+        for contact in self._contacts:
+            contact.points.add_forces(contact.reaction, forces[0])
+            contact.points.add_magnitudes(contact.reaction, forces[1])
+        sums, sizes = self._body.total(
+            [self._modes.T @ forces[0], np.abs(self._modes).T @ forces[1]]
+        )
+        return sums + self.loads, sizes + np.abs(self.loads)
+
+    def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
+        """A solution whose undetermined motions are those nearest to the last displacement, by volume.  Collective.
+
+        Args:
+            step: The ``LoadStep``; has measured ``x``.
+            x: Displacement of owned degrees of freedom.
+            choice: "refused" or "nearest".
+
+        Raises:
+            ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
+        """
+        motions = self._free_motions(step, UNFELT)
+        if not motions.size:
+            return x
+        if choice == "refused":
+            raise ValueError(
+                f"{self._body.loose.refusal(motions)} No reaction changes with them: fix them by Dirichlet conditions, add "
+                'friction or a soft spring, or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
+            )
+        Z = self._modes @ motions
+        weighed = times_volume(
+            self._body.displacements, Z
+        )  # nearest is least the integral of |du|^2
+        apart, sizes = (
+            self._body.total(weighed.T @ (self._last - x)),
+            self._body.total(weighed.T @ Z),
+        )
+        way = Z @ np.linalg.solve(sizes, apart)
+        for halved in range(HALVED):
+            trial = x + 0.5**halved * way
+            if step.measure(trial).within(step.tol):
+                return trial
+        step.measure(x)
+        return x
+
+
+def _cone_weights(
+    rays: np.ndarray, target: np.ndarray, scale: float = 1.0
+) -> tuple[np.ndarray, float]:
+    """Weights, none negative, of columns whose sum is nearest to a target, and its distance.
+
+    ``scale`` is about that distance: SciPy compares with its tolerance what is not relative to it.
+
+    By bounded least squares [P. B. Stark, R. L. Parker, Computational Statistics 10 (1995) 129]: SciPy's ``nnls`` is
+    another programme from release to release, and that of 1.15 stops early here.
+    """
+    from scipy.optimize import lsq_linear  # of loose bodies alone
+
+    lengths = np.linalg.norm(rays, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    found = lsq_linear(
+        rays / lengths, target / scale, bounds=(0.0, np.inf), method="bvls", tol=1e-15
+    )
+    weights = scale * found.x / lengths
+    return weights, float(np.linalg.norm(rays @ weights - target))
+
+
+def _touching(normal: np.ndarray, gap: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+    """The motion ``c`` with ``gap + normal c >= 0`` that is nearest to a far one against these forces; None if there is none.
+
+    Least distance by non-negative least squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974].
+    """
+    against = -force @ normal
+    length, most = np.abs(gap).max(), np.linalg.norm(against) * np.linalg.norm(normal, axis=1).max()
+    if not length * most > 0.0:
+        return None
+    far = FAR * length * np.linalg.norm(against) / most * against / np.linalg.norm(against)
+    below = -(gap + normal @ far) / length
+    weights, left = _cone_weights(np.vstack((normal.T, below)), np.append(np.zeros(len(far)), 1.0))
+    if not left > 1e-14:
+        return None
+    rest = np.vstack((normal.T, below)) @ weights - np.append(np.zeros(len(far)), 1.0)
+    if rest[-1] == 0.0:  # minus the square of what is left, which rounding has taken
+        return None
+    return far - length * rest[:-1] / rest[-1]

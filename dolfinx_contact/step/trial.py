@@ -1,0 +1,119 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The displacement without reactions: whether it presses on a plane, and whether it is the solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.solvers.base import SolverResult
+
+# Penetration over the largest displacement that three digits of it leave no doubt about.
+CERTAIN = 0.1
+
+NOTHING = "none: nothing touches"
+
+
+def without_reactions(body, contacts, step) -> SolverResult | None:
+    """The displacement without reactions, if it is the solution of a ``LoadStep``.  Collective."""
+    if step.surfaces is not None:
+        if not step.surfaces.can_rest:
+            return None
+        step.surfaces.move_to(step.surfaces.at_rest())
+    with stage("contact: elastic solve"):
+        trial = body.free_state(step.b, rough=True)
+        if not (body.known.exact or presses(body, contacts, trial)):
+            trial = body.free_state(step.b)  # whether anything touches takes all digits
+        step.alone = trial if body.known.exact else None
+    if not may_touch(body, contacts, trial):
+        trial = refined(body, step, trial)
+        if step.errors.within(step.tol):
+            return SolverResult(trial, 0, 0.0, NOTHING)
+    if step.surfaces is not None:
+        step.surfaces.move_to(np.zeros(step.surfaces.count))
+    return None
+
+
+def held_by_contact(body, contacts, step, last, undetermined: str, solve) -> SolverResult:
+    """What is found of a body that contact alone holds.  Collective.
+
+    Args:
+        body, contacts: The body, with ``loose`` motions, and its contacts.
+        step: The ``LoadStep``; gets its ``statics``, and has measured what is returned.
+        last: The last converged displacement, owned degrees of freedom.
+        undetermined: What to do with motions that nothing determines, "refused" or "nearest".
+        solve: Function of the step that asks the solver.
+
+    Raises:
+        ValueError: on all ranks, if nothing can hold the body, or nothing determines a motion that is to be refused.
+    """
+    from dolfinx_contact.step.statics import Statics  # of loose bodies alone
+
+    step.statics = statics = Statics(body, contacts, step, last)
+    if statics.said:
+        return unmoved(body, step, last)
+    found = None
+    if not statics.loads.any():
+        found = _floating(body, contacts, step, last)
+    pressed = np.concatenate([contact.last.reaction[:, -1] for contact in contacts])
+    if not body.largest(pressed) > 0.0:
+        statics.place()
+    found = found or solve(step)
+    if not step.errors.within(step.tol):
+        return found
+    if not statics.balanced():
+        return unmoved(body, step, last)
+    return found._replace(x=statics.settled(step, found.x, undetermined))
+
+
+def unmoved(body, step, last: np.ndarray) -> SolverResult:
+    """The last displacement with the present boundary values, judged as what it is: no solution."""
+    x, fixed = last.copy(), body.fixed
+    x[fixed] = step.b[fixed]
+    step.measure(x)
+    return SolverResult(x, 0, np.inf, "none: there is no solution")
+
+
+def _floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
+    """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
+
+    None where it touches.
+    """
+    x = last.copy()
+    x[body.fixed] = step.b[body.fixed]
+    x += body.solve(step.forces(x))
+    if may_touch(body, contacts, x) or not step.measure_open(x).within(step.tol):
+        return None
+    return SolverResult(x, 0, 0.0, NOTHING)
+
+
+def presses(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
+    return _deepest(body, contacts, trial) > CERTAIN * body.farthest(trial)
+
+
+def may_touch(body, contacts, trial: np.ndarray) -> bool:
+    """Whether a displacement without reactions penetrates a plane by more than rounding."""
+    return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
+
+
+def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> float:
+    """The deepest penetration of all contacts, at least zero, in a unit of length.  Collective."""
+    depths = [np.zeros(1)]
+    for contact in contacts:
+        contact.move(trial)
+        depths.append(-contact.gap / unit(contact))
+    return body.largest(np.concatenate(depths))
+
+
+def refined(body, step, x: np.ndarray) -> np.ndarray:
+    """The displacement without reactions, with another digit where what is left of ``b`` counts."""
+    errors = step.measure_open(x)
+    if errors.largest <= step.tol:
+        return x
+    finer = x + body.solve(step.forces(x))
+    if step.measure_open(finer).largest < errors.largest:
+        return finer
+    step.measure_open(x)
+    return x

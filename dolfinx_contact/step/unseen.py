@@ -1,0 +1,282 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps,
+contacts that are nowhere near their surface.
+
+Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
+nodes miss is an error of their forces of about ``kappa`` times that length.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.facets import Facets, facets_of, gauss
+from dolfinx_contact.results.record import Counts
+from dolfinx_contact.step.errors import NodalStiffness
+from dolfinx_contact.support.collective import raised_together
+
+# What is missed, over the largest ``r_n / kappa``, above which the user is told.
+SHARE = 1.0
+
+# A surface stands out between nodes of a round body on its own account if it does by more than so many times the body.
+ROUND = 4.0
+
+# What is rounding, over the size of a facet.
+CLEAR = 1e-6
+
+# Part of a hollow between nodes that these may be open and still count as touching.
+TOUCHING = 0.1
+
+# Smallest gap over the size of the body, and cosine between facets and a plane, from which on nothing is likely to touch.
+FAR, STEEP = 0.25, 0.1
+
+# How often points of a facet are taken about the deepest one, and by how much nearer to each other.
+CLOSER, FACTOR = 3, 0.25
+
+# In how many facets of a rank points are moved: the surface may be slow to ask for distances.
+DEEPEST = 64
+
+
+class Missed(NamedTuple):
+    """A length that the nodes of a facet miss; of two the larger one is the larger tuple."""
+
+    length: float = 0.0
+    where: tuple = ()
+    size: float = 0.0  # of the facet
+    needed: float = 0.0  # about the size that would see it
+    hollow: bool = False  # whether the surface recedes
+
+    def or_more(self, lengths, where, size, needed=0.0, hollow=False) -> Missed:
+        """This one, or the largest of those of some facets."""
+        if not lengths.size:
+            return self
+        k = int(lengths.argmax())
+        columns = (np.broadcast_to(column, lengths.shape)[k] for column in (size, needed, hollow))
+        return max(self, Missed(float(lengths[k]), tuple(where[k].tolist()), *map(float, columns)))
+
+
+class Unseen:
+    """What the nodes of some contacts cannot see.  Collective.
+
+    Nothing is set up and nothing looked at for contacts of planes with displacements of first order.
+
+    Args:
+        contacts: The contacts.
+    """
+
+    def __init__(self, contacts):
+        self._facets = {
+            contact: facets_of(contact)
+            for contact in contacts
+            if contact.surface.varies or contact.displacements.degree > 1
+        }
+        self._straight = [contact for contact in self._facets if self._is_straight(contact)]
+        self._between = [contact for contact in self._facets if contact.surface.varies]
+        self._leaps = self._apart = True  # to be looked at
+
+    def check(
+        self,
+        body,
+        contacts,
+        stiffness: list[NodalStiffness],
+        u: np.ndarray,
+        counts: Counts,
+        large: bool,
+    ) -> None:
+        """Warn, of each kind once, of what is not seen in the present state.  Collective.
+
+        Args:
+            body: The body.
+            contacts: All contacts.
+            stiffness: Of their nodes.
+            u: Displacement, degrees of freedom of this rank with those of ghosts.
+            counts: Nodes of all contacts by status.
+            large: Whether a displacement was too large, and the user told.
+        """
+        if self._facets:
+            self._check_facets(u, dict(zip(contacts, stiffness)))
+        self._check_wear(contacts, stiffness)
+        self._apart = self._apart and not large and counts.stick + counts.slip == 0
+        if self._apart and counts.open:
+            self._apart = not _check_apart(body, contacts)
+
+    def _check_facets(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
+        """What nodes of facets do not see.  Collective."""
+        for looked_at, look in ((self._straight, self._off_straight), (self._between, _between)):
+            for contact in looked_at:
+                lengths = contact.reaction[:, -1] / stiffness[contact].normal
+                pushed = contact.comm.allreduce(float(lengths.max(initial=0.0)), op=MPI.MAX)
+                worn = None if contact.wear is None else contact.everywhere(contact.wear_depth)
+                with raised_together(contact.comm):
+                    missed = look(contact, self._facets[contact], u, pushed, worn)
+                missed = max(contact.comm.allgather(missed))
+                if missed.length > max(SHARE * pushed, CLEAR * missed.size):
+                    said = _of_straight if look == self._off_straight else _of_between
+                    looked_at.clear()
+                    self._apart = self._apart and pushed > 0.0  # nothing touches, and that is why
+                    warnings.warn(said(contact, missed, pushed), stacklevel=4)
+                    break
+
+    def _check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
+        """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
+        for contact, of in zip(contacts, stiffness):
+            if not self._leaps or contact.wear is None:
+                continue
+            times, depth, where = contact.worn_in_a_leap(of)
+            if times > 1.0:
+                self._leaps = False
+                warnings.warn(
+                    f"the depth of {depth:.2g} that this step wears off at the node at {_said(where)} takes {times:.2g} times its "
+                    "reaction from it: wear opens gaps only after a step, and so runs ahead of the pressure that makes it. Divide "
+                    f"steps like this one into {int(np.ceil(times))} or more.",
+                    stacklevel=4,
+                )
+
+    def _is_straight(self, contact) -> bool:
+        """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
+        most = 0.0
+        for facets in self._facets[contact]:
+            flat = facets.at_nodes @ facets.x[:, facets.vertices]
+            off = np.linalg.norm(facets.x - flat, axis=-1) / facets.size[:, None]
+            sag = np.abs(facets.sag_at_nodes()) / facets.size[:, None]
+            most = max(most, float(np.where(off < CLEAR, sag, 0.0).max(initial=0.0)))
+        return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
+
+    def _off_straight(
+        self, contact, of: list[Facets], u: np.ndarray, pushed: float, _worn
+    ) -> Missed:
+        """How far nodes amid straight edges stand off a round body, where it touches."""
+        missed = Missed()
+        for facets in of:
+            x = _positions(contact, facets, u)
+            sag = facets.sag_at_nodes()
+            if (
+                pushed == 0.0
+            ):  # nodes that stand out of a hollow body, and touch nothing, are no harm
+                sag = np.maximum(sag, 0.0)
+            sag = np.abs(sag).max(axis=1)
+            near = _distances(contact, x).min(axis=1) <= sag
+            missed = missed.or_more(sag * near, x[:, 0], facets.size)
+        return missed
+
+
+def _check_apart(body, contacts) -> bool:
+    """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
+    smallest = -max(body.highest(-contact.gap) for contact in contacts)
+    if smallest > FAR * body.extent:
+        warnings.warn(
+            f"no node touches: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}. If that is not meant, "
+            "check place and units of the surface, the direction of loads and the facets.",
+            stacklevel=4,
+        )
+        return True
+    flat = [contact for contact in contacts if not contact.surface.curved]
+    facing = [
+        body.highest(
+            np.concatenate(
+                [[-1.0], *(-of.outwards @ contact.frame[-1] for of in facets_of(contact))]
+            )
+        )
+        for contact in flat
+    ]
+    if len(flat) < len(contacts) or max(facing) > STEEP:
+        return False
+    warnings.warn(
+        f"no node touches, and no facet of the contact faces {flat[0].surface!r}: of all the normals are across the plane's or "
+        "along it. Check the normal, which shows from the plane into the body, and the facets.",
+        stacklevel=4,
+    )
+    return True
+
+
+def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
+    """How far the surface goes into facets between nodes, or recedes between nodes that touch."""
+    missed = Missed()
+    for facets in of:
+        x = _positions(contact, facets, u)
+        gaps = _distances(contact, x)
+        opened = gaps if worn is None else gaps + worn[facets.nodes]
+        near = opened.min(axis=1) < facets.size
+        if near.any():
+            some = facets.some(near)
+            missed = _within(contact, some, x[near], gaps[near], opened[near], missed)
+    return missed
+
+
+def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
+    """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
+    half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
+    rule = 2.0 * gauss(facets.dim) - 1.0
+    for _ in range(CLOSER):
+        rows, touch = np.arange(len(x)), opened.max(axis=1)[:, None]
+        at = np.clip(centre + half * rule, 0.0, 1.0)
+        shapes = facets.shapes(at)
+        points = shapes @ x
+        there = _distances(contact, points)
+        bulge = np.einsum("mqk,mk->mq", shapes, gaps) - there
+        bulge[np.isinf(there)] = 0.0
+        above = np.einsum("mqk,mk->mq", shapes, opened)
+        hollow = np.where(touch < -TOUCHING * bulge, -bulge, 0.0)
+        sunk = bulge - np.maximum(above, 0.0)
+        own = np.abs(bulge) > ROUND * np.abs(facets.sag(facets.hats(at)))
+        lengths = np.where(own, np.maximum(sunk, hollow), 0.0)
+        k = lengths.argmax(axis=1)
+        lengths, of_all = lengths[rows, k], np.abs(bulge[rows, k])
+        part = np.divide(lengths, of_all, np.zeros(len(x)), where=of_all > 0)
+        needed = facets.size * np.sqrt(part) / 8
+        receding = hollow[rows, k] > sunk[rows, k]
+        missed = missed.or_more(lengths, points[rows, k], facets.size, needed, receding)
+        depth = bulge - above
+        some = np.argsort(-depth.max(axis=1), kind="stable")[:DEEPEST]
+        centre, half = at[some, depth[some].argmax(axis=1)][:, None], half * FACTOR
+        facets, x, gaps, opened = facets.some(some), x[some], gaps[some], opened[some]
+    return missed
+
+
+def _of_between(contact, missed: Missed, pushed: float) -> str:
+    near = f"near {_said(missed.where)}"
+    if missed.hollow:
+        does = f"recedes by {missed.length:.2g} between nodes that touch, {near}"
+    else:
+        does = f"goes {missed.length:.2g} into the body between its nodes, {near}"
+    felt = f"more than reactions push nodes in, {pushed:.2g}" if pushed else "and no node feels it"
+    return (
+        f"{contact.surface!r} {does}, {felt}: contact is asked for at nodes alone, and facets of size {missed.size:.2g} "
+        f"there do not see the surface, so that forces may be off by as much as they are large. Take facets of about "
+        f"{missed.needed:.1g} there, unless this is but a first touch that later steps leave behind."
+    )
+
+
+def _of_straight(contact, missed: Missed, pushed: float) -> str:
+    felt = f"more than reactions push nodes in, {pushed:.2g}" if pushed else "where nothing touches"
+    return (
+        f"displacements of second order on straight-sided cells of a round surface: near {_said(missed.where)} nodes between "
+        f"vertices stand {missed.length:.2g} off the round surface through these, {felt}, so that they carry too much or "
+        "nothing. Take a mesh whose cells are of second order, with curved edges, or displacements of first order, or "
+        f"smaller cells; they are {missed.size:.2g} there."
+    )
+
+
+def _said(where) -> str:
+    where = np.where(np.abs(where) < CLEAR * np.abs(where).max(), 0.0, where)
+    return f"({', '.join(f'{x:.3g}' for x in where)})"
+
+
+def _positions(contact, facets: Facets, u: np.ndarray) -> np.ndarray:
+    """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
+    return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
+
+
+def _distances(contact, x: np.ndarray) -> np.ndarray:
+    """Of positions, ``shape=(..., gdim)``, from the surface where it stands; infinite where it has none."""
+    surface = contact.surface
+    try:
+        return surface.distance(surface.relative(x.reshape(-1, x.shape[-1]))).reshape(x.shape[:-1])
+    except ValueError:  # a function that is made for the nodes alone
+        return np.full(x.shape[:-1], np.inf)

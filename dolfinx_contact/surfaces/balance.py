@@ -1,0 +1,200 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Where planes go that force drives: until the reactions at a displacement of the body are in balance with the force."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+# Steps of Newton's method, and lengths of one that are tried.
+STEPS, LENGTHS = 30, 40
+
+# What may be left of the forces on a plane, over the sum of their magnitudes: rounding.
+BALANCED = 16 * np.finfo(float).eps
+
+# Part of what is left that may come back with the other sign.
+TURNED = 0.1
+
+# Motion over that with which the last node begins to slip, after which all slip in its direction.
+TURNING = 1e3
+
+# Part of a motion that carries a node along its surface; of less the node says nothing about where all slip.
+CARRIED = 0.5
+
+# Part of the nodes' stiffness that is added to tangents: where all nodes slip, or too few touch, these have none.
+REGULAR = 1e-10
+
+
+class SurfaceBalance:
+    """The equilibrium of planes at a displacement, in their motions alone: a few unknowns, products at contact nodes.
+
+    Args:
+        planes: The ``DrivenPlanes``.
+        body: The body, for sums over ranks.
+        x: Displacement of owned degrees of freedom.
+        maps: Of the contacts, see ``maps.py``.
+        asked: Function that yields the contacts, each with the reactions that the body asks for.
+    """
+
+    def __init__(self, surfaces, body, x, maps, asked):
+        self._surfaces, self._body, self._x, self._maps, self._asked = (
+            surfaces,
+            body,
+            x,
+            maps,
+            asked,
+        )
+
+    def reach(self) -> None:
+        """Move the planes into equilibrium, or as near as Newton's method comes.  Collective."""
+        surfaces, limits = self._surfaces, None
+        if surfaces.plain:
+            for motion in np.flatnonzero(surfaces.pressing):
+                self._press(motion)
+        elif surfaces.pressing.any():
+            self._press_together()
+        left, size = self._response()
+        for _ in range(STEPS):
+            if (np.abs(left) <= BALANCED * size).all():
+                return
+            if limits is None:
+                limits = self._limits()
+            both = zip(self._asked(), self._maps)
+            derivatives = [contact.respond_with_derivatives(self._x, map) for contact, map in both]
+            change = np.linalg.solve(surfaces.tangent(derivatives), -left)
+            room = np.where(change > 0, limits[1] - surfaces.moved, surfaces.moved - limits[0])
+            within = np.divide(room, np.abs(change), np.ones(surfaces.count), where=change != 0)
+            change *= min(max(within.min(), 0.0), 1.0)
+            before = np.linalg.norm(left)
+            left, size = self._step(change, left)
+            if np.linalg.norm(left) >= before:
+                return
+
+    def _response(self) -> tuple[np.ndarray, np.ndarray]:
+        """What is left of the forces on planes, and the size of its terms."""
+        for contact, map in zip(self._asked(), self._maps):
+            contact.respond(self._x, map)
+        return self._surfaces.left()
+
+    def _step(self, change: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Go along a change as far as what is left falls and does not turn round; what is left then.
+
+        Where nodes slip reactions do not grow with the motion, and a whole step would go far beyond the solution.
+        """
+        start, size_before = self._surfaces.moved, np.linalg.norm(before)
+        low, high, length = 0.0, 1.0, 1.0
+        for _ in range(LENGTHS):
+            self._surfaces.move_to(start + length * change)
+            left, size = self._response()
+            turned = before @ left < -TURNED * size_before**2
+            if not turned and np.linalg.norm(left) < size_before:
+                return left, size
+            if not turned and length == 1.0:
+                break
+            low, high = (low, length) if turned else (length, high)
+            length = (low + high) / 2
+        self._surfaces.move_to(start)
+        return self._response()
+
+    def _limits(self) -> np.ndarray:
+        """Smallest and largest motions along planes, beyond which all nodes slip (nearly) the same way.  Collective.
+
+        Returns:
+            ``shape=(2, m)``, infinite along normals and where a spring holds.
+        """
+        surfaces = self._surfaces
+        limits = np.full((2, surfaces.count), -np.inf)
+        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
+            contact.move(self._x)
+            springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
+            pressure = np.maximum(contact.reaction[:, -1] - map.normal * contact.gap, 0.0)
+            bound = contact.friction.mu.max(axis=-1) * pressure
+            carried = np.where(np.abs(axes[:, :-1]) >= CARRIED, axes[:, :-1], 0.0)
+            node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
+            rate, way = springs[node, row], carried[node, row, motion]
+            middle = (contact.slip_increment[node, row] - contact.reaction[node, row] / rate) / way
+            # In three dimensions directions go on turning to that of the motion.
+            width = (1.0 if contact.points.dim == 2 else TURNING) * bound[node] / (rate * abs(way))
+            for side, sign in enumerate((-1, 1)):
+                np.maximum.at(limits[side], motion, width + sign * middle)
+        self._body.comm.Allreduce(MPI.IN_PLACE, limits, op=MPI.MAX)
+        limits[0] *= -1
+        limits += surfaces.moved
+        endless = ~np.isfinite(limits).all(axis=0) | (surfaces.springs > 0) | surfaces.pressing
+        limits[:, endless] = np.array([[-np.inf], [np.inf]])
+        return limits
+
+    def _press(self, motion: int) -> None:
+        """Move a plane along its normal until predictors ``max(r_n - rho x_n, 0)`` are in balance.
+
+        Their sum grows with the motion, piecewise linear and convex: Newton's method comes down to the only solution.
+        """
+        surfaces, total = self._surfaces, self._body.total
+        parts = [np.zeros((2, 0))]
+        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
+            contact.move(self._x)
+            pressure = contact.reaction[:, -1] - map.normal * contact.gap
+            parts.append(np.array([pressure, map.normal])[:, axes[:, -1, motion] > 0])
+        at_first, rho = np.concatenate(parts, axis=1)
+        spring, target, moved = surfaces.springs[motion], surfaces.driving()[motion], 0.0
+        for _ in range(STEPS):
+            pressure = np.maximum(at_first + rho * moved, 0.0)
+            force, slope = total([pressure.sum(), rho[pressure > 0].sum()])
+            if slope + spring == 0.0:  # nothing touches: as far as one node alone would need
+                alone = ((target - at_first) / rho).min(initial=np.inf)
+                moved = self._body.comm.allreduce(float(alone), op=MPI.MIN)
+                continue
+            left = force + spring * moved - target
+            if abs(left) <= BALANCED * (force + abs(target) + spring * abs(moved)):
+                break
+            moved -= left / (slope + spring)
+        if moved != 0.0:
+            surfaces.move_to(surfaces.moved + moved * np.eye(surfaces.count)[motion])
+
+    def _press_together(self) -> None:
+        """Move planes until predictors ``max(r_n - rho x_n, 0)`` are in balance along all motions that these resist.
+
+        The forces are the gradient of a convex function, the energy of springs ``rho``: Newton's method, in steps along
+        which it falls.
+        """
+        surfaces, total = self._surfaces, self._body.total
+        which = np.flatnonzero(surfaces.pressing)
+        parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
+        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
+            contact.move(self._x)
+            parts.append(np.array([contact.reaction[:, -1] - map.normal * contact.gap, map.normal]))
+            columns.append(axes[:, -1, which])
+        (at_first, rho), D = np.concatenate(parts, axis=1), np.concatenate(columns)
+        springs, target, n = surfaces.springs[which], surfaces.driving()[which], which.size
+
+        def energy(moved):
+            pressure = np.maximum(at_first + rho * (D @ moved), 0.0)
+            stored = float(total([(pressure**2 / (2 * rho)).sum()])[0])
+            return stored + moved @ (springs * moved / 2 - target), pressure
+
+        most = total(np.einsum("ni,n,nj->ij", D, rho, D)) + np.diag(springs)
+        moved, least = np.zeros(n), energy(np.zeros(n))
+        for _ in range(STEPS):
+            pressure, active = least[1], rho * (least[1] > 0)
+            sums = np.concatenate(
+                (pressure @ D, pressure @ np.abs(D), np.einsum("ni,n,nj->ij", D, active, D).ravel())
+            )
+            force, size, slope = np.split(total(sums), [n, 2 * n])
+            left = force + springs * moved - target
+            if (np.abs(left) <= BALANCED * (size + np.abs(target) + springs * np.abs(moved))).all():
+                break
+            slope = slope.reshape(n, n) + np.diag(springs) + REGULAR * most
+            change, length = -np.linalg.solve(slope, left), 1.0
+            while length > 2.0**-LENGTHS:
+                following = energy(moved + length * change)
+                if following[0] < least[0]:
+                    break
+                length /= 2
+            else:
+                break
+            moved, least = moved + length * change, following
+        if moved.any():
+            whole = np.zeros(surfaces.count)
+            whole[which] = moved
+            surfaces.move_to(surfaces.moved + whole)

@@ -1,0 +1,292 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What drives a rigid surface: free motions, and the forces, moments and springs that these are balanced with."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.support.attributes import Guarded, frozen, whole
+from dolfinx_contact.support.checks import finite
+
+# Part by which guides may miss unit length and right angles: half of the digits.
+SQUARE = 1e-8
+
+
+class Motion(NamedTuple):
+    """One free motion of a surface."""
+
+    name: str
+    axis: np.ndarray  # unit vector, global frame; of a rotation in two dimensions one
+    turns: bool
+    spring: float  # force per length, moment per radian
+
+
+def vector(name: str, value, size: int | None = None) -> np.ndarray:
+    """A vector of finite real numbers, as floats."""
+    try:
+        array = np.asarray(value)
+        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
+    except ValueError:  # ragged nesting
+        real = False
+    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
+        wanted = "2 or 3" if size is None else str(size)
+        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {value!r}.")
+    return array.astype(np.float64)
+
+
+class Drive(Guarded):
+    """Forces that drive a surface, which has ``point``, ``displacement``, ``rotation`` and axes of its free motions.
+
+    sum of the reactions = force + stiffness (drive - displacement),
+    sum of their moments about the point = moment - stiffness rotation.
+    """
+
+    def __init__(self, point: np.ndarray) -> None:
+        self.point = frozen(point)
+        size = point.size
+        self._displacement = frozen(np.zeros(size))
+        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
+        self._drive = frozen(np.zeros(size))
+        self._free: tuple[str, ...] = ()
+        self._held: tuple[str, ...] = ()
+        self._past_held = 0.0
+        self._ever_free = False  # or said that it is not, although a force is given
+        self._force: np.ndarray | None = None
+        self._moment: np.ndarray | None = None
+        self._stiffness = frozen(np.zeros(1))
+        self._spin: np.ndarray | None = None
+        self._taken = self._since = 0  # the problem that drove it last, and when
+
+    def take(self, problem: int, now: int) -> None:
+        """Let a problem step with the surface: what force has moved belongs to the problem that drove it last.
+
+        Args:
+            problem: Its number; problems made later have larger ones.
+            now: A number larger than that of any problem so far.
+
+        Raises:
+            ValueError: another problem has driven it since this one was made.
+        """
+        if problem != self._taken and problem < self._since:
+            raise ValueError(
+                f"{self} is driven by force in another ContactProblem, whose motion this one would take for its own: "
+                "make a surface and a Contact for each problem."
+            )
+        if self._free or self._taken:
+            self._taken, self._since = problem, now
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Names of the directions along which the surface may be free, the rows of ``drive_axes``."""
+        return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
+
+    @property
+    def turnings(self) -> tuple[str, ...]:
+        """Names of the rotations that may be free, about these directions."""
+        return ("r",) if self.point.size == 2 else tuple(f"r{name[-1]}" for name in self.directions)
+
+    @property
+    def drive_axes(self) -> np.ndarray:
+        """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
+        raise NotImplementedError
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Motions that forces drive, see docs/force.md: names among ``directions`` and ``turnings``, in the order given; none at first."""
+        return self._free
+
+    @free.setter
+    def free(self, names: Sequence[str]) -> None:
+        known = self.directions + self.turnings
+        if not isinstance(names, (tuple, list)) or any(name not in known for name in names):
+            raise ValueError(
+                f"surface.free must be a tuple of names among {known}, such as ({self.directions[-1]!r},), got {names!r}."
+            )
+        self._free = tuple(dict.fromkeys(names))
+        self._ever_free = self._ever_free or bool(self._free)
+
+    @property
+    def force(self) -> np.ndarray | None:
+        """Force of the surface on the bodies at its point, ``shape=(gdim,)``, global frame; None is no force."""
+        return whole("surface.force", self._force)
+
+    @force.setter
+    def force(self, value: ArrayLike | None) -> None:
+        size = self.point.size
+        self._force = None if value is None else frozen(vector("surface.force", value, size))
+
+    @property
+    def moment(self) -> np.ndarray | None:
+        """Moment of the surface on the bodies about its point, ``shape=(3,)``, in 2-D one number; None is zero."""
+        return whole("surface.moment", self._moment)
+
+    @moment.setter
+    def moment(self, value: ArrayLike | None) -> None:
+        if value is not None:
+            size = self._rotation.size
+            value = frozen(vector("surface.moment", np.atleast_1d(value), size))
+        self._moment = value
+
+    @property
+    def stiffness(self) -> np.ndarray | dict[str, float]:
+        """Of springs that pull the surface, by the name of the free motion; or one number for all of them, or one for each in the
+        order of ``free``.  Zero, a dead load, at first and for what is not named."""
+        return dict(self._stiffness) if isinstance(self._stiffness, dict) else self._stiffness
+
+    @stiffness.setter
+    def stiffness(self, value: Mapping[str, float] | ArrayLike) -> None:
+        names, known = None, self.directions + self.turnings
+        if isinstance(value, Mapping):
+            names = tuple(value)
+            if any(name not in known for name in names):
+                raise ValueError(
+                    f"surface.stiffness must name springs by free motions, among {known}, got {value!r}."
+                )
+        array = finite("surface.stiffness", value if names is None else list(value.values()))
+        array = np.atleast_1d(array)
+        if array.ndim != 1 or array.size > len(known) or not (array >= 0).all():
+            raise ValueError(
+                f"surface.stiffness must be numbers, zero or more, by name, such as {{{self.directions[0]!r}: 200.0}}, or "
+                f"one for all free motions, got {value!r}."
+            )
+        self._stiffness = frozen(array) if names is None else dict(zip(names, array.tolist()))
+
+    @property
+    def drive(self) -> np.ndarray:
+        """Displacement of the springs' far end, ``shape=(gdim,)``, global frame."""
+        return whole("surface.drive", self._drive)
+
+    @drive.setter
+    def drive(self, value: ArrayLike) -> None:
+        self._drive = frozen(vector("surface.drive", value, self.point.size))
+
+    @property
+    def springs(self) -> np.ndarray:
+        """Stiffness of the spring of each free motion, in the order of ``free``, ``shape=(m,)``, force per length or moment per radian."""
+        if isinstance(self._stiffness, dict):
+            return np.array([self._stiffness.get(name, 0.0) for name in self._free])
+        return np.broadcast_to(self._stiffness, len(self._free))
+
+    @property
+    def spins(self) -> bool:
+        """Whether a rotation is free."""
+        return any(name in self.turnings for name in self._free)
+
+    @property
+    def spin(self) -> np.ndarray | None:
+        """Rotation that the step at hand has found, radians, a small one; None if there is none, and between steps."""
+        return self._spin
+
+    def spin_by(self, angle: np.ndarray | None) -> None:
+        """Turn within a step, for which frames stay those of its start."""
+        self._spin = angle
+
+    def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
+        """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held_planes.py``."""
+        self._held, self._past_held = names, past
+
+    @property
+    def past_held(self) -> float:
+        """The sign of a plane's motion past nodes that cannot hold it; zero if there is none."""
+        return self._past_held
+
+    @property
+    def motions(self) -> list[Motion]:
+        """The free motions that no contact nodes hold, rotations first."""
+        if not self._free:
+            return []
+        axes = self.drive_axes
+        about = np.ones((1, 1)) if self.point.size == 2 else axes
+        springs = dict(zip(self._free, self.springs.tolist()))
+        springs = {name: k for name, k in springs.items() if name not in self._held}
+        turns = [
+            Motion(name, axis, True, springs[name])
+            for name, axis in zip(self.turnings, about)
+            if name in springs
+        ]
+        return turns + [
+            Motion(name, axis, False, springs[name])
+            for name, axis in zip(self.directions, axes)
+            if name in springs
+        ]
+
+    def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
+        """Force or moment that drives each motion where the surface is; or the size of the terms that add up to it."""
+        size = np.abs if magnitudes else np.asarray
+        less = np.add if magnitudes else np.subtract
+        force = np.zeros(self.point.size) if self._force is None else self._force
+        moment = np.zeros(self._rotation.size) if self._moment is None else self._moment
+        stretched = less(size(self._drive), size(self._displacement))
+        turned = size(self._rotation) + (0.0 if self._spin is None else size(self._spin))
+        back = less(np.zeros_like(turned), turned)
+        terms = [(moment, back) if m.turns else (force, stretched) for m in motions]
+        return np.array(
+            [size(m.axis) @ size(f) + m.spring * (size(m.axis) @ way) for m, (f, way) in zip(motions, terms)]
+        )  # fmt: skip
+
+    def driven(self) -> str:
+        """What drives the surface, in words."""
+        given = (self._free, self._force, self._stiffness, self._drive)
+        if self.spins:
+            given += (self._moment,)
+        return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
+
+    def check_drive(self) -> None:
+        """Raise a ``ValueError`` if no force drives what is free, or a plane would leave the body."""
+        self._check_springs()
+        if not self._ever_free and not (self._force is None and self._moment is None):
+            self._ever_free = True
+            warnings.warn(
+                f"surface.force is {self._force} and surface.moment {self._moment}, but surface.free is (): no force moves the "
+                "plane, it stands where surface.displacement puts it. Name the directions that force drives, such as "
+                f"surface.free = ({self.directions[-1]!r},), if that is not meant.",
+                stacklevel=2,
+            )
+        moving = [motion for motion in self.motions if not motion.turns]
+        if not moving or (self._force is None and all(motion.spring > 0 for motion in moving)):
+            return
+        if self._force is None:
+            raise ValueError(
+                f"surface.free is {self._free}, but neither surface.force nor surface.stiffness drives all of them: set "
+                "surface.force."
+            )
+        self._check_pressing(moving[-1])
+
+    def _check_springs(self) -> None:
+        """Raise a ``ValueError`` if numbers without names do not tell which spring is which."""
+        count, stiffness = len(self._free), self._stiffness
+        if isinstance(stiffness, dict):
+            return
+        if stiffness.size not in (1, count):
+            raise ValueError(
+                f"surface.stiffness has {stiffness.size} numbers, surface.free {count} names: name the springs, such as "
+                f"surface.stiffness = {{{self.directions[0]!r}: 200.0}}."
+            )
+        if self.spins and stiffness.size == 1 < count and stiffness.any():
+            raise ValueError(
+                f"surface.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
+                "one for each, by name."
+            )
+
+    def _check_pressing(self, motion: Motion) -> None:
+        """Raise a ``ValueError`` if the force pulls a surface off bodies, which that of a plane may say beforehand."""
+
+
+def check_guides(value: ArrayLike, size: int) -> np.ndarray:
+    """Orthonormal directions, ``shape=(size, size)``, orthonormal to the last digit."""
+    rows = finite("surface.guides", value)
+    square = rows.shape == (size, size)
+    if not square or np.abs(rows @ rows.T - np.eye(size)).max() > SQUARE:
+        raise ValueError(
+            f"surface.guides must be {size} directions of unit length at right angles, one a row, got {value!r}."
+        )
+    left, _, right = np.linalg.svd(rows)
+    return frozen(left @ right)

@@ -1,0 +1,168 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Rigid surfaces given by a function of position: a signed distance, or any function that is zero on the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from ufl.core.expr import Expr
+
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.checks import finite
+from dolfinx_contact.surfaces.drive import vector
+from dolfinx_contact.surfaces.round import CurvedSurface
+from dolfinx_contact.surfaces.surface import unit
+from dolfinx_contact.surfaces.ufl_distance import by_ufl, is_ufl
+
+# Step of central differences over the size of the nodes' positions: rounding and truncation alike.
+STEP = float(np.cbrt(np.finfo(float).eps))
+
+# Part of its length by which a gradient may be off differences: as far as those of values in single precision may be.
+APART = 0.05
+
+# A gradient is none if it is that much smaller than the largest one.
+FLAT = 1e-12
+
+
+class RigidSurface(CurvedSurface):
+    """A rigid surface given by its signed distance, driven by displacement, rotation or force.
+
+    Any smooth function does that is zero on the surface and positive where the body may be: gaps are its value over the
+    length of its gradient, which on the surface, and for a distance everywhere, is exact.  Within a step a node feels the
+    tangent plane where the node was at the start of the step, see docs/surfaces.md.
+
+    Args:
+        distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface, global components
+            as long as it stands where it was made; gives ``shape=(n,)``.  Or a scalar expression of UFL in
+            ``SpatialCoordinate``, numbers and ``Constant`` of any mesh; its gradient is then UFL's.
+        point: About which it rotates, at which force acts, ``shape=(gdim,)``, global frame, length units.
+        gradient: Function of the same positions that gives the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
+            central differences, exact to ten digits.  A Contact compares it with differences at its nodes.
+        axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
+            unless friction is isotropic or the body two-dimensional.
+
+    Raises:
+        ValueError: vectors that make no sense, or what is no function.
+
+    Attributes:
+        point, axis: As given, ``axis`` of unit length; read-only.
+        displacement, rotation, free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+
+    Example:
+        >>> bump = dc.RigidSurface(lambda x: x[2] + 0.1 * (x[0] ** 2 + 2 * x[1] ** 2), point=(0, 0, 0), axis=(1, 0, 0))
+        >>> on_bump = dc.Contact(V, foot, bump, friction)
+    """
+
+    def __init__(
+        self,
+        distance: Callable[[np.ndarray], ArrayLike] | Expr,
+        point: ArrayLike = (0.0, 0.0, 0.0),
+        gradient: Callable[[np.ndarray], ArrayLike] | None = None,
+        axis: ArrayLike | None = None,
+    ) -> None:
+        super().__init__(vector("point", point))
+        self._derived = gradient is None  # and nothing to be checked
+        if is_ufl(distance):
+            if gradient is not None:
+                raise ValueError(
+                    "gradient must be None where distance is in UFL, which derives it."
+                )
+            distance, gradient = by_ufl(distance, self.point.size)
+            self._derived = True
+        for name, function in (("distance", distance), ("gradient", gradient)):
+            if not (callable(function) or function is gradient is None):
+                raise ValueError(f"{name} must be a function of positions, got {function!r}.")
+        self._values, self._gradient = distance, gradient
+        if axis is not None:
+            self.axis = frozen(unit("axis", axis, self.point.size))
+        self._made = True
+
+    def _of(self, name: str, function, y: np.ndarray, shape) -> np.ndarray:
+        values = finite(f"the values of {name}", function(y.T.copy()))
+        if values.shape != shape:
+            raise ValueError(
+                f"{name} of RigidSurface must give shape {shape} for positions of shape {y.T.shape}, not {values.shape}."
+            )
+        return values
+
+    def _slopes(self, y: np.ndarray) -> np.ndarray:
+        """Gradient at positions, ``shape=(n, gdim)``."""
+        if self._gradient is not None:
+            return self._of("gradient", self._gradient, y, y.T.shape).T
+        after, before = self._beside(y, 1), self._beside(y, -1)
+        return (after[0] - before[0]) / (after[1] - before[1])
+
+    def _beside(self, y: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+        """Values a small step along each axis from positions, and the coordinates there, ``shape=(n, gdim)`` each."""
+        step = STEP * (np.abs(y - self.point).max(initial=0.0) or 1.0)
+        moved = [y + side * shift for shift in step * np.eye(y.shape[1])]
+        values = [self._of("distance", self._values, z, y.shape[:1]) for z in moved]
+        return np.column_stack(values), np.column_stack([z[:, k] for k, z in enumerate(moved)])
+
+    def check_at(self, y: np.ndarray) -> None:
+        """See ``Surface``: compare the gradient given with differences of the distance.
+
+        Where slopes jump any between those of both sides will do.
+
+        Raises:
+            ValueError: it has another sign, direction or length.
+        """
+        if self._derived or not len(y):
+            return
+        given, here = self._slopes(y), self._of("distance", self._values, y, y.shape[:1])
+        try:
+            sides = [self._beside(y, side) for side in (1, -1)]
+        except ValueError:  # beside these positions the function has no values
+            return
+        found = np.array([(values - here[:, None]) / (at - y) for values, at in sides])
+        off = np.linalg.norm(given - np.clip(given, found.min(axis=0), found.max(axis=0)), axis=1)
+        lengths = np.linalg.norm([given, *found], axis=2).max(axis=0)
+        wrong = off > APART * lengths
+        if wrong.any():
+            k = int(np.argmax(wrong * off))
+            raise ValueError(
+                f"gradient of RigidSurface is {given[k].tolist()} at {y[k].tolist()}, relative to it, where differences of "
+                f"distance are {found.mean(axis=0)[k].tolist()}: give the derivatives of distance, with their signs and "
+                "length, or leave gradient out."
+            )
+
+    def distance(self, y: np.ndarray) -> np.ndarray:
+        """Value over the length of the gradient, ``shape=(n,)``."""
+        if not len(y):
+            return np.zeros(0)
+        return self._of("distance", self._values, y, y.shape[:1]) / self._lengths(
+            y, self._slopes(y)
+        )
+
+    def normals(self, y: np.ndarray) -> np.ndarray:
+        """Along the gradient, ``shape=(n, gdim)``.
+
+        Raises:
+            ValueError: a position where there is no gradient.
+        """
+        if not len(y):
+            return np.zeros_like(y)
+        slopes = self._slopes(y)
+        return slopes / self._lengths(y, slopes)[:, None]
+
+    def _lengths(self, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        lengths = np.linalg.norm(slopes, axis=1)
+        if not (lengths > FLAT * lengths.max()).all():
+            at = y[np.argmin(lengths)].tolist()
+            raise ValueError(
+                f"distance of RigidSurface has no gradient at {at}, relative to it: there is no normal."
+            )
+        return lengths
+
+    def described(self) -> np.ndarray:
+        """Point and axis; what the function is nobody knows."""
+        return np.concatenate(
+            (self.point, np.zeros(self.point.size) if self.axis is None else self.axis)
+        )
+
+    def __repr__(self) -> str:
+        axis = None if self.axis is None else self.axis.tolist()
+        return f"RigidSurface(distance=..., point={self.point.tolist()}, axis={axis})"

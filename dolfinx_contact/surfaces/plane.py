@@ -1,0 +1,154 @@
+"""Rigid planes: position, normal and the directions in which friction is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.checks import finite
+from dolfinx_contact.surfaces.surface import Surface, unit
+
+
+class RigidPlane(Surface):
+    """A rigid plane on which bodies press and slide, driven by displacement or by force.
+
+    Along the directions in ``free`` the plane moves until its forces are in equilibrium, see docs/force.md:
+
+        sum of the reactions = force + stiffness (drive - displacement).
+
+    Args:
+        point: Any point of the plane, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
+        normal: Direction towards the side where the body may be, ``shape=(gdim,)``; need not be of
+            unit length.
+        axis: First principal friction direction, ``shape=(gdim,)``; made orthogonal to the normal.
+            Needed unless friction is isotropic or the body two-dimensional.
+        height: None, or a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the plane: the
+            waviness of its face, ``shape=(n,)``, length units, whose slopes are neglected.
+
+    Raises:
+        ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
+
+    Attributes:
+        point, normal, axis: As given, the latter two of unit length; read-only.
+        displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global
+            frame, length units; zero at first, a read-only array.  Assign another one between steps: the plane
+            moves, and slip is relative to it.  Along free directions a step finds it.
+        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.
+            Assigned between steps: normal and axis turn with the plane, and slip is relative to it.
+        free: Directions of the frame along which a force drives the plane, a tuple of "t1", "t2" and "n", in two
+            dimensions of "t" and "n", and rotations about these, "r1", "r2", "rn", in two dimensions "r"; none at first.
+        force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Its components along
+            directions that are not free do not count: a guide carries the rest.
+        moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
+            dimensions one number, global frame; None is zero.
+        stiffness: Of springs that pull the plane along free directions, by name, ``{"t1": 200.0}``: force per length, of
+            rotations moment per radian.  Or one number for all free directions, or one for each in the order of ``free``.  Zero,
+            a dead load, at first and for directions without a name.
+        drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
+
+    Example:
+        >>> plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
+        >>> plane.displacement = (0, 0, 0.01)  # driven by displacement
+        >>> plane.free, plane.force = ("n",), (0, 0, 500)  # or by force: 500 N on the body
+    """
+
+    _settable = ("displacement", "rotation", "free", "force", "moment", "stiffness", "drive")
+    _remedy = "make a new RigidPlane and a new Contact; surface.displacement and surface.rotation move a plane."
+
+    def __init__(
+        self,
+        point: ArrayLike,
+        normal: ArrayLike,
+        axis: ArrayLike | None = None,
+        height: Callable[[np.ndarray], ArrayLike] | None = None,
+    ) -> None:
+        super().__init__(point)
+        size = self.point.size
+        if not (height is None or callable(height)):
+            raise ValueError(f"height must be a function of positions, got {height!r}.")
+        self.height, self.varies = height, height is not None
+        self.normal = frozen(unit("normal", normal, size))
+        if axis is not None:
+            along = unit("axis", axis, size)
+            across = along - (along @ self.normal) * self.normal
+            if np.linalg.norm(across) < 1e-8:  # half of the digits: the direction would be noise
+                raise ValueError(
+                    f"axis {axis!r} is parallel to the normal {normal!r}: give the first principal "
+                    "friction direction, which lies in the plane."
+                )
+            across /= np.linalg.norm(across)
+            across -= (across @ self.normal) * self.normal  # once more, for a nearly parallel axis
+            self.axis = frozen(across / np.linalg.norm(across))
+        self._made = True
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Names of the rows of ``frame``."""
+        return ("t", "n") if self.point.size == 2 else ("t1", "t2", "n")
+
+    @property
+    def drive_axes(self) -> np.ndarray:
+        """The rows of ``frame``."""
+        return self.frame
+
+    def _check_pressing(self, motion) -> None:
+        """See ``Drive``."""
+        pressing = float(self._force @ self.frame[-1])
+        if motion.name == "n" and motion.spring == 0 and pressing <= 0:
+            raise ValueError(
+                f"surface.force {self._force.tolist()} does not press the plane on the body: its component along the "
+                f"normal is {pressing:g}, must be positive, and nothing else holds the plane. It is the force of the "
+                "plane on the body; a spring, surface.stiffness, also pulls."
+            )
+
+    @property
+    def frame(self) -> np.ndarray:
+        """Rows (t1, t2, n) in three dimensions, (t, n) in two; global components, orthonormal.
+
+        Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal.
+        In two dimensions t is the normal turned by -90 degrees.  They turn with the plane.
+        """
+        return self.turned(self._frame)
+
+    @cached_property
+    def _frame(self) -> np.ndarray:
+        """The frame as long as the plane is not turned."""
+        n = self.normal
+        if n.size == 2:
+            return frozen(np.array([[n[1], -n[0]], n]))
+        t1 = self.axis
+        if t1 is None:
+            t1 = np.eye(3)[np.argmin(np.abs(n))]
+            t1 = t1 - (t1 @ n) * n
+            t1 /= np.linalg.norm(t1)
+        return frozen(np.array([t1, np.cross(n, t1), n]))
+
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """The same frame at all positions, ``shape=(gdim, gdim)``."""
+        return self._frame
+
+    def distance(self, y: np.ndarray) -> np.ndarray:
+        """Distance to the plane, ``shape=(n,)``, less the height of its face."""
+        flat = (y - self.point) @ self.normal
+        if self.height is None or not len(y):
+            return flat
+        height = finite("the values of plane.height", self.height(y.T.copy()))
+        if height.shape not in ((), flat.shape):
+            raise ValueError(
+                f"plane.height must give one value per point, shape {flat.shape}, for y of shape {y.T.shape}, not "
+                f"{height.shape}."
+            )
+        return flat - height
+
+    def described(self) -> np.ndarray:
+        """Point and frame."""
+        return np.concatenate((self.point, self._frame.ravel()))
+
+    def __repr__(self) -> str:
+        axis = None if self.axis is None else self.axis.tolist()
+        height = "" if self.height is None else ", height=..."
+        return f"RigidPlane(point={self.point.tolist()}, normal={self.normal.tolist()}, axis={axis}{height})"

@@ -1,0 +1,198 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Rigid spheres, circles and cylinders, from outside and from inside."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.checks import positive
+from dolfinx_contact.surfaces.drive import vector
+from dolfinx_contact.surfaces.surface import Surface, unit
+
+# Part of the radius within which a position has no direction from the centre; of a direction that has to be tangential.
+NEAR, ALONG = 1e-9, 1e-8
+
+# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent.
+TIES = 9
+
+
+class CurvedSurface(Surface):
+    """A surface with a normal at every position."""
+
+    curved = varies = True
+
+    def normals(self, y: np.ndarray) -> np.ndarray:
+        """Unit normals towards the side where the body may be, ``shape=(n, gdim)``."""
+        raise NotImplementedError
+
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
+
+        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
+
+        Raises:
+            ValueError: an axis along the normal of a position.
+        """
+        n = self.normals(y)
+        if n.shape[1] == 2:
+            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
+        axis = (
+            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
+            if self.axis is None
+            else self.axis
+        )
+        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
+        length = np.linalg.norm(t1, axis=1)
+        if (length < ALONG).any():
+            at = y[np.argmin(length)].tolist()
+            raise ValueError(
+                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
+                "another first principal friction direction."
+            )
+        t1 /= length[:, None]
+        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
+        t1 /= np.linalg.norm(t1, axis=1)[:, None]
+        return np.stack((t1, np.cross(n, t1), n), axis=1)
+
+
+class _Round(CurvedSurface):
+    """A surface of given distance from a point or a line."""
+
+    def __init__(self, point, radius, inside) -> None:
+        super().__init__(point)
+        self.radius = positive("radius", radius, finite=True)
+        if not isinstance(inside, (bool, np.bool_)):
+            raise ValueError(f"inside must be True or False, got {inside!r}.")
+        self.inside = bool(inside)
+
+    def _arms(self, y: np.ndarray) -> np.ndarray:
+        """From the centre or the cylinder's axis to positions."""
+        return y - self.point
+
+    def distance(self, y: np.ndarray) -> np.ndarray:
+        """``|y - c| - R``, from inside ``R - |y - c|``, ``shape=(n,)``."""
+        outside = np.linalg.norm(self._arms(y), axis=1) - self.radius
+        return -outside if self.inside else outside
+
+    def normals(self, y: np.ndarray) -> np.ndarray:
+        """Away from the centre, from inside towards it, ``shape=(n, gdim)``.
+
+        Raises:
+            ValueError: a position at the centre.
+        """
+        arms = self._arms(y)
+        length = np.linalg.norm(arms, axis=1)
+        if (length <= NEAR * self.radius).any():
+            at = y[np.argmin(length)].tolist()
+            raise ValueError(
+                f"a contact node is at the centre of {self}, {at} relative to it, where there is no normal: let its facets "
+                "be those near the surface."
+            )
+        return arms / (-length if self.inside else length)[:, None]
+
+    def _numbers(self, *more) -> np.ndarray:
+        sign = -1.0 if self.inside else 1.0
+        return np.concatenate((self.point, [sign * self.radius], *more))
+
+
+class RigidSphere(_Round):
+    """A rigid sphere, in two dimensions a circle, driven by displacement and rotation.
+
+    Within a step a node feels the plane that touches the sphere where the node was at the start of the step, see
+    docs/surfaces.md.
+
+    Args:
+        centre: Its centre, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
+        radius: Of the sphere, length units.
+        axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
+            unless friction is isotropic or the body two-dimensional.
+        inside: Whether the body is inside, in a spherical socket.
+
+    Raises:
+        ValueError: vectors or a radius that make no sense.
+
+    Attributes:
+        point, radius, axis, inside: As given, ``point`` the centre, ``axis`` of unit length; read-only.
+        displacement: From the first position, ``shape=(gdim,)``, global frame, length units; assign another one
+            between steps.
+        rotation: About the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle.
+        free, force, moment, stiffness, drive: As of ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
+            dimensions "x", "y", "r", along and about ``guides``.
+        guides: Directions of these names, one a row, ``shape=(gdim, gdim)``, global frame; do not turn.
+
+    Example:
+        >>> ball = dc.RigidSphere(centre=(0.5, 0.5, -2), radius=2, axis=(1, 0, 0))
+        >>> on_ball = dc.Contact(V, foot, ball, friction)
+        >>> ball.displacement = (0, 0, 0.01)  # before the next step
+    """
+
+    def __init__(self, centre: ArrayLike, radius: float, axis: ArrayLike | None = None, inside: bool = False) -> None:  # fmt: skip
+        super().__init__(vector("centre", centre), radius, inside)
+        if axis is not None:
+            self.axis = frozen(unit("axis", axis, self.point.size))
+        self._made = True
+
+    def described(self) -> np.ndarray:
+        """Centre, radius, negative from inside, and axis."""
+        return self._numbers(np.zeros(self.point.size) if self.axis is None else self.axis)
+
+    def __repr__(self) -> str:
+        axis = None if self.axis is None else self.axis.tolist()
+        return f"RigidSphere(centre={self.point.tolist()}, radius={self.radius}, axis={axis}, inside={self.inside})"
+
+
+class RigidCylinder(_Round):
+    """A rigid cylinder without ends, driven by displacement and rotation; in two dimensions take ``RigidSphere``.
+
+    Its axis is the first principal friction direction.  Within a step a node feels the plane that touches the cylinder
+    where the node was at the start of the step, see docs/surfaces.md.
+
+    Args:
+        point: Any point of its axis, ``shape=(3,)``, global frame, length units.
+        axis: Direction of its axis, ``shape=(3,)``; need not be of unit length.
+        radius: Of the cylinder, length units.
+        inside: Whether the body is inside, in a bore.
+
+    Raises:
+        ValueError: vectors or a radius that make no sense.
+
+    Attributes:
+        point, axis, radius, inside: As given, ``axis`` of unit length; read-only.
+        displacement: From the first position, ``shape=(3,)``, global frame, length units; assign another one between
+            steps.
+        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``.
+        free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+
+    Example:
+        >>> roll = dc.RigidCylinder(point=(0.5, 0, -2), axis=(0, 1, 0), radius=2)
+        >>> rolling = dc.Contact(V, foot, roll, friction)
+        >>> roll.rotation = (0, 0.001, 0)  # radians, before the next step
+    """
+
+    def __init__(
+        self, point: ArrayLike, axis: ArrayLike, radius: float, inside: bool = False
+    ) -> None:
+        super().__init__(point, radius, inside)
+        if self.point.size != 3:
+            raise ValueError(
+                "RigidCylinder needs three dimensions: in two it is a circle, RigidSphere(centre, radius)."
+            )
+        self.axis = frozen(unit("axis", axis, 3))
+        self._made = True
+
+    def _arms(self, y: np.ndarray) -> np.ndarray:
+        arms = y - self.point
+        return arms - np.outer(arms @ self.axis, self.axis)
+
+    def described(self) -> np.ndarray:
+        """Point, radius, negative from inside, axis, and a one that a sphere has not."""
+        return self._numbers(self.axis, [1.0])
+
+    def __repr__(self) -> str:
+        return (
+            f"RigidCylinder(point={self.point.tolist()}, axis={self.axis.tolist()}, radius={self.radius}, "
+            f"inside={self.inside})"
+        )

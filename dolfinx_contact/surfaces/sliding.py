@@ -1,0 +1,212 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Surfaces that are pushed by more than reactions can carry: there is no static state."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+# Part of a motion that is not named.
+NONE = 1e-6
+
+# Part of what friction carries that has to be left: where all is used, how far the plane slides is not determined.
+MARGIN = 1e-9
+
+
+def slides_away(surfaces, body, contacts, given: bool) -> str:
+    """Which of the ``DrivenPlanes`` slides away, tips or spins, in words; none is the empty string.  Collective.
+
+    Args:
+        given: Ask before anything is known but the forces that are given, not by the present normal reactions.
+    """
+    driving = surfaces.driving()
+    for surface, part in zip(surfaces.surfaces, surfaces.parts):
+        of = [
+            (c, axes[:, :, part])
+            for c, axes in zip(contacts, surfaces.axes)
+            if c.surface is surface
+        ]
+        one = _Driven(surface, surfaces, part, driving[part], of, body)
+        said = "" if surface.curved else one.slides(given) or one.tips()
+        if not said and not given:
+            said = one.spins()
+        if said:
+            return said
+    return ""
+
+
+def lost_far_away(body, statics, surfaces, x: np.ndarray, acts: bool) -> bool:
+    """Whether body or planes are so far away that rounding hides the loads on them: no state is one then.  Collective.
+
+    Args:
+        body: The body.
+        statics: Its ``Statics``, None where something holds it.
+        planes: The ``DrivenPlanes``, or None.
+        x: Displacement, owned degrees of freedom, whose rounding is as large as the forces that act, roughly.
+        acts: Whether some act above rounding.
+    """
+    loads, moved = [], np.zeros(0)
+    if statics is not None:
+        loads.append(statics.loads)
+    if surfaces is not None:  # of springs the force would be as large as the way is far
+        loads.append(surfaces.driving()[surfaces.springs == 0.0])
+        moved = np.abs(surfaces.moved)
+    if not any(load.any() for load in loads):
+        return False
+    return not acts or max(body.farthest(x), moved.max(initial=0.0)) > body.extent
+
+
+def nothing_holds(contacts) -> str:
+    """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
+    surfaces = [contact.surface for contact in contacts]
+    if any(
+        not any(m.name == "n" and m.spring == 0 for m in surface.motions) for surface in surfaces
+    ):
+        return ""
+    return (
+        "No condition holds the body along the normal, and force moves every plane that it touches along its own: together "
+        "they fly away, or stand anywhere. Hold the body, or a plane: leave 'n' out of its surface.free"
+    )
+
+
+class _Driven:
+    """One surface, its motions ``part`` of all, and the contacts on it with their columns of ``D``."""
+
+    def __init__(self, surface, surfaces, part, driving, contacts, body):
+        self._surface, self._driving, self._contacts, self._body = surface, driving, contacts, body
+        self._springs, self._turns = surfaces.springs[part], surfaces.turns[part]
+        self._names, self._pressing = surfaces.names[part], surfaces.pressing[part]
+
+    def slides(self, given: bool) -> str:
+        """Whether a plane is pushed along itself by more than friction carries."""
+        along = ~self._turns & np.array([name != "n" for name in self._names])
+        motions = np.flatnonzero(along & (self._springs == 0.0))
+        if not motions.size or (given and self._weight() == np.inf):
+            return ""
+        limit = _Limit(self._contacts, motions, self._body, self._weight() if given else None)
+        way, pushed, most = limit.weakest(self._driving[motions])
+        if pushed > most * (1 - MARGIN if given else 1):
+            direction = way @ np.array([m.axis for m in self._surface.motions])[motions]
+            direction = (direction.round(6) + 0.0).tolist()
+            known = "with the normal forces found: the plane slides away"
+            if given:
+                known = "at most: the plane slides away, no static state exists"
+            return f"surface.force pushes {self._surface} along {direction} by {pushed:.6g}, and friction carries {most:.6g} along it {known}"
+        return ""
+
+    def _weight(self) -> float:
+        """The force along the normal, if it is given: infinite otherwise."""
+        known = self._names[-1] == "n" and self._springs[-1] == 0
+        return float(self._driving[-1]) if known else np.inf
+
+    def tips(self) -> str:
+        """Whether moment and weight ask for a centre of pressure beyond the nodes of a plane."""
+        weight = self._weight()
+        if not (0.0 < weight < np.inf):
+            return ""
+        for k in np.flatnonzero(self._turns & (self._springs == 0.0)):
+            ends = [np.full((2, 1), -np.inf)]
+            for contact, axes in self._contacts:
+                normal, most = axes[:, -1, k], _radius(contact.friction, axes[:, :-1, k])
+                ends.append(np.array([-(normal - most), normal + most]))
+            low, high = np.concatenate(ends, axis=1).max(axis=1)
+            low, high = (self._body.comm.allreduce(float(end), op=MPI.MAX) for end in (low, high))
+            asked = self._driving[k] / weight
+            room = MARGIN * (low + high)
+            if not -low + room <= asked <= high - room:
+                return (
+                    f"surface.force and surface.moment turn {self._surface} about {self._names[k]!r} by more than its contact "
+                    "nodes can hold, the resultant is beyond the outermost: the plane tips over, no static state exists"
+                )
+        return ""
+
+    def spins(self) -> str:
+        """Whether motions that friction alone resists are driven by more than it carries with the present normals."""
+        free = ~self._pressing & (self._springs == 0.0)
+        motions = np.flatnonzero(free & (self._turns | self._surface.curved))
+        if not motions.size:
+            return ""
+        limit = _Limit(self._contacts, motions, self._body)
+        way, pushed, most = limit.weakest(self._driving[motions] - limit.by_normals())
+        if pushed > most:
+            names = [
+                self._names[k]
+                for k, part in zip(motions, way)
+                if abs(part) > NONE * np.abs(way).max()
+            ]
+            turns = self._turns[motions][np.abs(way).argmax()]
+            return (
+                f"what drives {self._surface} along or about {' and '.join(map(repr, names))} is "
+                f"{pushed / most if most else np.inf:.6g} times what friction carries with the normal forces found: the surface "
+                f"{'turns' if turns else 'moves'} away"
+            )
+        return ""
+
+
+def _radius(friction, slip: np.ndarray) -> np.ndarray:
+    """``|M v|`` of nodes that move along their surfaces by ``v``, local components, ``shape=(n,)``."""
+    return np.linalg.norm(friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1)
+
+
+class _Limit:
+    """What friction carries against motions of a surface, at most, whatever the nodes' friction within the cone.
+
+    Against a virtual motion ``c`` node i works ``r_n |M D_t c|`` at most, the support function of its ellipse: forces ``F`` that are in balance
+    have ``F . c <= sum r_n |M D_t c|`` for every ``c``.
+
+    Args:
+        contacts: With their columns of ``D``.
+        motions: Columns that are asked for, ``shape=(k,)``.
+        body: For sums over ranks.
+        weight: Sum of normal reactions, of which no node is known; None takes the present ones.
+    """
+
+    def __init__(self, contacts, motions: np.ndarray, body, weight: float | None = None):
+        self._body, self._weight = body, weight
+        self._parts = [(c.friction, c.reaction[:, -1], axes[:, :, motions]) for c, axes in contacts]
+        laws = [friction for friction, _, _ in self._parts]
+        alike = all(law.frictionless or law.isotropic for law in laws)
+        self._plain = (
+            alike
+            and motions.size <= 2
+            and not any(c.surface.curved or c.surface.spins for c, _ in contacts)
+        )
+
+    def by_normals(self) -> np.ndarray:
+        """What the present normal reactions carry of each motion, ``shape=(k,)``.  Collective."""
+        return self._body.total(sum(normal @ axes[:, -1] for _, normal, axes in self._parts))
+
+    def carried(self, way: np.ndarray) -> float:
+        """The most work of friction against a motion, per length.  Collective."""
+        most = [np.zeros(1)]
+        for friction, normal, axes in self._parts:
+            slip = axes[:, :-1] @ way
+            radius = _radius(friction, slip)
+            most.append(radius if self._weight is not None else np.maximum(normal, 0.0) * radius)
+        if self._weight is not None:
+            return self._weight * self._body.largest(np.concatenate(most))
+        return float(self._body.total([np.concatenate(most).sum()])[0])
+
+    def weakest(self, force: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """The motion against which the least is carried of what drives it, a unit vector, and both sizes.  Collective."""
+        size = float(np.linalg.norm(force))
+        if size == 0.0:
+            return np.eye(force.size)[0], 0.0, np.inf
+        along = force / size
+        across = np.linalg.svd(along[None])[2][
+            1:
+        ]  # all motions with along . c = 1 are along + s across
+        best = np.zeros(len(across))
+        if len(across) and not self._plain:
+            from scipy.optimize import minimize
+
+            best = minimize(
+                lambda s: self.carried(along + s @ across),
+                best,
+                method="Powell",
+                options={"xtol": 1e-6, "ftol": 1e-9},
+            ).x
+        way = along + np.atleast_1d(best) @ across
+        way /= np.linalg.norm(way)
+        return way, float(force @ way), self.carried(way)

@@ -1,0 +1,165 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What rigid surfaces have in common: a rigid motion, distances and frames of points near them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.support.attributes import frozen, whole
+from dolfinx_contact.support.checks import finite
+from dolfinx_contact.surfaces.drive import Drive, check_guides, vector
+
+
+def unit(name: str, value, size: int) -> np.ndarray:
+    """A vector that is not zero, of length one."""
+    along = vector(name, value, size)
+    largest = np.abs(along).max()
+    if largest == 0.0:
+        raise ValueError(f"{name} must not be zero: only its direction counts, got {value!r}.")
+    along /= largest  # first to order one, so that no square under- or overflows
+    return along / np.linalg.norm(along)
+
+
+class Surface(Drive):
+    """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
+
+    Such positions are in axes that move with the surface: global components as long as it stands where it was made.
+
+    Args:
+        point: About which the surface rotates, ``shape=(gdim,)``, global frame, length units.
+
+    Attributes:
+        varies: Whether gaps are not linear in the position, so that contacts take them anew at every step.
+        curved: Whether frames differ from place to place.
+        axis: First principal friction direction, or None.
+    """
+
+    _settable: tuple[str, ...] = (
+        "displacement", "rotation", "free", "force", "moment", "stiffness", "drive", "guides",
+    )  # fmt: skip
+    _remedy = "make a new surface and a new Contact; displacement and rotation move it."
+    varies = curved = False
+    axis: np.ndarray | None = None
+
+    def __init__(self, point: ArrayLike) -> None:
+        super().__init__(vector("point", point))
+        self._turn: np.ndarray | None = None
+        self._guides = frozen(np.eye(self.point.size))
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement from the first position, ``shape=(gdim,)``, global frame, length units."""
+        return whole("surface.displacement", self._displacement)
+
+    @displacement.setter
+    def displacement(self, value: ArrayLike) -> None:
+        self._displacement = frozen(vector("surface.displacement", value, self.point.size))
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation from the first position about ``point``, radians: its vector, ``shape=(3,)``; one angle in 2-D."""
+        return whole("surface.rotation", self._rotation)
+
+    @rotation.setter
+    def rotation(self, value: ArrayLike) -> None:
+        size = self._rotation.size
+        array = np.atleast_1d(finite("surface.rotation", value))
+        if array.shape != (size,):
+            wanted = "a vector of 3 numbers" if size == 3 else "one angle"
+            raise ValueError(f"surface.rotation must be {wanted}, in radians, got {value!r}.")
+        self._rotation, self._spin = frozen(array.astype(np.float64)), None
+        self._turn = rotation_less_one(self._rotation) if self._rotation.any() else None
+
+    @property
+    def guides(self) -> np.ndarray:
+        """Directions "x", "y", "z" of ``free``, rows, ``shape=(gdim, gdim)``, global frame; at first its axes.
+
+        They stay when the surface turns.
+        """
+        return whole("surface.guides", self._guides)
+
+    @guides.setter
+    def guides(self, value: ArrayLike) -> None:
+        self._guides = check_guides(value, self.point.size)
+
+    @property
+    def drive_axes(self) -> np.ndarray:
+        """See ``Drive``."""
+        return self._guides
+
+    def end_step(self) -> None:
+        """Add what a step has turned to ``rotation``."""
+        if self._spin is not None:
+            self.rotation = composed(self._spin, self._rotation)
+
+    def motion(self, x: np.ndarray) -> np.ndarray:
+        """Displacement of its material points that were at ``x``: ``shape=(gdim,)`` if it does not rotate."""
+        if self._turn is None:
+            return self._displacement
+        return self._displacement + (x - self.point) @ self._turn.T
+
+    def relative(self, x: np.ndarray) -> np.ndarray:
+        """Positions relative to the surface of points at ``x``, ``shape=(n, gdim)``, global frame."""
+        if self._turn is None:
+            return x - self._displacement
+        arm = x - self.point - self._displacement
+        return self.point + arm + arm @ self._turn
+
+    def moved_past(self, x: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """``relative(x + moved) - x`` with all digits of small motions."""
+        past = moved - self._displacement
+        return past if self._turn is None else past + (x - self.point + past) @ self._turn
+
+    def turned(self, frames: np.ndarray) -> np.ndarray:
+        """Frames in the surface's axes, in global components."""
+        return frames if self._turn is None else frames + frames @ self._turn.T
+
+    def distance(self, y: np.ndarray) -> np.ndarray:
+        """Distance to the surface, ``shape=(n,)``, positive on the side where the body may be."""
+        raise NotImplementedError
+
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """Rows (t1, t2, n), in two dimensions (t, n), orthonormal: ``shape=(n, gdim, gdim)``, or one for all."""
+        raise NotImplementedError
+
+    def check_at(self, y: np.ndarray) -> None:
+        """Raise a ``ValueError`` if what the user says of the surface contradicts itself at positions of nodes."""
+
+    def described(self) -> np.ndarray:
+        """Numbers that say which surface it is, for checkpoints."""
+        raise NotImplementedError
+
+
+def rotation_less_one(angle: np.ndarray) -> np.ndarray:
+    """Matrix of a rotation minus the identity, with all digits of small ones.
+
+    ``sin(a) N + 2 sin(a/2)^2 N^2`` with the cross product matrix ``N`` of the axis [O. Rodrigues 1840].
+    """
+    a = np.linalg.norm(angle)
+    if angle.size == 1:
+        N = np.array([[0.0, -1.0], [1.0, 0.0]]) * np.sign(angle[0])
+    else:
+        x, y, z = angle / a
+        N = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.sin(a) * N + 2 * np.sin(a / 2) ** 2 * N @ N
+
+
+def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Rotation vector, in two dimensions angle, of one rotation after another."""
+    if after.size == 1:
+        return after + before
+    if not before.any():
+        return after
+    from scipy.spatial.transform import Rotation
+
+    first, second = (Rotation.from_rotvec(angle.copy()) for angle in (before, after))
+    return (second * first).as_rotvec()
+
+
+def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """Velocities of points with these arms, ``shape=(n, gdim)``, in a rotation about a vector, in 2-D by one number."""
+    if angle.size == 1:
+        return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
+    return np.cross(angle, arms)
