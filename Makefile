@@ -13,8 +13,9 @@
 .PHONY: punch study stress report docs test test-rest test-ranks \
 	test-wheel test-wheel-ranks test-all format stubs clean
 
-RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/test_*.py)
-CORE = $(patsubst %,tests/test_%.py,force history multigrid problem)
+RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/*/test_*.py)
+CORE = tests/surfaces/test_force.py tests/results/test_history.py tests/solvers/test_multigrid.py \
+	tests/step/test_problem.py
 made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
 	$(wildcard cpp/*.cpp cpp/*.h cpp/include/dolfinx_contact/*.h \
 	cpp/include/dolfinx_contact/*/*.h)

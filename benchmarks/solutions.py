@@ -6,7 +6,7 @@ Existence is certain for an elastic body, uniqueness is not. Every step is conde
 solved from many random starts; each answer is judged by NumPy functions of the tests. The fixed point then
 does the step from the same history, which is Newton's; solution 0 is the one that Newton's method found there.
 
-    python -m benchmarks.solutions        # the block of tests/test_solutions.py, and the coarse punch
+    python -m benchmarks.solutions        # the block of tests/step/test_solutions.py, and the coarse punch
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def block(solver):
 
 
 if __name__ == "__main__":
-    # Pressed and dragged, then dragged back: a step of tests/test_solutions.py.
+    # Pressed and dragged, then dragged back: a step of tests/step/test_solutions.py.
     examine(block, [(0.004, 0.002, -0.01), (-0.004, 0.002, -0.01)], [0, 200])
     steps = programme(Parameters())
     examine(punch, steps, [20] * len(steps))

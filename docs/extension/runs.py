@@ -1,6 +1,6 @@
 """The Python blocks of a page are one script.  It is run, and what each block prints and draws is shown below it.
 
-The same script is what ``tests/test_docs.py`` runs.  A run is kept in ``build/docs`` until the script or the
+The same script is what ``tests/programs/test_docs.py`` runs.  A run is kept in ``build/docs`` until the script or the
 package changes.
 """
 

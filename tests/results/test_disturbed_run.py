@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """A long run through everything that goes wrong in one ends where an undisturbed run does.
 
-``SOAK_STEPS=100000 tools/mpitest .venv 2 -s tests/test_soak.py`` takes an hour; 300 steps meet every disturbance.
+``SOAK_STEPS=100000 tools/mpitest .venv 2 -s tests/results/test_disturbed_run.py`` takes an hour; 300 steps meet every disturbance.
 """
 
 import math

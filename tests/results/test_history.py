@@ -279,8 +279,12 @@ def test_killed_run_continues_to_the_same_bits(tmp_path):
     # Started under mpiexec, a child must not take itself for a rank of this run.
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
     alone = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
-    here = Path(__file__).parent
-    path = here, here.parent, alone.get("PYTHONPATH", "")  # of scenes, and of what they are made of
+    root = Path(__file__).parents[2]
+    path = (
+        root / "tests/support",
+        root,
+        alone.get("PYTHONPATH", ""),
+    )  # of scenes, and of what they are made of
     alone["PYTHONPATH"] = os.pathsep.join(map(str, path))
     results = []
     for name, kills in (("straight", [-1]), ("killed", [0, 2, -1])):

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A script as users write them, with types: tests/test_types.py runs it, and ``mypy --strict`` on it."""
+"""A script as users write them, with types: tests/programs/test_types.py runs it, and ``mypy --strict`` on it."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import pytest
 from dolfinx_contact.solvers.automatic import most_nodes
 
 ROWS = json.loads(
-    (Path(__file__).parents[1] / "notes/records/crossover-2026-11-24.json").read_text()
+    (Path(__file__).parents[2] / "notes/records/crossover-2026-11-24.json").read_text()
 )
 
 

@@ -12,7 +12,7 @@ from dolfinx.fem.petsc import assemble_matrix
 from mixed_scenes import block, held, pressed, ring, taylor_hood
 from patches import carries_even_stress
 from scenes import COMM
-from test_any_body import BULK, rubber_seal
+from test_bodies_of_users import BULK, rubber_seal
 
 from dolfinx_contact.compat import mixed_functionspace, partitioner
 

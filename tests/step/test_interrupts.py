@@ -81,7 +81,8 @@ def test_an_interrupt_ends_the_condensed_solver():
 def test_an_interrupt_leaves_the_last_state(solver, monkeypatch):
     """Wherever a step is, in the kernel, the fixed point or GMRES: Ctrl-C ends it, and the next solve is what it would
     have been."""
-    from dolfinx_contact.solvers import newton_krylov, search
+    from dolfinx_contact.solvers import search
+    from dolfinx_contact.solvers.fixed_point import newton_krylov
 
     scene = scenes.block(cells=(2, 2, 2), solver=solver)
     scene.move_top(0, 0, -0.01)

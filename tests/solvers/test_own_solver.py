@@ -12,7 +12,7 @@ import scenes
 
 import dolfinx_contact as dc
 
-PAGE = (Path(__file__).parents[1] / "docs" / "own_solver.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "own_solver.md").read_text()
 
 
 def damped(**options):

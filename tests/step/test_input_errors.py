@@ -61,7 +61,7 @@ def test_a_component_of_what_is_assigned_as_a_whole_is_refused(d, name):
     size = 1 if d == 2 and name in ("rotation", "moment") else d
     given = np.eye(d) if name == "guides" else np.arange(1.0, 1.0 + size)
     setattr(surface, name, given)
-    with pytest.raises(ValueError, match=f"plane.{name} is read-only, it is assigned as a whole"):
+    with pytest.raises(ValueError, match=f"surface.{name} is read-only, it is assigned as a whole"):
         getattr(surface, name)[0] = 2.0
     before = getattr(surface, name)
     assert (before == given).all() and type(before + 1) is type(before.copy()) is np.ndarray

@@ -124,7 +124,7 @@ def ring(
     pressure=("Lagrange", 1),
     volume=5,
 ):
-    """Half a ring of rubber of shear modulus 1 between two planes, height down by 30 %; as ``rubber_seal`` in test_any_body.py.
+    """Half a ring of rubber of shear modulus 1 between two planes, height down by 30 %; as ``rubber_seal`` in test_bodies_of_users.py.
 
     Args:
         bulk: Bulk modulus; None is incompressible.

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from test_packaging import clean_environment
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md")]
 PAGES += sorted([*ROOT.glob("docs/**/*.md"), *ROOT.glob("notes/*.md")])
 PAGES = [page for page in PAGES if "gallery" not in page.parts]  # made by `make docs`

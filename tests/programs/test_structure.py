@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("dolfinx_contact", "demos", "benchmarks", "studies", "mechanics")
 PROGRAMS = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
 TREES = {file: ast.parse(file.read_text()) for file in PROGRAMS}
@@ -30,7 +30,7 @@ def test_functions_are_short(file):
 
 def test_no_program_changes_the_path():
     """Programs and tests are found by how they are started, not by a path that they change."""
-    files = [*PROGRAMS, *(ROOT / "tests").glob("*.py")]
+    files = [*PROGRAMS, *(ROOT / "tests").rglob("*.py")]
     changed = [
         f"{file}:{node.lineno}"
         for file in files

@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.slow,  # mypy reads NumPy's types, some 20 seconds
     pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts programs of its own"),
 ]
-SCRIPT = Path(__file__).with_name("user_script.py")
+SCRIPT = Path(__file__).parents[1] / "support" / "user_script.py"
 
 # What DOLFINx and others lack is theirs; an editable install is found by its path, as source that is not checked.
 CONFIG = """[mypy]

@@ -13,7 +13,7 @@ import dolfinx_contact  # before MPI, which one of DOLFINx's wheels needs
 import pytest
 from mpi4py import MPI
 
-PROBE = Path(__file__).parent.parent / "tools" / "probe.py"
+PROBE = Path(__file__).parents[2] / "tools" / "probe.py"
 
 pytestmark = pytest.mark.skipif(
     MPI.COMM_WORLD.size > 1, reason="starts interpreters, which MPI forbids to several ranks"

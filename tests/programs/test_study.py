@@ -32,7 +32,7 @@ from studies.punch.work import TERMS, comparison
 
 COMM = MPI.COMM_WORLD
 ALONE = COMM.size == 1
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 COARSE = ["--divisions", "2", "--layers", "1", "--cycles", "2"]
 FIGURES = "fig3 fig4 fig5 fig6 fig7 fig4_node1 fig7_node1 unloading1 unloading_last".split()
 FIGURES += "dissipation wear cycles energy".split() + ["convergence"] * ALONE

@@ -10,7 +10,7 @@ import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels ne
 import pytest
 from mpi4py import MPI
 
-DEMOS = Path(__file__).parents[1] / "demos"
+DEMOS = Path(__file__).parents[2] / "demos"
 TESTED_ELSEWHERE = {"demo_punch"}  # a command with options: test_demo_punch.py
 NOTEBOOKS = sorted(
     path.stem
