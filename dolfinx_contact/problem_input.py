@@ -129,7 +129,7 @@ def hold(contacts, body) -> None:
     left_out = [np.zeros((0, 3))]
     with raised_together(body.comm):
         for contact in contacts:
-            contact.points.hold(*_held_directions(contact, body.fixed))
+            contact.hold(*_held_directions(contact, body.fixed))
             left_out.append(contact.x[contact.points.closed])
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))

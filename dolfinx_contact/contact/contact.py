@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import weakref
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,31 +15,33 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
+from dolfinx_contact.contact import fields
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import contact_nodes, weight_on
+from dolfinx_contact.contact.friction_field import guided
 from dolfinx_contact.contact.input import (
+    check_coefficients,
     check_law,
     check_space,
     check_wear,
     checked_facets,
 )
-from dolfinx_contact.contact.interface import add_to
-from dolfinx_contact.contact.kinematics import ContactKinematics
-from dolfinx_contact.contact.state import Status
+from dolfinx_contact.contact.interface import ContactPoints, add_to
+from dolfinx_contact.contact.laws import Laws, rows
+from dolfinx_contact.contact.placement import Placement, carried
+from dolfinx_contact.contact.state import KEPT, History, State, Status
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.law.supported import supported
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
-from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
-# Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
-CLEAR = 1e-9
 
-
-class Contact(ContactKinematics):
+class Contact(Guarded):
     """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
 
     Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The
@@ -99,10 +102,18 @@ class Contact(ContactKinematics):
             self._weight = weight_on(self.displacements.V, weight)
         self.nodes = frozen(contact_nodes(self.displacements.V, facets, self._weight))
         self.x = frozen(self.displacements.x[self.nodes])
+        self._area: np.ndarray | None = None
+        self._axial: bool | None = None
+        self._dragged: np.ndarray | None = None
+        self._forget_supported()
+        x, dofs = self.x[:, :gdim], self.displacements.dofs(self.nodes)
         with raised_together(mesh.comm):
-            surface.check_at(surface.relative(self._at))
-        self.place()
-        self.friction, self.wear, self.rho = friction, wear, None
+            surface.check_at(surface.relative(x))
+        extent, size = np.abs(mesh.geometry.x).max(initial=0.0), self.displacements.size
+        self._placement = Placement(surface, x, dofs, size, extent, mesh.comm)
+        self._laws, self._history, self.rho = Laws(), History(), None
+        self._laws.assign(self, friction, empty=True)
+        self.wear = wear
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
         described = mesh.comm.bcast(self.described(), root=0)
         with raised_together(mesh.comm):
@@ -113,7 +124,6 @@ class Contact(ContactKinematics):
                     "facet_tags.values has the tags that the mesh has; if from a position, compare it with mesh.geometry.x."
                 )
         self.facets, self._geometry, self._owner = frozen(facets), self._digest(), None
-        self._apart = CLEAR * np.abs(mesh.geometry.x).max(initial=0.0)
         self.reset()
         self._made = True
 
@@ -132,7 +142,7 @@ class Contact(ContactKinematics):
     @property
     def has_history(self) -> bool:
         """Whether a step was made since the contact was, or since it was reset; the same on all ranks."""
-        return self._settled_by is not None
+        return self._history.settled_by is not None
 
     def mesh_has_moved(self) -> bool:
         """Whether the mesh has been moved or scaled since the contact was made, on this rank."""
@@ -140,6 +150,194 @@ class Contact(ContactKinematics):
 
     def _digest(self) -> bytes:
         return hashlib.blake2b(np.ascontiguousarray(self.V.mesh.geometry.x)).digest()
+
+    # -- laws ----------------------------------------------------------------------------------
+
+    @property
+    def friction(self) -> Friction:
+        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, anew at the start
+        of each step, and as the state goes on if they follow it.
+        """
+        return self._laws.friction
+
+    @friction.setter
+    def friction(self, friction: Friction | float) -> None:
+        self._laws.assign(self, friction)
+        self._forget_supported()
+
+    @property
+    def wear(self) -> Wear | None:
+        """The law of wear.  Another one may be assigned between steps, on all ranks."""
+        return self._laws.wear
+
+    @wear.setter
+    def wear(self, wear: Wear | None) -> None:
+        check_wear(wear)
+        self._laws.wear = wear
+
+    @property
+    def law(self):
+        """The kernel's law of this friction."""
+        return self._laws.kernel
+
+    @property
+    def follows_pressure(self) -> bool:
+        """Whether friction follows the pressure at the end of the step."""
+        return self._laws.follow_pressure
+
+    def renew_friction(self, begin: bool = False) -> None:
+        """Let fields have their present values; ``begin``: a step begins here, with frames of its own.  Collective."""
+        self._laws.renew(self, begin)
+        self._forget_supported()
+
+    def described(self) -> dict[str, str]:
+        """Surface and laws, but coefficients per node, in words: the same on all ranks."""
+        return self._laws.described(self.surface)
+
+    def check(self, first: dict[str, str]) -> None:
+        """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""
+        for name, value in self.described().items():
+            if value != first[name]:
+                raise ValueError(
+                    f"{name} differs between ranks: here {value}, on rank 0 {first[name]}. Planes and laws must not "
+                    "differ between ranks."
+                )
+        check_coefficients(self.friction, self.nodes.size)
+
+    # -- nodes that supports hold --------------------------------------------------------------
+
+    def hold(self, held, closed, guided=None, fixed=None) -> None:
+        """Take note of what boundary conditions fix, see ``ContactPoints.hold``."""
+        self.points.hold(held, closed, guided, fixed)
+        self._forget_supported()
+
+    def _forget_supported(self) -> None:
+        """Friction, points or the last state are others now."""
+        self._free_friction: Friction | None = None
+        self._usual = (
+            False  # whether all nodes that do not move along their support have the kernel's law
+        )
+
+    @property
+    def known_slip(self) -> np.ndarray:
+        """Part of ``slip_increment`` that supports prescribe, ``shape=(n, gdim - 1)``, local frame, length units."""
+        known = self.present.known
+        return np.zeros_like(self.slip_increment) if known is None else known
+
+    @property
+    def dragged(self) -> np.ndarray | None:
+        """Slip of held nodes past which force drives the surface, ``shape=(n, gdim - 1)``, a direction; None is nowhere."""
+        return self._dragged
+
+    def drag(self, slip: np.ndarray | None) -> None:
+        """From now on held nodes with such a slip have the friction against it, whatever the present one is."""
+        self._dragged = slip
+
+    @property
+    def free_friction(self) -> Friction:
+        """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
+        points, friction = self.points, self.friction
+        if not points.along.any() or friction.frictionless:
+            return friction
+        if self._free_friction is None:
+            found = guided(friction, points.count, points.supported, points.along)
+            self._free_friction = found
+        return self._free_friction
+
+    def law_of(self, law, nodes=slice(None)) -> Any:
+        """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
+
+        Args:
+            law: Of the kernel, of these nodes.
+            nodes: Their indices, ``shape=(k,)``; all of them by default.
+        """
+        points = self.points
+        if not points.supported.size or self.friction.frictionless:
+            return law
+        still = self.present.known is None and self.dragged is None
+        if still and self._usual:
+            return law
+        at_rows = np.arange(points.count)[nodes]
+        at = np.searchsorted(points.supported, at_rows)
+        at[at == points.supported.size] = 0
+        mine = points.supported[at] == at_rows
+        known, last = self.known_slip[at_rows], self.last.reaction[at_rows, :-1]
+        if self.dragged is not None:
+            known = np.where(self.dragged[at_rows] != 0.0, self.dragged[at_rows], known)
+        everywhere = isinstance(nodes, slice)
+        friction = self.friction if everywhere else self.friction.at(at_rows)
+        found = supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
+        self._usual = self._usual or (found is law and still and everywhere)
+        return found
+
+    # -- frames and motion ---------------------------------------------------------------------
+
+    @property
+    def frame(self) -> np.ndarray:
+        """Rows (t1, t2, n), in 2-D (t, n), of the last step: ``shape=(gdim, gdim)``; on curved surfaces ``(n, gdim, gdim)``."""
+        return self._placement.now.frame
+
+    @property
+    def points(self) -> ContactPoints:
+        """The ``ContactPoints``: motion as a sparse operator, directions that supports hold."""
+        return self._placement.now.points
+
+    @property
+    def home(self) -> np.ndarray:
+        """Positions relative to the surface for which frames and gaps were taken, in its axes, ``shape=(n, gdim)``."""
+        return self._placement.now.home
+
+    @property
+    def own_frame(self) -> np.ndarray:
+        """As ``frame``, in the axes of the surface."""
+        return self._placement.now.own
+
+    @property
+    def arms(self) -> np.ndarray:
+        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
+        return self._placement.arms
+
+    @property
+    def _wanders(self) -> bool:
+        """Whether it matters where on the surface nodes are."""
+        return self.surface.varies or self._laws.textured
+
+    @property
+    def follows(self) -> bool:
+        """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
+        return self._placement.follows(self._wanders)
+
+    def follow(self, u: np.ndarray) -> None:
+        """Take frames and gaps for the next step, where the surface is at present; see ``Placement.follow``."""
+        self._placement.follow(u, self._wanders)
+        self._history.last = self._placement.carried(self._settled)
+        self._history.restore()
+        self._forget_supported()
+
+    def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
+        """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
+        return self._placement.carried_by(axis, turns)
+
+    def move(self, u: fem.Function | np.ndarray) -> None:
+        """Gaps and slip increments for a displacement, from the last converged step on.
+
+        Args:
+            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+        """
+        values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
+        self.take(**self._placement.moved(values, self.last, self.wear_depth))
+
+    def gap_rounding(self, u: np.ndarray) -> float:
+        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        return self._placement.gap_rounding(u)
+
+    def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Estimate of the rounding in each gap and slip for the displacement moved to last, see ``Placement.motion_rounding``."""
+        return self._placement.motion_rounding(u, self.present, self.last, self.wear_depth)
+
+    def take(self, **arrays: np.ndarray) -> None:
+        """Replace parts of the present state."""
+        self._history.take(**arrays)
 
     # -- one iteration -------------------------------------------------------------------------
 
@@ -252,6 +450,19 @@ class Contact(ContactKinematics):
 
     # -- history -------------------------------------------------------------------------------
 
+    def reset(self) -> None:
+        """Forget the history: undeformed, unworn body, no reactions, the surface where it is now."""
+        if self.follows:
+            self._placement.stand(self._wanders)
+        self._history.begin(self._placement.at_rest())
+        self._settle_here()
+
+    def _settle_here(self) -> None:
+        """The last state of the history is that of the last converged step, in the present frames."""
+        self._placement.settle()
+        self._settled = self._history.last
+        self._forget_supported()
+
     def advance(self) -> None:
         """Make the present state the last converged one, from which the next slip is measured."""
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
@@ -260,18 +471,249 @@ class Contact(ContactKinematics):
         rough = np.broadcast_to(law.mu, (len(slip), 2)).any(axis=1)
         sticks = (rough & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
-        if self._begun is None:
+        begun = self._laws.begun
+        if begun is None:
             work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
         else:  # forces before the step with the law at its beginning
             none = np.zeros_like(before)
-            work = work_of_friction(self._begun, before, slipped, none, slip, law_before)
+            work = work_of_friction(begun, before, slipped, none, slip, law_before)
             work += work_of_friction(law, none, slipped, self.reaction, slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(slip, axis=1)
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
-        self.settle(work.sum(axis=1), path, depth, kept)
-        self._settled_by = self.friction
+        if self.surface.spin is not None:
+            self.take(displacement=self._placement.turned_past(self.displacement))
+        self._history.settle(law, work.sum(axis=1), path, depth, kept)
+        self._settle_here()
+
+    @property
+    def law_before(self) -> Friction | None:
+        """The law by which the last step was settled, its axes carried in space to the frames of this one; None before the first."""
+        law, settled = self._history.settled_by, self._placement.settled
+        if law is None or law.axes is None or settled.points is self.points:
+            return law
+        n, gdim = self.points.count, self.points.dim
+        axes = np.column_stack((law.axes, np.zeros((n, gdim - 2))))
+        axes = carried(axes, settled.frame, self.frame)[:, :2]
+        return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
+
+    def restore(self) -> None:
+        """Return to the last converged state, its frames and, where friction is a field, its law."""
+        self._placement.restore()
+        self._history.last = self._settled
+        self._history.restore()
+        self._laws.restore(self)
+        self._forget_supported()
+
+    def history(self) -> tuple:
+        """All that a step leaves to the next one, for ``go_back``."""
+        return self._placement.now, self._history.kept()
+
+    def go_back(self, history: tuple) -> None:
+        """Take back what ``history`` returned."""
+        placed, kept = history
+        self._placement.restore(placed)
+        self._history.go_back(kept)
+        self._laws.restore(self)
+        self._settle_here()
+
+    def save(self) -> dict[str, np.ndarray]:
+        """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
+        saved = self._history.save() | self._laws.save(self) | {"plane": self.surface.displacement}
+        if self._history.settled_by is not None:
+            saved["law_of_last_step"] = rows(self._history.settled_by, self.nodes.size)
+        return saved | self._placement.save()
+
+    def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Raise a ``ValueError`` if an array is missing or of another size, or another law or surface was saved."""
+        self._history.check_saved(saved)
+        self._laws.check_saved(self, saved)
+        if self.surface.varies and "home" not in saved:
+            raise ValueError(f"checkpoint: it was written with another plane: here {self.surface}.")
+
+    def load(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
+        surface = self.surface
+        surface.rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
+        if self.follows:
+            self._placement.back_to(np.array(saved["home"]) if surface.varies else None)
+        self._history.load(saved)
+        surface.displacement = saved["plane"]
+        self._history.settled_by = self._laws.load(self, saved)
+        self._settle_here()
+        surface.rotation = saved.get("found_rotation_of_plane", surface.rotation)
+
+    # -- results -------------------------------------------------------------------------------
+
+    @property
+    def present(self) -> State:
+        """The present state; another object as soon as any part of it is replaced."""
+        return self._history.present
+
+    @property
+    def last(self) -> State:
+        """The state at the end of the last step that converged."""
+        return self._history.last
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement of the nodes relative to the surface, ``shape=(n, gdim)``, local frame, length."""
+        return self.present.displacement
+
+    @property
+    def reaction(self) -> np.ndarray:
+        """Force of the surface on each node, ``shape=(n, gdim)``, local frame, force units."""
+        return self.present.reaction
+
+    @property
+    def previous_reaction(self) -> np.ndarray:
+        """Reactions of the last converged step, ``shape=(n, gdim)``, local frame."""
+        return self.last.reaction
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Distance to the surface, ``shape=(n,)``, length units; negative is penetration."""
+        return self.present.gap
+
+    @property
+    def slip_increment(self) -> np.ndarray:
+        """Slip relative to the surface in the last step, ``shape=(n, gdim - 1)``, local frame, length units."""
+        return self.present.slip_increment
+
+    @property
+    def status(self) -> np.ndarray:
+        """A ``Status`` per node, ``shape=(n,)``, integers: 0 open, 1 stick, 2 slip."""
+        return self.present.status
+
+    @property
+    def dissipation(self) -> np.ndarray:
+        """Work of friction since the start, ``shape=(n,)``, force times length; it never decreases."""
+        return self._history.sums["dissipation"]
+
+    @property
+    def slip_path(self) -> np.ndarray:
+        """Length of the path slipped while in contact since the start, ``shape=(n,)``, length units."""
+        return self._history.sums["slip_path"]
+
+    @property
+    def wear_depth(self) -> np.ndarray:
+        """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
+        return self._history.sums["wear_depth"]
+
+    @property
+    def slip_kept(self) -> np.ndarray:
+        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``, local frame, length.
+
+        A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
+        """
+        return self._history.sums[KEPT]
+
+    @property
+    def load_function(self) -> np.ndarray:
+        """f = ||M^-1 r_t|| - r_n, ``shape=(n,)``, force units [dSFMH07, Eq. (1)]."""
+        return self.law.load_function(self.reaction)
+
+    @property
+    def bipotential_gap(self) -> np.ndarray:
+        """Certificate b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
+
+        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``;
+        penetration is reported by itself.
+        """
+        return self.law.bipotential_gap(
+            self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
+        )
+
+    @property
+    def slip_residual(self) -> np.ndarray:
+        """What of the slip increments the slip rule leaves unexplained, ``shape=(n, gdim - 1)``, length.
+
+        ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
+        on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
+        """
+        slip, mu = self.slip_increment, self.friction.mu[..., :1]
+        against = self.friction.against_slip(self.reaction[:, :-1])
+        length = np.linalg.norm(slip, axis=1, keepdims=True)
+        # Compared with an enum, NumPy looks for attributes that enums do not have, and drops a Ctrl-C that comes then.
+        slips = (self.status == int(Status.SLIP))[:, None]
+        bound = (self.status != int(Status.OPEN))[:, None] & (mu > 0)
+        return np.where(bound, slip + slips * length * against, 0.0)
+
+    def force(self) -> np.ndarray:
+        """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective.
+
+        With axial symmetry its axial component alone is a force; the other one is the sum of radial forces, which balance.
+        """
+        if self.surface.curved:
+            return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
+        return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
+
+    def moment(self) -> np.ndarray:
+        """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
+
+        With the lever arms of the step: from where the point was put before it to where the nodes were then.  After a
+        step it is ``surface.moment`` about the axes that are free.
+        """
+        forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
+        arms = self.arms
+        if arms.shape[1] == 2:
+            moments = (arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]).sum(axis=0)
+        else:
+            moments = np.cross(arms, forces).sum(axis=0)
+        return self.comm.allreduce(moments)
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of the contact surface that belongs to each node, ``shape=(n,)``, undeformed state, see ``facing_areas``.
+
+        The integral of the node's shape function, times ``weight``, over the facets as the surface sees them: facets that are turned away from
+        it have none.  Without a weight a length in two dimensions.  Collective at the first call.
+        """
+        if self._area is None:
+            self._area = frozen(fields.facing_areas(self, self._weight))
+        return self._area
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Normal reaction over nodal area, ``shape=(n,)``, force per area; zero where a node has none.  Collective at first."""
+        return fields.per_area(self.reaction[:, -1], self.area)
+
+    @property
+    def weighted(self) -> bool:
+        """Whether the surface measure has a weight."""
+        return self._weight is not None
+
+    @property
+    def axial(self) -> bool:
+        """Whether ``weight`` is in proportion to the first coordinate, in two dimensions: axial symmetry.  Collective at first."""
+        if self._axial is None:
+            V = self.displacements.V
+            plain = self._weight is None or V.mesh.geometry.dim == 3
+            self._axial = not plain and fields.grows_with_radius(V, self._weight)
+        return self._axial
+
+    def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
+        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
+        return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
+
+    def everywhere(self, values: ArrayLike) -> np.ndarray:
+        """Values at the contact nodes at those of all nodes that this rank knows, ghosts included, zero elsewhere.  Collective."""
+        function = fem.Function(self.displacements.V)
+        rows = function.x.array.reshape(-1, self.displacements.dim)
+        rows[self.nodes, 0] = values
+        function.x.scatter_forward()
+        return rows[:, 0].copy()
+
+    def reaction_function(self) -> fem.Function:
+        """Nodal reactions in global components as a Function on the space of displacements, zero elsewhere."""
+        function = fem.Function(self.displacements.V, name="reaction")
+        forces = np.zeros(self.points.size)
+        self.points.add_forces(self.reaction, forces)
+        rows = self.displacements.rows(forces)
+        function.x.array[: rows.size] = rows.ravel()
+        function.x.scatter_forward()
+        return function
 
     def worn_in_a_leap(self, stiffness: NodalStiffness) -> tuple[float, float, list]:
         """Of the node whose depth worn in the last step unloads it most: by how many times its reaction, depth and position.

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.support.attributes import Guarded, frozen
+from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.support.attributes import frozen
 
 
 class Status(IntEnum):
@@ -26,64 +27,83 @@ class Status(IntEnum):
 
 
 class State(NamedTuple):
-    """All that a step leaves to the next one; arrays over the owned contact nodes, local frame."""
+    """A state of ``n`` contact nodes; read-only arrays, local frame."""
 
-    displacement: np.ndarray  # of the node relative to the plane, (n, gdim)
+    displacement: np.ndarray  # of the node relative to the surface, (n, gdim)
     reaction: np.ndarray  # (n, gdim)
     gap: np.ndarray  # (n,)
     slip_increment: np.ndarray  # (n, gdim - 1)
     status: np.ndarray  # (n,)
+    known: np.ndarray | None = (
+        None  # part of the slip that supports prescribe, (n, gdim - 1); None where there is none
+    )
 
 
+SAVED = State._fields[:-1]  # of a state, in checkpoints
 SUMS = ("dissipation", "slip_path", "wear_depth")
 KEPT = "slip_kept"
 
 
-class ContactHistory(Guarded):
-    """States and sums of ``n`` nodes.  All arrays are read-only: the next step starts from them."""
+class History:
+    """States and sums of ``n`` nodes.  All arrays are read-only: the next step starts from them.
 
-    _settled_by: Any = None  # friction of the last converged step
+    Attributes:
+        present: The present ``State``.
+        last: That at the end of the last step that converged.
+        sums: Since the start, and slip that sticking nodes have kept, arrays by name.
+        settled_by: Friction of the last step that converged; None before the first.
+    """
+
+    present: State
+    last: State
+    sums: dict[str, np.ndarray]
+    settled_by: Friction | None = None
 
     def begin(self, state: State) -> None:
         """Forget everything: this is the state, and all sums are zero."""
-        self._sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
-        self._sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
-        self._last = State(*map(frozen, state))
+        self.settled_by = None
+        self.sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
+        self.sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
+        self.replace_last(*state[:-1])
         self.restore()
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
-        self._present = self._present._replace(**{k: frozen(a) for k, a in arrays.items()})
+        self.present = self.present._replace(
+            **{k: a if a is None else frozen(a) for k, a in arrays.items()}
+        )
+
+    def replace_last(self, *arrays: np.ndarray) -> None:
+        """Let the last state have these arrays."""
+        self.last = State(*map(frozen, arrays))
 
     def restore(self) -> None:
         """Return to the last converged state."""
-        self._present = self._last
+        self.present = self.last
 
-    def settle(
-        self, work: np.ndarray, path: np.ndarray, depth: np.ndarray, kept: np.ndarray
-    ) -> None:
+    def settle(self, by: Friction, work, path, depth, kept) -> None:
         """Make the present state the last converged one, and add to the sums what the step did; ``kept`` is the new ``slip_kept``."""
         added = dict(zip(SUMS, (work, path, depth)))
-        self._sums = {name: frozen(self._sums[name] + added[name]) for name in SUMS}
-        self._sums[KEPT] = frozen(kept)
-        self._last = self._present
+        self.sums = {name: frozen(self.sums[name] + added[name]) for name in SUMS}
+        self.sums[KEPT] = frozen(kept)
+        self.last, self.settled_by = self.present._replace(known=None), by
 
-    def history(self) -> tuple:
+    def kept(self) -> tuple:
         """Last converged state and sums, and the law that was slipped by, for ``go_back``."""
-        return self._last, self._sums, self._settled_by
+        return self.last, self.sums, self.settled_by
 
-    def go_back(self, history: tuple) -> None:
-        """Take back what ``history`` returned."""
-        self._last, self._sums, self._settled_by = history
+    def go_back(self, kept: tuple) -> None:
+        """Take back what ``kept`` returned."""
+        self.last, self.sums, self.settled_by = kept
         self.restore()
 
     def save(self) -> dict[str, np.ndarray]:
         """Last converged state and sums as arrays by name; this rank's nodes."""
-        return self._last._asdict() | self._sums
+        return {name: getattr(self.last, name) for name in SAVED} | self.sums
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size."""
-        for name, array in ContactHistory.save(self).items():
+        for name, array in self.save().items():
             if name == KEPT and name not in saved:
                 continue  # older checkpoints do not have it
             if name not in saved or saved[name].shape != array.shape:
@@ -101,70 +121,7 @@ class ContactHistory(Guarded):
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank."""
-        self._last = State(*(frozen(np.array(saved[name])) for name in State._fields))
-        none = np.zeros_like(self._last.slip_increment)
-        self._sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
+        self.replace_last(*(np.array(saved[name]) for name in SAVED))
+        none = np.zeros_like(self.last.slip_increment)
+        self.sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
         self.restore()
-
-    @property
-    def present(self) -> State:
-        """The present state; another object as soon as any part of it is replaced."""
-        return self._present
-
-    @property
-    def last(self) -> State:
-        """The state at the end of the last step that converged."""
-        return self._last
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement of the nodes relative to the plane, ``shape=(n, gdim)``, local frame, length."""
-        return self._present.displacement
-
-    @property
-    def reaction(self) -> np.ndarray:
-        """Force of the plane on each node, ``shape=(n, gdim)``, local frame, force units."""
-        return self._present.reaction
-
-    @property
-    def previous_reaction(self) -> np.ndarray:
-        """Reactions of the last converged step, ``shape=(n, gdim)``, local frame."""
-        return self._last.reaction
-
-    @property
-    def gap(self) -> np.ndarray:
-        """Distance to the plane, ``shape=(n,)``, length units; negative is penetration."""
-        return self._present.gap
-
-    @property
-    def slip_increment(self) -> np.ndarray:
-        """Slip relative to the plane in the last step, ``shape=(n, gdim - 1)``, local frame, length units."""
-        return self._present.slip_increment
-
-    @property
-    def status(self) -> np.ndarray:
-        """A ``Status`` per node, ``shape=(n,)``, integers: 0 open, 1 stick, 2 slip."""
-        return self._present.status
-
-    @property
-    def dissipation(self) -> np.ndarray:
-        """Work of friction since the start, ``shape=(n,)``, force times length; it never decreases."""
-        return self._sums["dissipation"]
-
-    @property
-    def slip_path(self) -> np.ndarray:
-        """Length of the path slipped while in contact since the start, ``shape=(n,)``, length units."""
-        return self._sums["slip_path"]
-
-    @property
-    def wear_depth(self) -> np.ndarray:
-        """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
-        return self._sums["wear_depth"]
-
-    @property
-    def slip_kept(self) -> np.ndarray:
-        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``, local frame, length.
-
-        A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
-        """
-        return self._sums[KEPT]

@@ -1,0 +1,255 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Where contact nodes stand relative to their rigid surface: frames, gaps and slips.
+
+A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose material point at ``x`` has moved by ``s``,
+in components of its frame ``F``.  On planes gaps are linear in this motion.  On other surfaces frame and gap are taken
+for the surface as it stands in the step and the node as the last step has left it, and in the step the surface is its
+tangent plane there, see docs/surfaces.md.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+
+from dolfinx_contact.contact.interface import ContactPoints
+from dolfinx_contact.contact.state import State
+from dolfinx_contact.step.errors import EPSILON
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import Surface, cross
+
+# Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
+CLEAR = 1e-9
+
+
+class Placed(NamedTuple):
+    """Frames and gaps of the nodes, and what they were taken for."""
+
+    home: np.ndarray  # positions relative to the surface, (n, gdim)
+    rotation: np.ndarray  # of the surface
+    own: np.ndarray  # frames in the surface's axes: (gdim, gdim) for all, or (n, gdim, gdim)
+    frame: np.ndarray  # the same in global components
+    flat: np.ndarray  # gap less the displacement along the normal, (n,)
+    points: ContactPoints
+    arms: np.ndarray | None  # of nodes about the surface's point, (n, gdim), if rotations are free
+
+
+class Placement:
+    """Frames, gaps and motions of ``n`` nodes relative to a surface.
+
+    Args:
+        surface: The surface.
+        x: Reference positions of the nodes, ``shape=(n, gdim)``.
+        dofs: Their degrees of freedom, ``shape=(n, gdim)``.
+        size: Number of owned degrees of freedom.
+        extent: Largest coordinate of the mesh.
+        comm: MPI communicator.
+
+    Attributes:
+        now: ``Placed``, of the present step.
+        settled: That of the last step that converged.
+    """
+
+    now: Placed
+    settled: Placed
+
+    def __init__(
+        self, surface: Surface, x: np.ndarray, dofs: np.ndarray, size: int, extent: float, comm
+    ):
+        self.surface, self.x, self._comm = surface, x, comm
+        self._dofs, self._size, self._apart = dofs, size, CLEAR * extent
+        self._place(surface.relative(x) if surface.varies else x, x, None)
+        self.settle()
+
+    # -- frames --------------------------------------------------------------------------------
+
+    def stand(self, wanders: bool) -> None:
+        """Take frames and gaps where the undeformed body stands.  Collective.
+
+        Args:
+            wanders: Whether it matters where on the surface nodes are.
+        """
+        self._place(self.surface.relative(self.x) if wanders else self.x, self.x, self.now)
+
+    def follow(self, u: np.ndarray, wanders: bool) -> None:
+        """Take frames and gaps for the next step, where the surface is at present.  Collective.
+
+        Directions held by supports are not known for the new frames.
+
+        Args:
+            u: Displacement of owned degrees of freedom with which nodes stand there, that of the last step.
+            wanders: As in ``stand``.
+        """
+        there = self.x + u[self._dofs]
+        home = self.surface.relative(there) if wanders else self.settled.home
+        self._place(home, there, self.now)
+
+    def back_to(self, home: np.ndarray | None) -> None:
+        """Take frames and gaps at positions relative to the surface that were saved; None is where they were taken last."""
+        self._place(self.now.home if home is None else home, self.x, self.now)
+
+    def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
+        """Take frames and gaps at positions relative to the surface, ``there`` in space, for lever arms.  Collective."""
+        surface, x = self.surface, self.x
+        with raised_together(self._comm):  # the user's functions
+            own = surface.frames(home)
+            frame, flat = surface.turned(own), surface.distance(home)
+        if home is not x:
+            flat = flat - times(own, home - x)[:, -1]
+        arms = None
+        if surface.spins:
+            arms = frozen(there - surface.point - surface.displacement)
+        stands = not surface.curved and arms is None
+        if before and stands and np.array_equal(before.rotation, surface.rotation):
+            points = before.points
+        else:
+            frames = np.broadcast_to(frame, (*x.shape, x.shape[1])).copy()
+            points = ContactPoints(self._dofs, frames, self._size)
+        home, own, frame, flat = map(frozen, (home, own, frame, flat))
+        self.now = Placed(home, surface.rotation, own, frame, flat, points, arms)
+
+    def settle(self) -> None:
+        """These are the frames of the last step that converged."""
+        self.settled = self.now
+
+    def restore(self, placed: Placed | None = None) -> None:
+        """Return to the frames of the last step that converged, or to others that were kept."""
+        self.now = self.settled if placed is None else placed
+
+    def follows(self, wanders: bool) -> bool:
+        """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
+        surface = self.surface
+        turned = not np.array_equal(surface.rotation, self.now.rotation)
+        return wanders or surface.spins or turned
+
+    @property
+    def arms(self) -> np.ndarray:
+        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
+        surface, arms = self.surface, self.now.arms
+        return self.x - surface.point - surface.displacement if arms is None else arms
+
+    def carried(self, last: State) -> State:
+        """The last state in the frames of the next step."""
+        before, now = self.settled, self.now
+        if self.surface.curved:
+            moved = turned_back(before.own, last.displacement)
+            last = last._replace(displacement=frozen(times(now.own, moved)))
+        if now.points is not before.points:
+            last = last._replace(reaction=frozen(carried(last.reaction, before.frame, now.frame)))
+        return last
+
+    # -- motion --------------------------------------------------------------------------------
+
+    def of_surface(self) -> np.ndarray:
+        """Motion of the surface at the nodes, global frame: ``shape=(gdim,)`` if it is the same for all."""
+        motion, spin = self.surface.motion(self.x), self.surface.spin
+        return motion if spin is None else motion + cross(spin, self.now.arms)
+
+    def surface_moved(self) -> np.ndarray:
+        """The same in the local frame."""
+        motion, frame = self.of_surface(), self.now.frame
+        return frame @ motion if motion.ndim == 1 else times(frame, motion)
+
+    def at_rest(self) -> State:
+        """The state of the undeformed body without reactions."""
+        n, gdim = self.x.shape
+        moved = np.broadcast_to(self.surface_moved(), (n, gdim))
+        gap, none = self.now.flat - moved[:, -1], np.zeros((n, gdim - 1))
+        return State(-moved, np.zeros((n, gdim)), gap, none, np.zeros(n, dtype=np.uint8))
+
+    def moved(self, u: np.ndarray, last: State, worn: np.ndarray) -> dict:
+        """Gaps and slip increments for a displacement, from the last converged state on, as parts of a ``State``.
+
+        Args:
+            u: Displacement of owned degrees of freedom, length units.
+            last: The last converged state, in these frames.
+            worn: Depths, ``shape=(n,)``.
+        """
+        points, moved = self.now.points, self.surface_moved()
+        motion = points.motion(u)
+        displacement = motion - moved
+        gap = self.now.flat + worn + displacement[:, -1]
+        slip = displacement - last.displacement
+        known = points.known(slip, (motion, moved, last.displacement))
+        slip = slip[:, :-1]
+        points.without_held(slip)
+        if known is not None:
+            slip += known
+        gap[points.closed] = np.maximum(gap[points.closed], self._apart)
+        return dict(displacement=displacement, gap=gap, slip_increment=slip, known=known)
+
+    def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
+        """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
+        if turns:
+            return times(self.now.frame, cross(axis, self.now.arms))
+        along = self.now.frame @ axis  # the axes of a plane are those of its frame
+        return np.broadcast_to(along if self.surface.curved else np.rint(along), self.x.shape)
+
+    def turned_past(self, displacement: np.ndarray) -> np.ndarray:
+        """Displacements relative to the surface with what a rotation found in the step is beyond the first order."""
+        ended = copy(self.surface)
+        ended.end_step()
+        moved = turned_back(self.now.frame, displacement) + self.of_surface()
+        return times(self.now.own, ended.moved_past(self.x, moved))
+
+    def gap_rounding(self, u: np.ndarray) -> float:
+        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        lengths = (self.x, self.surface.point, self.surface.displacement, self.now.points.motion(u))
+        return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
+
+    def motion_rounding(self, u: np.ndarray, state: State, last: State, worn) -> tuple:
+        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
+
+        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
+
+        Args:
+            u: Displacement of owned degrees of freedom, for which ``state`` was computed.
+            state, last, worn: As ``moved`` has them.
+        """
+        frame, motion = np.abs(self.now.frame), np.abs(self.of_surface())
+        felt = frame @ motion if motion.ndim == 1 else times(frame, motion)
+        terms = self.now.points.magnitudes(u) + felt
+        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.surface.point))
+        gap = terms[:, -1] + coordinates + worn
+        slip = terms[:, :-1] + np.abs(last.displacement[:, :-1])
+        if state.known is None:
+            slip[self.now.points.held] = 0.0
+        return EPSILON * gap, EPSILON * slip
+
+    # -- checkpoints ---------------------------------------------------------------------------
+
+    def save(self) -> dict[str, np.ndarray]:
+        """What the frames were taken for, as arrays by name."""
+        surface, saved = self.surface, {}
+        if surface.varies:
+            saved["home"] = self.now.home
+        if self.now.rotation.any():
+            saved["rotation_of_plane"] = self.now.rotation
+        if surface.spins:
+            saved["found_rotation_of_plane"] = surface.rotation
+        return saved
+
+
+def times(frame: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Components of ``vectors``, ``shape=(n, gdim)``, in one frame or a frame each."""
+    return (frame @ vectors[:, :, None])[:, :, 0]
+
+
+def turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
+    """Vectors of these components, ``shape=(n, gdim)``, in one frame or a frame each."""
+    return (components[:, None, :] @ frame)[:, 0]
+
+
+def carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Reactions in other frames: friction keeps its length and, as far as it can, its direction in space."""
+    found, tangential = reaction.copy(), reaction.copy()
+    tangential[:, -1] = 0.0
+    along = times(after, turned_back(before, tangential))[:, :-1]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    kept = np.linalg.norm(tangential, axis=1, keepdims=True)
+    found[:, :-1] = np.divide(kept, length, np.zeros_like(length), where=length > 0) * along
+    return found
