@@ -10,7 +10,7 @@
 #include <benchmark/benchmark.h>
 #include <cstring>
 #include <ctime>
-#include <dolfinx_contact/batch.h>
+#include <dolfinx_contact/law/batch.h>
 #include <map>
 #include <memory>
 #include <random>

@@ -1,5 +1,5 @@
 // A node pressed and dragged over a plane with orthotropic friction: one predictor and corrector.
-#include <dolfinx_contact/bipotential.h>
+#include <dolfinx_contact/law/bipotential.h>
 #include <iostream>
 
 int main() {

@@ -1,6 +1,6 @@
 // Functions of one node, and a loop over nodes: what docs/cpp.md shows.
 #include <cmath>
-#include <dolfinx_contact/batch.h>
+#include <dolfinx_contact/law/batch.h>
 #include <iostream>
 
 namespace dc = dolfinx_contact;

@@ -5,7 +5,7 @@
 
 #include <array>
 #include <cmath>
-#include <dolfinx_contact/batch.h>
+#include <dolfinx_contact/law/batch.h>
 #include <random>
 
 namespace dolfinx_contact::testing {

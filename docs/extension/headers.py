@@ -1,6 +1,6 @@
 """The C++ reference: declarations of a header with the comments above them, as the header has them.
 
-```{cpp-header} friction.h
+```{cpp-header} law/friction.h
 ```
 """
 

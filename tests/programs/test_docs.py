@@ -219,7 +219,7 @@ def test_cpp_reference_has_every_declaration():
         shown |= names
     programs = [
         ROOT / "cpp" / "example" / "functions.cpp",
-        ROOT / "cpp" / "tests" / "test_condensed.cpp",
+        ROOT / "cpp" / "tests" / "condensed" / "test_search.cpp",
     ]
     example = (
         programs[0].read_text()

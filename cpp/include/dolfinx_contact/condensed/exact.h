@@ -6,7 +6,7 @@
 #pragma once
 
 #include "../algebra/square.h"
-#include "../friction.h"
+#include "../law/friction.h"
 
 namespace dolfinx_contact::condensed {
 /// A contact's reaction r and motion w (T tangential components, then the normal one), and what the

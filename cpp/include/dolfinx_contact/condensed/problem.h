@@ -5,7 +5,7 @@
 /// `solve`, whose compilation takes a minute, is in search.h.
 #pragma once
 
-#include "../law.h"
+#include "../law/law.h"
 #include "operator.h"
 #include <array>
 #include <functional>

@@ -6,7 +6,7 @@
 /// Curnier.
 #pragma once
 
-#include "../law.h"
+#include "../law/law.h"
 #include "operator.h"
 
 namespace dolfinx_contact::condensed {

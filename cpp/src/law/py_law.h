@@ -5,7 +5,7 @@
 // released in loops.
 #pragma once
 
-#include <dolfinx_contact/batch.h>
+#include <dolfinx_contact/law/batch.h>
 
 #include <optional>
 #include <pybind11/numpy.h>

@@ -4,7 +4,7 @@
 /// that is empty where the property holds.
 #pragma once
 
-#include "random_states.h"
+#include "../random_states.h"
 #include <sstream>
 #include <string>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 /// The condensed problem w = q + W r: closed forms, and random problems whose answers are judged by
 /// the law as the paper writes it, without the projection that the solver uses.
-#include "random_states.h"
+#include "../random_states.h"
 #include <dolfinx_contact/condensed/problem.h>
 #include <gtest/gtest.h>
 

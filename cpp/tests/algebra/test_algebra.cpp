@@ -3,7 +3,7 @@
 //
 // Each operation of the linear algebra gives what its formula gives, entry by entry in long double,
 // whatever part of the matrix is stored; entries that are not stored are not read.
-#include "random_states.h"
+#include "../random_states.h"
 #include <dolfinx_contact/algebra/square.h>
 #include <gtest/gtest.h>
 #include <limits>

@@ -1,7 +1,7 @@
 // Copyright (c) 2025 The dolfinx_contact authors
 // SPDX-License-Identifier: MIT
 //
-// The kernel on NumPy arrays: its functions by name.
+// The law on NumPy arrays: its functions by name.
 #include "py_law.h"
 
 namespace {
@@ -103,14 +103,7 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
 }
 } // namespace
 
-void bind_condensed(py::module_ &m); // bindings_condensed.cpp
-
-PYBIND11_MODULE(_kernel, m) {
-    m.doc() =
-        "Kernel of dolfinx_contact: friction law, cone and maps on NumPy arrays.\n\n"
-        "Local frame (t1, t2, n), or (t, n) in two dimensions. r, tau: (n, dim); gap, rho:\n"
-        "(n,); slip: (n, dim - 1); branch: uint8, 0 open, 1 stick, 2 slip. All float64 of any\n"
-        "strides, read in place.";
+void bind_law(py::module_ &m) {
     bind_law<1>(m, "Law2D");
     bind_law<2>(m, "Law3D");
     m.def(
@@ -126,20 +119,4 @@ PYBIND11_MODULE(_kernel, m) {
         py::arg("mu"), py::arg("p"), py::arg("dim"), py::arg("axes") = py::none(),
         "The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: "
         "associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).");
-    bind_condensed(m);
-    m.def(
-        "instruction_sets",
-        [] {
-            std::vector<std::string> sets;
-#if defined(__x86_64__)
-            if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-                __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-                sets.emplace_back("avx512");
-            if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-                sets.emplace_back("avx2");
-#endif
-            return sets;
-        },
-        "What this processor can run beyond what every one can, the widest first: _algebra_avx512, "
-        "_algebra_avx2.");
 }

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: MIT
 /// What the condensed solver's judge is made of: products in twice the precision, the law in
 /// extended precision, inverses with tied rows.
-#include "random_states.h"
-#include <dolfinx_contact/bipotential.h>
+#include "../random_states.h"
 #include <dolfinx_contact/condensed/exact.h>
 #include <dolfinx_contact/condensed/judge.h>
 #include <dolfinx_contact/condensed/operator.h>
-#include <dolfinx_contact/slip_rule.h>
+#include <dolfinx_contact/law/bipotential.h>
+#include <dolfinx_contact/law/slip_rule.h>
 #include <gtest/gtest.h>
 
 using namespace dolfinx_contact;
