@@ -265,7 +265,7 @@ class ContactProblem(ProblemStates):
         return step
 
     def bound(self) -> BoundSolver:
-        """The solver, bound to the body as it is now, see ``solver.py``.  Collective."""
+        """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""
         if self._bound_to is not self.solver:
             self._unbind()
             solver = self.solver

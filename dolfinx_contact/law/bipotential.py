@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The gap of the bi-potential on NumPy arrays: a certificate for any approximate solution.
 
-[dSFMH07]: see :mod:`dolfinx_contact.friction`. Needs NumPy alone, no DOLFINx.
+[dSFMH07]: see :mod:`dolfinx_contact.law.friction`. Needs NumPy alone, no DOLFINx.
 """
 
 from __future__ import annotations

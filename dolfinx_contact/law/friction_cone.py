@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The elliptic friction cone on NumPy arrays: load function and Euclidean projection.
 
-[dSFMH07]: see :mod:`dolfinx_contact.friction`. Needs NumPy alone, no DOLFINx.
+[dSFMH07]: see :mod:`dolfinx_contact.law.friction`. Needs NumPy alone, no DOLFINx.
 """
 
 from __future__ import annotations

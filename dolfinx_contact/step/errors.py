@@ -1,4 +1,4 @@
-r"""The errors of a step: dimensionless numbers, defined here and nowhere else; see docs/errors.md.
+r"""The errors of a step, dimensionless numbers; see docs/errors.md.
 
 For a displacement ``u`` with nodal reactions ``r`` in the friction cone all errors are forces that are not as they
 should be, over the forces that act in that same state,

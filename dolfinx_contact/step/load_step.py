@@ -38,7 +38,7 @@ def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
 class LoadStep:
     """Equilibrium of a body under new loads, its contacts, and the errors of a displacement.
 
-    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``maps.py`` for each contact.
+    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``law/maps.py`` for each contact.
 
     Args:
         body: The body, its stiffness assembled.
@@ -52,8 +52,8 @@ class LoadStep:
         monitor: None, or the user's function of iteration, largest error and ``Counts``.
 
     Attributes:
-        planes: The ``DrivenPlanes``, None where force drives none.  They follow every displacement that is asked for.
-        holding: ``HeldPlanes``, None where held nodes hold none of them.
+        surfaces: The ``DrivenSurfaces``, None where force drives none.  They follow every displacement that is asked for.
+        holding: ``HeldSurfaces``, None where held nodes hold none of them.
         statics: ``Statics`` of a body that contact alone holds, else None.
         alone: The displacement without reactions, None where it was not asked for or not found exactly.
     """

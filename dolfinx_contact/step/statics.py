@@ -82,7 +82,7 @@ class Statics:
         if escape is None and step.surfaces is not None:
             escape, _ = self._escape(*self._with_surfaces(step.surfaces))
             self.said = "" if escape is None else nothing_holds(contacts)
-        # Planes that move alone are the concern of ``DrivenPlanes.beyond``.
+        # Planes that move alone are the concern of ``DrivenSurfaces.beyond``.
         if escape is not None and np.linalg.norm(escape[:m]) > SMALL * np.linalg.norm(escape):
             self.said = self.said or (
                 f"The loads drive {body.loose.words(escape[:m])}, which no reactions of the contact nodes within their friction can "

@@ -30,10 +30,10 @@ class SurfaceBalance:
     """The equilibrium of planes at a displacement, in their motions alone: a few unknowns, products at contact nodes.
 
     Args:
-        planes: The ``DrivenPlanes``.
+        surfaces: The ``DrivenSurfaces``.
         body: The body, for sums over ranks.
         x: Displacement of owned degrees of freedom.
-        maps: Of the contacts, see ``maps.py``.
+        maps: Of the contacts, see ``law/maps.py``.
         asked: Function that yields the contacts, each with the reactions that the body asks for.
     """
 

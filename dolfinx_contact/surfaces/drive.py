@@ -190,7 +190,7 @@ class Drive(Guarded):
         self._spin = angle
 
     def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
-        """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held_planes.py``."""
+        """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held.py``."""
         self._held, self._past_held = names, past
 
     @property

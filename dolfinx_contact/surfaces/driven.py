@@ -293,7 +293,7 @@ class DrivenSurfaces:
 
         Args:
             x: Displacement of owned degrees of freedom.
-            maps: Of the contacts, see ``maps.py``.
+            maps: Of the contacts, see ``law/maps.py``.
             asked: Function that yields the contacts, each with the reactions that the body asks for.
         """
         SurfaceBalance(self, self._body, x, maps, asked).reach()

@@ -115,7 +115,7 @@ class HeldSurface:
 
     Args:
         body: The body, for sums over ranks.
-        plane: The plane.
+        surface: The plane.
         motions: Those that are held, ``m`` of them, translations.
         holding: ``Holding`` of each contact on the plane.
         contacts: All contacts on it.

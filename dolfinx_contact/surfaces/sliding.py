@@ -15,7 +15,7 @@ MARGIN = 1e-9
 
 
 def slides_away(surfaces, body, contacts, given: bool) -> str:
-    """Which of the ``DrivenPlanes`` slides away, tips or spins, in words; none is the empty string.  Collective.
+    """Which of the ``DrivenSurfaces`` slides away, tips or spins, in words; none is the empty string.  Collective.
 
     Args:
         given: Ask before anything is known but the forces that are given, not by the present normal reactions.
@@ -42,7 +42,7 @@ def lost_far_away(body, statics, surfaces, x: np.ndarray, acts: bool) -> bool:
     Args:
         body: The body.
         statics: Its ``Statics``, None where something holds it.
-        planes: The ``DrivenPlanes``, or None.
+        surfaces: The ``DrivenSurfaces``, or None.
         x: Displacement, owned degrees of freedom, whose rounding is as large as the forces that act, roughly.
         acts: Whether some act above rounding.
     """

@@ -47,7 +47,7 @@ class CondensedBody:
     part in the law, with next to no compliance along the prescribed one.  Without friction at any contact there are
     normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
     forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
-    planes that force drives, see ``CondensedPlanes``.
+    planes that force drives, see ``CondensedSurfaces``.
 
     Args:
         options: ``CondensedNewton``, which solves the condensed problem.

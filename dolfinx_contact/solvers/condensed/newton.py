@@ -118,7 +118,7 @@ class CondensedNewton:
         return result
 
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
-        """See ``solver.Solver``."""
+        """See ``Solver``."""
         from dolfinx_contact.solvers.condensed.body import (
             CondensedBody,  # arrays alone do without DOLFINx
         )
