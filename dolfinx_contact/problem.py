@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -45,14 +46,19 @@ from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
 from dolfinx_contact.step.nonlinear import NonlinearStep
-from dolfinx_contact.step.settle import found_for, refusal, with_friction
-from dolfinx_contact.step.trial import unmoved
+from dolfinx_contact.step.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.surfaces.driven import approach, check_driven, freedom
 from dolfinx_contact.surfaces.held import HeldSurfaces, held_surfaces
 
 LOG = logging.getLogger("dolfinx_contact")
+
+# How often friction is made to follow the pressure, and the largest factor by which its changes are taken to fall.
+MOST, SLOWEST = 50, 0.9
+
+# Tolerance of a solution on the way: at most ROUGH, and this part of the last change of the reactions.
+ROUGH, PART = 1e-3, 0.03
 
 
 class ContactProblem(ProblemStates):
@@ -222,7 +228,7 @@ class ContactProblem(ProblemStates):
         done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
         if not converged(step.errors, done, self.tol):
             raise NotConverged(
-                f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {refusal(step, self.contacts)}.",
+                f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {step.refusal()}.",
                 done,
                 self.body.values(found.x),
                 [contact.reaction for contact in self.contacts],
@@ -258,11 +264,8 @@ class ContactProblem(ProblemStates):
             self._unbind()
             self._freedom = freedom(self.contacts)
         kind = NonlinearStep if body.nonlinear else LoadStep
-        step = kind(
-            body, self.contacts, self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
-        )  # fmt: skip
-        step.holding = holding
-        return step
+        given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
+        return kind(body, self.contacts, *given)
 
     def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""
@@ -276,26 +279,92 @@ class ContactProblem(ProblemStates):
         return self._bound
 
     def _search(self) -> tuple[LoadStep, SolverResult]:
-        """A displacement that the solver takes for the solution, and the step that has judged it."""
-        step = self.load_step()
-        found = self._found(step)
+        """The step that has judged what the solver takes for the solution, and that."""
+        step, found = self._with_friction(self.load_step())
         if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
             for contact in self.contacts:
                 contact.restore()
             step = self.load_step(step.holding)
             if step.holding.beyond:
                 return step, unmoved(self.body, step, self._states[0])
-            found = self._found(step)
+            step, found = self._with_friction(step)
         return step, found
 
-    def _found(self, step: LoadStep) -> SolverResult:
-        def search() -> SolverResult:
-            arguments = self.body, self.contacts, step, self._states[0], self.undetermined
-            return found_for(*arguments, self._solved)
+    def _with_friction(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+        """What is found with friction that belongs to the state found.  Collective.
 
-        return with_friction(self.contacts, step, search, self._renew_laws, self._memory)
+        A fixed point: the step is solved, laws that follow the pressure become those of the pressures found, and the errors are
+        measured with these.  They are what the step is judged by; while they are too large the step is solved again.
+        """
+        if not any(contact.follows_pressure for contact in self.contacts):
+            return self._found(step)
+        goal, tol, last, known = step.tol, max(step.tol, ROUGH), np.inf, None
+        rounds = iterations = 0
+        while rounds < MOST:
+            step, found = self._found(step.within(tol))
+            known = self._keep_one_start(known)
+            rounds, iterations = rounds + 1, iterations + found.iterations
+            if not step.errors.within(tol):
+                break  # no state with these laws
+            self._renew_laws()
+            step = step.with_laws_of(found.x)
+            change = step.measure(found.x).change
+            rate = min(change / last, SLOWEST) if 0.0 < last < np.inf else 0.5
+            forward = max(found.forward_error, change * rate / (1 - rate))
+            found = found._replace(forward_error=forward)
+            settled = forward <= goal and step.errors.within(goal)
+            if settled or step.errors.within(0.0):
+                break
+            last, tol = change, max(goal, min(ROUGH, PART * change))
+        said = f"{found.chosen}, {rounds} times with friction that follows the pressure"
+        return step.within(goal), found._replace(iterations=iterations, chosen=said)
+
+    def _keep_one_start(self, before):
+        """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""
+        past = self._memory.get("past", ())
+        if before is not None and len(past) > 1 and past[-2] is before:
+            del past[-2]
+        return past[-1] if past else None
+
+    def _found(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+        """What is found with the laws as they are, whatever holds the body.  Collective."""
+        if step.surfaces is not None:
+            step.surfaces.check()
+            if step.surfaces.beyond(given=True):
+                return step, unmoved(self.body, step, self._states[0])
+        if self.body.loose is not None:
+            return self._held_by_contact(step)
+        linear = not self.body.nonlinear
+        found = without_reactions(self.body, self.contacts, step) if linear else None
+        return step, found or self._solved(step)
+
+    def _held_by_contact(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+        """What is found of a body that contact alone holds.  Collective.
+
+        Raises:
+            ValueError: on all ranks, if nothing can hold the body, or nothing determines a motion that is to be refused.
+        """
+        from dolfinx_contact.step.statics import Statics
+
+        body, last, found = self.body, self._states[0], None
+        statics = Statics(body, self.contacts, step, last)
+        step = step.held_by(statics)
+        if statics.said:
+            return step, unmoved(body, step, last)
+        if not statics.loads.any():
+            found = floating(body, self.contacts, step, last)
+        pressed = np.concatenate([contact.last.reaction[:, -1] for contact in self.contacts])
+        if not body.largest(pressed) > 0.0:
+            statics.place()
+        found = found or self._solved(step)
+        if not step.errors.within(step.tol):
+            return step, found
+        if not statics.balanced():
+            return step, unmoved(body, step, last)
+        return step, found._replace(x=statics.settled(step, found.x, self.undetermined))
 
     def _solved(self, step: LoadStep) -> SolverResult:
+        """What the solver finds, measured."""
         with stage("contact: iterations"):
             found = self.bound().solve(step)
         step.measure(found.x)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from dolfinx_contact.contact.shared import shared_nodes
@@ -50,20 +52,23 @@ class LoadStep:
         tol: Largest error.
         unit: Of force, any that keeps squares within the range of double precision.
         monitor: None, or the user's function of iteration, largest error and ``Counts``.
+        holding: As the attribute.
 
     Attributes:
         surfaces: The ``DrivenSurfaces``, None where force drives none.  They follow every displacement that is asked for.
         holding: ``HeldSurfaces``, None where held nodes hold none of them.
-        statics: ``Statics`` of a body that contact alone holds, else None.
-        alone: The displacement without reactions, None where it was not asked for or not found exactly.
+        statics: ``Statics`` of a body that contact alone holds, else None; see ``held_by``.
+        errors: Of the state judged last.
     """
 
-    def __init__(self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None):
+    def __init__(
+        self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None, holding=None
+    ):
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
         self.surfaces = driven_surfaces(body, contacts)
         self._shared = shared_nodes(contacts, stiffness, body.fixed)
-        self.statics = self.alone = self.holding = None
+        self.statics, self.holding = None, holding
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before, self._told = None, 0  # reactions of the state judged before, states told
         self._known = None  # a displacement, and the forces b - K x that it leaves
@@ -74,20 +79,37 @@ class LoadStep:
         """Whether a plane, or the body, is held by contact along some direction."""
         return self.surfaces is not None or self.statics is not None
 
-    def free_state(self) -> np.ndarray:
-        """The displacement without reactions, to all digits.  Collective."""
-        return self.body.free_state(self.b) if self.alone is None else self.alone
+    def held_by(self, statics) -> LoadStep:
+        """The step of a body that contact alone holds, with its ``Statics``."""
+        return self._but(statics=statics)
+
+    def within(self, tol: float) -> LoadStep:
+        """The step with another tolerance."""
+        return self._but(tol=tol)
+
+    def with_laws_of(self, x: np.ndarray) -> LoadStep:
+        """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet."""
+        return self._but(_starts=[x], _measured=None)
+
+    def _but(self, **parts) -> LoadStep:
+        other = copy(self)
+        vars(other).update(parts)
+        return other
 
     def slides(self) -> bool:
         """Whether force pushes a plane, or loads a body, by more than friction carries in the present state.  Collective."""
         slides = self.surfaces is not None and bool(self.surfaces.beyond())
         return slides or (self.statics is not None and self.statics.slides(self))
 
-    def hidden(self) -> str:
-        """Whether rounding hides the loads of a body that contact alone holds, in words.  Collective."""
-        return "" if self.statics is None else self.statics.hidden(self)
+    def refusal(self) -> str:
+        """Why it has not converged, in words, as far as anything tells.  Collective."""
+        said = "" if self.statics is None else self.statics.hidden(self)
+        said = said or self._no_state() or "Smaller load steps help most often"
+        if any(contact.follows_pressure for contact in self.contacts):
+            said += "; friction follows the pressure, and was that of the last iterate"
+        return said
 
-    def no_state(self) -> str:
+    def _no_state(self) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""
         said = "" if self.statics is None else self.statics.said
         if self.surfaces is not None:
@@ -190,10 +212,6 @@ class LoadStep:
             self.errors = self.errors._replace(change=change)
         self._tell()
         return left, self.errors
-
-    def again(self, x: np.ndarray) -> None:
-        """Laws are others now: measure anew, and start from a displacement."""
-        self._measured, self._starts = None, [x]
 
     def measure(self, x: np.ndarray) -> Errors:
         """Errors of a displacement by F itself; also takes its reactions, gaps and slips.

@@ -25,7 +25,6 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
         trial = body.free_state(step.b, rough=True)
         if not (body.known.exact or presses(body, contacts, trial)):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
-        step.alone = trial if body.known.exact else None
     if not may_touch(body, contacts, trial):
         trial = refined(body, step, trial)
         if step.errors.within(step.tol):
@@ -33,38 +32,6 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
     if step.surfaces is not None:
         step.surfaces.move_to(np.zeros(step.surfaces.count))
     return None
-
-
-def held_by_contact(body, contacts, step, last, undetermined: str, solve) -> SolverResult:
-    """What is found of a body that contact alone holds.  Collective.
-
-    Args:
-        body, contacts: The body, with ``loose`` motions, and its contacts.
-        step: The ``LoadStep``; gets its ``statics``, and has measured what is returned.
-        last: The last converged displacement, owned degrees of freedom.
-        undetermined: What to do with motions that nothing determines, "refused" or "nearest".
-        solve: Function of the step that asks the solver.
-
-    Raises:
-        ValueError: on all ranks, if nothing can hold the body, or nothing determines a motion that is to be refused.
-    """
-    from dolfinx_contact.step.statics import Statics  # of loose bodies alone
-
-    step.statics = statics = Statics(body, contacts, step, last)
-    if statics.said:
-        return unmoved(body, step, last)
-    found = None
-    if not statics.loads.any():
-        found = _floating(body, contacts, step, last)
-    pressed = np.concatenate([contact.last.reaction[:, -1] for contact in contacts])
-    if not body.largest(pressed) > 0.0:
-        statics.place()
-    found = found or solve(step)
-    if not step.errors.within(step.tol):
-        return found
-    if not statics.balanced():
-        return unmoved(body, step, last)
-    return found._replace(x=statics.settled(step, found.x, undetermined))
 
 
 def unmoved(body, step, last: np.ndarray) -> SolverResult:
@@ -75,7 +42,7 @@ def unmoved(body, step, last: np.ndarray) -> SolverResult:
     return SolverResult(x, 0, np.inf, "none: there is no solution")
 
 
-def _floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
+def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
     """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
 
     None where it touches.

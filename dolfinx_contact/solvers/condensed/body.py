@@ -128,7 +128,7 @@ class CondensedBody:
 
     def _begin(self, step) -> np.ndarray:
         """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
-        free = self._held_by.solve(step.b) if self._anchored else step.free_state()
+        free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
         self._surfaces.begin(step, free)
         if self._guided:
             for contact in self._contacts:
