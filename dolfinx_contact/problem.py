@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from os import PathLike
 from time import perf_counter
 from typing import Any
 
@@ -13,7 +14,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies.internal_variables import InternalVariables
 from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
@@ -27,9 +27,13 @@ from dolfinx_contact.problem_input import (
     checked_conditions,
     checked_contacts,
     checked_options,
+    checked_solver,
+    checked_tolerance,
+    checked_undetermined,
     follow,
     hold,
     take_contacts,
+    variables_of,
 )
 from dolfinx_contact.problem_states import ProblemStates
 from dolfinx_contact.results.record import (
@@ -48,6 +52,7 @@ from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
 from dolfinx_contact.step.nonlinear import NonlinearStep
 from dolfinx_contact.step.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
+from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.surfaces.driven import approach, check_driven, freedom
 from dolfinx_contact.surfaces.held import HeldSurfaces, held_surfaces
@@ -61,7 +66,7 @@ MOST, SLOWEST = 50, 0.9
 ROUGH, PART = 1e-3, 0.03
 
 
-class ContactProblem(ProblemStates):
+class ContactProblem(Guarded):
     """An elastic body pressed against rigid planes, solved load step by load step.
 
     Args:
@@ -111,6 +116,10 @@ class ContactProblem(ProblemStates):
         True
     """
 
+    monitor: Callable[[int, float, Counts], object] | None
+    _settable = ("monitor", "solver", "tol", "undetermined")
+    _remedy = "monitor, solver, tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
+
     def __init__(
         self,
         F: Any,
@@ -137,7 +146,7 @@ class ContactProblem(ProblemStates):
             self.solver, self.tol = solver, tol
             self.undetermined = undetermined
             petsc_options = checked_options(petsc_options)
-            self._variables = InternalVariables(state, after_step)
+            self._variables = variables_of(state, after_step)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
         self.u, self.monitor = u, None
@@ -150,13 +159,44 @@ class ContactProblem(ProblemStates):
         self._unseen = Unseen(self.contacts)
         self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
-        self._assembled, self._memory = 0, {}
+        self._assembled = 0
         self._laws, self._freedom = self._present_laws(), freedom(self.contacts)
         take_contacts(self, self.contacts)
-        self._stood = self._places()
-        self._begin()
+        self._states = ProblemStates(self.body, self.contacts, self._variables)
         self.number = next(NUMBERS)
         self._made = True
+
+    def __repr__(self) -> str:
+        nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
+        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
+        return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
+
+    @property
+    def solver(self) -> Solver:
+        """The solver's options; another one may be assigned between steps, on all ranks."""
+        return self._solver
+
+    @solver.setter
+    def solver(self, solver: Solver | None) -> None:
+        self._solver = checked_solver(solver)
+
+    @property
+    def tol(self) -> float:
+        """The tolerance; another one may be assigned between steps, on all ranks."""
+        return self._tol
+
+    @tol.setter
+    def tol(self, tol: float) -> None:
+        self._tol = checked_tolerance(tol)
+
+    @property
+    def undetermined(self) -> str:
+        """What to do with rigid motions that nothing determines, "refused" or "nearest"; may change between steps, on all ranks."""
+        return self._undetermined
+
+    @undetermined.setter
+    def undetermined(self, choice: str) -> None:
+        self._undetermined = checked_undetermined(choice)
 
     def close(self) -> None:
         """Free what PETSc holds: matrices, factors, levels.  Collective; results stay, no step can follow."""
@@ -187,8 +227,8 @@ class ContactProblem(ProblemStates):
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
-        stood = [contact.surface.displacement for contact in self.contacts]
-        self._variables.settle()  # with what the user has written into them
+        stood = self._states.places()
+        self._states.take_variables()
         try:
             with raised_together(self.body.comm):  # whatever happens on one rank alone
                 done, found = self._step(start)
@@ -198,19 +238,10 @@ class ContactProblem(ProblemStates):
             if self.body.comm.allreduce(stopped, op=MPI.LOR):
                 self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
                 self.body.forget()
-            for contact, where in zip(self.contacts, stood):
-                contact.surface.displacement = where
-                contact.surface.spin_by(None)
-            self._restore()
+            self._states.restore(stood)
             raise_interrupt(failure)
             raise
-        self._states = [found.x, self._states[0]]
-        self._variables.settle()
-        for contact in self.contacts:
-            contact.advance()
-        for contact in self.contacts:
-            contact.surface.end_step()
-        self._keep(step=True)
+        self._states.advance(found.x)
         self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
         self._large = self._large or check_size(self.body, found.x, self.u.x.array)
         self._unseen.check(
@@ -234,7 +265,8 @@ class ContactProblem(ProblemStates):
                 [contact.reaction for contact in self.contacts],
             )
         self.body.put(found.x)
-        self._variables.advance(self.u)
+        if self._variables is not None:
+            self._variables.move_on(self.u)
         return done, found
 
     def load_step(self, holding: HeldSurfaces | None = None) -> LoadStep:
@@ -246,9 +278,9 @@ class ContactProblem(ProblemStates):
             holding: Planes that held nodes hold, or cannot hold, if that is known.
         """
         body = self.body
-        assembled = body.refresh(self._states[0])
-        approach(body, self.contacts, self._states[0])
-        turned = follow(self.contacts, body, self._states[0], self._points)
+        assembled = body.refresh(self._states.last)
+        approach(body, self.contacts, self._states.last)
+        turned = follow(self.contacts, body, self._states.last, self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
             if turned or not body.nonlinear:  # else its stiffness is new in every iteration
@@ -256,7 +288,7 @@ class ContactProblem(ProblemStates):
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         self._renew_laws(begin=True)  # in the frames of this step
         b, external = body.load()
-        last, before = self._states
+        last, before = self._states.last, self._states.before
         starts = [body.taken(self.u.x.array), 2 * last - before]
         if holding is None and any(contact.surface.free for contact in self.contacts):
             holding = held_surfaces(body, self.contacts, last, b)
@@ -274,7 +306,9 @@ class ContactProblem(ProblemStates):
             solver = self.solver
             if self.body.nonlinear and not getattr(solver, "nonlinear", False):
                 solver = Linearised(solver)
-            self._bound = solver.bind(self.body, self.contacts, self._stiffness, self._memory)
+            self._bound = solver.bind(
+                self.body, self.contacts, self._stiffness, self._states.memory
+            )
             self._bound_to = self.solver
         return self._bound
 
@@ -286,7 +320,7 @@ class ContactProblem(ProblemStates):
                 contact.restore()
             step = self.load_step(step.holding)
             if step.holding.beyond:
-                return step, unmoved(self.body, step, self._states[0])
+                return step, unmoved(self.body, step, self._states.last)
             step, found = self._with_friction(step)
         return step, found
 
@@ -321,7 +355,7 @@ class ContactProblem(ProblemStates):
 
     def _keep_one_start(self, before):
         """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""
-        past = self._memory.get("past", ())
+        past = self._states.memory["past"]
         if before is not None and len(past) > 1 and past[-2] is before:
             del past[-2]
         return past[-1] if past else None
@@ -331,7 +365,7 @@ class ContactProblem(ProblemStates):
         if step.surfaces is not None:
             step.surfaces.check()
             if step.surfaces.beyond(given=True):
-                return step, unmoved(self.body, step, self._states[0])
+                return step, unmoved(self.body, step, self._states.last)
         if self.body.loose is not None:
             return self._held_by_contact(step)
         linear = not self.body.nonlinear
@@ -346,7 +380,7 @@ class ContactProblem(ProblemStates):
         """
         from dolfinx_contact.step.statics import Statics
 
-        body, last, found = self.body, self._states[0], None
+        body, last, found = self.body, self._states.last, None
         statics = Statics(body, self.contacts, step, last)
         step = step.held_by(statics)
         if statics.said:
@@ -375,6 +409,48 @@ class ContactProblem(ProblemStates):
         if self._bound is not None:
             self._bound.destroy()
         self._bound = self._bound_to = None
+
+    # -- converged states ----------------------------------------------------------------------
+
+    def rewind(self) -> None:
+        """Go back by one accepted step, as if it had not been made, to try another one.  Collective.
+
+        Displacement, contacts with their sums, and planes are those of the end of the step before; loads, boundary values and
+        laws stay as they are.  One step is kept: after it, ``rewind`` again needs another one to go back by.
+
+        Raises:
+            ValueError: no step has been accepted since the beginning, the last ``reset``, ``load`` or ``rewind``.
+        """
+        check_alive(self, self.body, self.contacts)
+        self._states.rewind()
+
+    def reset(self) -> None:
+        """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""
+        check_alive(self, self.body, self.contacts)
+        self._states.reset()
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
+
+        The file is replaced in one go, so a run that is killed leaves the last one whole.  Collective.
+
+        Args:
+            path: File name, usually ending in ``.npz``.
+        """
+        check_alive(self, self.body, self.contacts)
+        self._states.save(path)
+
+    def load(self, path: str | PathLike[str]) -> None:
+        """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
+
+        On one rank the steps that follow have the same bits as without the interruption.  On several
+        ranks MUMPS adds in the order in which messages arrive, and they agree to rounding.
+
+        Raises:
+            ValueError: the file is no checkpoint of this problem.
+        """
+        check_alive(self, self.body, self.contacts)
+        self._states.load(path)
 
     # -- helpers -------------------------------------------------------------------------------
 

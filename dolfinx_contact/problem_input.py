@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from itertools import count
 
 import numpy as np
@@ -14,10 +13,7 @@ from ufl.classes import Indexed, Product, SpatialCoordinate
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.results.record import Counts
 from dolfinx_contact.solvers.automatic import Automatic
-from dolfinx_contact.solvers.base import Solver
-from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import from_first, raised_together
 from dolfinx_contact.surfaces.drive import SQUARE
@@ -110,6 +106,22 @@ def checked_tolerance(tol) -> float:
             f"tol must be a finite number of at least 1e-13 (rounding forbids less), got {tol!r}."
         )
     return value
+
+
+def checked_undetermined(choice) -> str:
+    """One of ``UNDETERMINED``."""
+    if choice not in UNDETERMINED:
+        raise ValueError(f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}.")
+    return choice
+
+
+def variables_of(state, after_step):
+    """``InternalVariables``, None where there are none."""
+    if after_step is None and isinstance(state, (list, tuple)) and not state:
+        return None
+    from dolfinx_contact.bodies.internal_variables import InternalVariables
+
+    return InternalVariables(state, after_step)
 
 
 def checked_options(options) -> dict | None:
@@ -251,50 +263,6 @@ def check_axial(contacts) -> None:
                 f"{what}: rotations in the plane and resultants along the radius have no meaning there. Prescribe the motion, or "
                 "drive the axial one."
             )
-
-
-class ProblemOptions(Guarded):
-    """Solver and tolerance of a ``ContactProblem``, which may be exchanged between steps; the rest stays."""
-
-    monitor: Callable[[int, float, Counts], object] | None
-    _settable = ("monitor", "solver", "tol", "undetermined")
-    _remedy = "monitor, solver, tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
-
-    @property
-    def solver(self) -> Solver:
-        """The solver's options; another one may be assigned between steps, on all ranks."""
-        return self._solver
-
-    @solver.setter
-    def solver(self, solver: Solver | None) -> None:
-        self._solver = checked_solver(solver)
-
-    @property
-    def tol(self) -> float:
-        """The tolerance; another one may be assigned between steps, on all ranks."""
-        return self._tol
-
-    @tol.setter
-    def tol(self, tol: float) -> None:
-        self._tol = checked_tolerance(tol)
-
-    @property
-    def undetermined(self) -> str:
-        """What to do with rigid motions that nothing determines, "refused" or "nearest"; may change between steps, on all ranks."""
-        return self._undetermined
-
-    @undetermined.setter
-    def undetermined(self, choice: str) -> None:
-        if choice not in UNDETERMINED:
-            raise ValueError(
-                f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}."
-            )
-        self._undetermined = choice
-
-    def __repr__(self) -> str:
-        nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
-        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
-        return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
 
 
 def take_contacts(problem, contacts) -> None:

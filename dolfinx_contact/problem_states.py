@@ -10,122 +10,125 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.problem_input import ProblemOptions, check_alive
 from dolfinx_contact.results import checkpoint
-from dolfinx_contact.solvers.condensed.body import KEPT
+from dolfinx_contact.solvers.base import KEPT
 
 
 class Kept(NamedTuple):
     """All that a step ends with and the next one starts from: references, nothing is copied."""
 
-    states: list  # the last displacement and the one before
-    contacts: list  # histories
+    displacements: tuple  # the last one and the one before
+    histories: list  # of contacts and internal variables
     surfaces: list  # displacements and rotations
     known: Any  # the body's free state
     past: tuple  # steps of the condensed solver
-    variables: list  # values of internal variables
 
 
-class ProblemStates(ProblemOptions):
-    """The last converged states of a ``ContactProblem``, which has body, contacts and displacement."""
+class ProblemStates:
+    """The last converged states of a body, its contacts and internal variables.
 
-    _before: Kept | None = None
+    Args:
+        body: The body.
+        contacts: Its contacts.
+        variables: ``InternalVariables``, or None.
+
+    Attributes:
+        last: The last displacement, owned degrees of freedom.
+        before: The one before.
+        memory: Of solvers, see ``Solver.bind``.
+    """
+
+    def __init__(self, body, contacts, variables) -> None:
+        self._body, self._contacts, self._variables = body, contacts, variables
+        self._parts = [*contacts, *filter(None, [variables])]  # what has a history
+        self._stood, self.memory = self.places(), {}
+        self._begin()
+
+    def _begin(self) -> None:
+        """No history.  ``u`` is left: it is the guess of the first step."""
+        self.last = self.before = np.zeros(self._body.size)
+        self._body.known = None
+        self._remember(())
+        for part in self._parts:
+            part.reset()
+        self._keep(None)
+
+    def _keep(self, before: Kept | None) -> None:
+        """Keep the present state to go back to, and the one before, if there is one."""
+        histories = [part.history() for part in self._parts]
+        displacements, past = (self.last, self.before), tuple(self.memory["past"])
+        self._kept = Kept(displacements, histories, self.places(), self._body.known, past)
+        self._before = before
+
+    def _remember(self, past) -> None:
+        """Starts for the condensed solver, which has the same deque."""
+        kept = self.memory.setdefault("past", deque(maxlen=KEPT))
+        kept.clear()
+        kept.extend(past)
+
+    def places(self) -> list[tuple]:
+        """Displacement and rotation of each contact's surface."""
+        surfaces = [contact.surface for contact in self._contacts]
+        return [(surface.displacement, surface.rotation) for surface in surfaces]
+
+    def _put_surfaces(self, places: list[tuple]) -> None:
+        for contact, (displacement, rotation) in zip(self._contacts, places):
+            contact.surface.displacement, contact.surface.rotation = displacement, rotation
+
+    def take_variables(self) -> None:
+        """What the user has written into internal variables is their last state."""
+        if self._variables is not None:
+            self._variables.advance()
+
+    def advance(self, x: np.ndarray) -> None:
+        """The contacts' present state and this displacement are the last converged ones."""
+        self.last, self.before = x, self.last
+        for part in self._parts:
+            part.advance()
+        for contact in self._contacts:
+            contact.surface.end_step()
+        self._keep(self._kept)
+
+    def restore(self, places: list[tuple] | None = None) -> None:
+        """Show the last converged state; surfaces at ``places``, if these are given."""
+        if places is not None:
+            self._put_surfaces(places)
+        self._body.show(self.last)
+        for part in self._parts:
+            part.restore()
 
     def rewind(self) -> None:
-        """Go back by one accepted step, as if it had not been made, to try another one.  Collective.
-
-        Displacement, contacts with their sums, and planes are those of the end of the step before; loads, boundary values and
-        laws stay as they are.  One step is kept: after it, ``rewind`` again needs another one to go back by.
-
-        Raises:
-            ValueError: no step has been accepted since the beginning, the last ``reset``, ``load`` or ``rewind``.
-        """
-        check_alive(self, self.body, self.contacts)
+        """Go back by one step, see ``ContactProblem.rewind``.  Collective."""
         if self._before is None:
             raise ValueError(
                 "there is no step to go back by: rewind goes back once after a step; save and load go further."
             )
         kept = self._before
-        self._states, self.body.known = kept.states, kept.known
-        for contact, history, where in zip(self.contacts, kept.contacts, kept.surfaces):
-            contact.go_back(history)
-            contact.surface.displacement, contact.surface.rotation = where
-        self._remember(kept.past)
-        self._variables.go_back(kept.variables)
-        self._restore()
-        self._keep()
+        (self.last, self.before), self._body.known = kept.displacements, kept.known
+        for part, history in zip(self._parts, kept.histories):
+            part.go_back(history)
+        self._put_surfaces(kept.surfaces)
+        self._take(kept.past)
 
-    def _keep(self, step: bool = False) -> None:
-        """Keep the present state to go back to; after a ``step`` the one before, too."""
-        self._before = self._kept if step else None
-        self._kept = Kept(
-            self._states,
-            [contact.history() for contact in self.contacts],
-            self._places(),
-            self.body.known,
-            tuple(self._memory.get("past", ())),
-            self._variables.last,
-        )
-
-    def _places(self) -> list[tuple]:
-        """Displacement and rotation of each contact's surface."""
-        return [
-            (contact.surface.displacement, contact.surface.rotation) for contact in self.contacts
-        ]
-
-    def _remember(self, past) -> None:
-        """Starts for the condensed solver."""
-        kept = self._memory.setdefault("past", deque(maxlen=KEPT))
-        kept.clear()
-        kept.extend(past)
+    def _take(self, past) -> None:
+        """Go on from a state that was put in place, with starts for the condensed solver."""
+        self._remember(past)
+        self.restore()
+        self._keep(None)
 
     def reset(self) -> None:
-        """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""
-        check_alive(self, self.body, self.contacts)
-        for contact, where in zip(self.contacts, self._stood):
-            contact.surface.displacement, contact.surface.rotation = where
+        """No history, and surfaces where they were at first."""
+        self._put_surfaces(self._stood)
         self._begin()
-        self._variables.reset()
-        self._restore()
-
-    def _begin(self) -> None:
-        """No history.  ``u`` is left: it is the guess of the first step."""
-        self._states = [np.zeros(self.body.size)] * 2
-        self.body.known = None
-        self._memory.clear()
-        for contact in self.contacts:
-            contact.reset()
-        self._keep()
+        self.restore()
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
-
-        The file is replaced in one go, so a run that is killed leaves the last one whole.  Collective.
-
-        Args:
-            path: File name, usually ending in ``.npz``.
-        """
-        check_alive(self, self.body, self.contacts)
-        past = self._memory.get("past", ())
-        checkpoint.save(path, self.body, self.contacts, self._states, past, self._variables)
+        """Write a checkpoint, see ``ContactProblem.save``.  Collective."""
+        displacements, past = [self.last, self.before], self.memory["past"]
+        checkpoint.save(path, self._body, self._contacts, displacements, past, self._variables)
 
     def load(self, path: str | PathLike[str]) -> None:
-        """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
-
-        On one rank the steps that follow have the same bits as without the interruption.  On several
-        ranks MUMPS adds in the order in which messages arrive, and they agree to rounding.
-
-        Raises:
-            ValueError: the file is no checkpoint of this problem.
-        """
-        check_alive(self, self.body, self.contacts)
-        self._states, past = checkpoint.load(path, self.body, self.contacts, self._variables)
-        self._remember(past)
-        self._restore()
-        self._keep()
-
-    def _restore(self) -> None:
-        self.body.show(self._states[0])
-        self._variables.restore()
-        for contact in self.contacts:
-            contact.restore()
+        """Continue from a checkpoint, see ``ContactProblem.load``.  Collective."""
+        found = checkpoint.load(path, self._body, self._contacts, self._variables)
+        (self.last, self.before), past = found
+        self._take(past)

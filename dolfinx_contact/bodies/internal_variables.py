@@ -47,7 +47,7 @@ class InternalVariables:
         self.go_back(self._first)
 
     def go_back(self, values: list[np.ndarray]) -> None:
-        """Back to what they were at an earlier state, once ``last``."""
+        """Back to what ``history`` returned."""
         self.last = values
         self.restore()
 
@@ -56,13 +56,17 @@ class InternalVariables:
         for function, values in zip(self._functions, self.last):
             function.x.array[:] = values
 
-    def advance(self, u: fem.Function) -> None:
+    def move_on(self, u: fem.Function) -> None:
         """Let the user move them on with the converged displacement.  Collective."""
         if self._after is not None:
             with raised_together(u.function_space.mesh.comm):
                 self._after(u)
 
-    def settle(self) -> None:
+    def history(self) -> list[np.ndarray]:
+        """All that a step leaves to the next one, for ``go_back``."""
+        return self.last
+
+    def advance(self) -> None:
         """What they are is the last converged state."""
         self.last = self._values()
 
@@ -92,4 +96,4 @@ class InternalVariables:
             values, dofs = rows[f"state_{k}"], compat.cell_dofs(function.function_space)
             function.x.array[dofs[: len(values)]] = values
             function.x.scatter_forward()
-        self.settle()
+        self.advance()

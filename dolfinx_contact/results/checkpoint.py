@@ -40,7 +40,7 @@ def save(path, body, contacts, states, past, variables) -> None:
         contacts: Its contacts.
         states: The last displacement and the one before, owned degrees of freedom.
         past: Earlier steps of the condensed solver.
-        variables: ``InternalVariables``.
+        variables: ``InternalVariables``, or None.
     """
     comm, nodes = body.comm, _nodes(body, contacts)
     with raised_together(comm):
@@ -54,7 +54,7 @@ def save(path, body, contacts, states, past, variables) -> None:
     if past:
         of_contacts = [nodes[f"contact{k}_nodes"] for k in range(len(contacts))]
         mine["past_nodes"] = np.concatenate(of_contacts)
-    mine |= variables.save()
+    mine |= variables.save() if variables else {}
     stiffness, everything = body.stiffness_norm(), comm.gather(mine, root=0)
     with raised_together(comm):
         if comm.rank == 0:
@@ -117,8 +117,10 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
     with raised_together(comm):
         _check_path(path)
     body.refresh(np.zeros(body.size) if body.displacements.mixed else None)  # it scales unknowns
-    asked = comm.gather(_nodes(body, contacts) | variables.cells(), root=0)
-    like = _arrays(body, contacts, [np.zeros(body.size)] * 2) | variables.save()
+    nodes, like = _nodes(body, contacts), _arrays(body, contacts, [np.zeros(body.size)] * 2)
+    if variables:
+        nodes, like = nodes | variables.cells(), like | variables.save()
+    asked = comm.gather(nodes, root=0)
     stiffness = body.stiffness_norm()
     parts, past = None, ()
     with raised_together(comm):
@@ -142,7 +144,8 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
             contact.check_saved(saved)
     for contact, saved in zip(contacts, own):
         contact.load(saved)
-    variables.load(mine)
+    if variables:
+        variables.load(mine)
     body.known = None
     is_known = {"digest", "load"} <= mine.keys() and ("free" in mine or "rough" in mine)
     if comm.allreduce(is_known, op=MPI.LAND):

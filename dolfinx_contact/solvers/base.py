@@ -12,6 +12,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+KEPT = 64  # earlier steps in the memory of a problem: more than a cycle has
+
 
 class SolverResult(NamedTuple):
     """What a solver found for a load step; the problem judges it.
@@ -59,5 +61,6 @@ class Solver(Protocol):
             body: The body.
             contacts: Its contacts.
             stiffness: ``NodalStiffness`` of each contact.
-            memory: Dictionary that outlives the binding, for starts; saved in checkpoints.
+            memory: Dictionary that outlives the binding.  Its ``past``, a deque of at most ``KEPT`` earlier steps, from which
+                the condensed solver starts, is saved in checkpoints.
         """

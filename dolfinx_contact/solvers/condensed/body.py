@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from dolfinx_contact.contact.shared import any_shared, mean_laws
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.base import KEPT, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Rows,
     bytes_needed,
@@ -34,8 +34,6 @@ FEW, MANY, ASTRAY = 3000, 6000, 1e-3
 
 # Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
 RIGID = 1e-9
-
-KEPT = 64  # earlier steps: more than a cycle has
 
 
 class CondensedBody:
