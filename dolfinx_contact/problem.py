@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Sequence
 from os import PathLike
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -54,8 +54,9 @@ from dolfinx_contact.step.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.collective import agree, raised_together
-from dolfinx_contact.surfaces.driven import approach, check_driven, freedom
-from dolfinx_contact.surfaces.held import HeldSurfaces, held_surfaces
+
+if TYPE_CHECKING:
+    from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -160,7 +161,7 @@ class ContactProblem(Guarded):
         self._large = False  # whether a displacement was, and the user told
         self._bound = self._bound_to = None
         self._assembled = 0
-        self._laws, self._freedom = self._present_laws(), freedom(self.contacts)
+        self._laws, self._freedom = self._present_laws(), self._present_freedom()
         take_contacts(self, self.contacts)
         self._states = ProblemStates(self.body, self.contacts, self._variables)
         self.number = next(NUMBERS)
@@ -279,7 +280,10 @@ class ContactProblem(Guarded):
         """
         body = self.body
         assembled = body.refresh(self._states.last)
-        approach(body, self.contacts, self._states.last)
+        if any(contact.surface.free and contact.surface.curved for contact in self.contacts):
+            from dolfinx_contact.surfaces.driven import approach
+
+            approach(body, self.contacts, self._states.last)
         turned = follow(self.contacts, body, self._states.last, self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
@@ -291,10 +295,12 @@ class ContactProblem(Guarded):
         last, before = self._states.last, self._states.before
         starts = [body.taken(self.u.x.array), 2 * last - before]
         if holding is None and any(contact.surface.free for contact in self.contacts):
+            from dolfinx_contact.surfaces.held import held_surfaces
+
             holding = held_surfaces(body, self.contacts, last, b)
-        if freedom(self.contacts) != self._freedom:
+        if self._present_freedom() != self._freedom:
             self._unbind()
-            self._freedom = freedom(self.contacts)
+            self._freedom = self._present_freedom()
         kind = NonlinearStep if body.nonlinear else LoadStep
         given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
         return kind(body, self.contacts, *given)
@@ -456,7 +462,6 @@ class ContactProblem(Guarded):
 
     def _check_input(self) -> None:
         check_step(self.u, self.body.comm, self.contacts)
-        check_driven(self.body, self.contacts)
         agree(self.body.comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
 
     def _renew_laws(self, begin: bool = False) -> None:
@@ -473,6 +478,11 @@ class ContactProblem(Guarded):
 
     def _present_laws(self) -> list:
         return [contact.friction for contact in self.contacts]
+
+    def _present_freedom(self) -> list:
+        """Free motions and springs of each contact's surface."""
+        drivers = [contact.surface.driver for contact in self.contacts]
+        return [() if driver is None else driver.freedom for driver in drivers]
 
     def _log(self, line: str) -> None:
         if self.body.comm.rank == 0:

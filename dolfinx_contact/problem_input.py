@@ -16,7 +16,6 @@ from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import from_first, raised_together
-from dolfinx_contact.surfaces.drive import SQUARE
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 STRAINED = 0.5  # mean strain above which linear elasticity says nothing
@@ -253,9 +252,7 @@ def check_axial(contacts) -> None:
             continue
         surface = contact.surface
         turns = surface.spins or surface.rotation.any()
-        radial = any(
-            not motion.turns and abs(motion.axis[0]) > SQUARE for motion in surface.motions
-        )
+        radial = surface.driver is not None and surface.driver.radial
         if turns or radial:
             what = "turn" if turns else "be driven by force along the radius"
             raise ValueError(
@@ -288,7 +285,8 @@ def check_alive(problem, body, contacts) -> None:
             "go on with that one, or make a Contact for each."
         )
     for surface in {id(contact.surface): contact.surface for contact in contacts}.values():
-        surface.take(problem.number, next(NUMBERS))
+        if surface.driver is not None:
+            surface.driver.take(problem.number, next(NUMBERS))
 
 
 def check_step(u, comm, contacts) -> None:
@@ -304,6 +302,9 @@ def check_step(u, comm, contacts) -> None:
             raise ValueError(
                 "u contains NaN or infinity: it is the guess of this step, set it anew."
             )
+        for driver in filter(None, (contact.surface.driver for contact in contacts)):
+            driver.hold()
+            driver.check()
 
 
 def check_size(body, x: np.ndarray, u: np.ndarray) -> bool:

@@ -14,7 +14,6 @@ from dolfinx_contact.bodies import rigid_motion, stiffness_checks
 from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
-from dolfinx_contact.bodies.unknowns import Unknowns
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
@@ -23,8 +22,10 @@ from dolfinx_contact.support.collective import OverRanks, raised_together
 _instances = count()
 
 
-class ElasticBody(Unknowns, OverRanks):
+class ElasticBody(OverRanks):
     """F(u) = K u - f on the free degrees of freedom, u given on the others.
+
+    Vectors are ``x`` and ``D F`` with ``u = D x``, see ``bodies/unknowns.py``; of displacements alone ``D`` is one.
 
     Args:
         F: Residual form, linear in ``u``.
@@ -40,6 +41,7 @@ class ElasticBody(Unknowns, OverRanks):
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose = None  # ``LooseMotions``, where rigid motions cost nothing
+    scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
     def __init__(self, F, u, bcs, derivative, options=None, prefix=None, of=None, entity_maps=None):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
@@ -100,10 +102,15 @@ class ElasticBody(Unknowns, OverRanks):
             self.K.zeroEntries()
             fem.petsc.assemble_matrix(self.K, self._stiffness_form)
         self.K.assemble()
-        self.balance(self.K)
+        diagonal = np.abs(self.diagonal())
+        if self.displacements.mixed:
+            from dolfinx_contact.bodies import unknowns
+
+            self.scale = unknowns.scaled(self.K, self.displacements, self.scale)
+            diagonal = unknowns.row_sizes(self.K, self.displacements)
         # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
         entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
-        self._row_size = np.sqrt(entries) * self.sizes(self.K)
+        self._row_size = np.sqrt(entries) * diagonal
         self._right, self._left = self.K.createVecs()
         self._assemblies += 1
 
@@ -147,6 +154,32 @@ class ElasticBody(Unknowns, OverRanks):
     def __del__(self):
         if not getattr(self, "closed", True) and compat.may_free_alone(self.comm):
             self.close()
+
+    # -- unknowns ------------------------------------------------------------------------------
+
+    def show(self, x: np.ndarray) -> None:
+        """Let ``u`` have these values, the first of which are the owned ones.  Collective."""
+        self.u.x.array[: self.size] = self.values(x[: self.size])
+        self.u.x.scatter_forward()
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """``u`` of owned degrees of freedom."""
+        return x if self.scale is None else self.scale * x
+
+    def taken(self, values: np.ndarray) -> np.ndarray:
+        """``x`` of values of ``u``, the first of which are the owned ones."""
+        values = values[: self.size].copy()
+        return values if self.scale is None else values / self.scale
+
+    def boundary_values(self) -> np.ndarray:
+        """``x`` of the Dirichlet conditions' values, zero at free degrees of freedom."""
+        values = np.zeros_like(self.u.x.array)
+        compat.set_bc_values(values, self.bcs)
+        return self.taken(values)
+
+    def farthest(self, x: np.ndarray) -> float:
+        """Largest component of a displacement, of either sign, over all ranks."""
+        return self.largest(np.abs(self.displacements.rows(x)))
 
     def put(self, values: np.ndarray) -> None:
         """As ``show``, and let what the user makes of ``u`` follow, see ``NonlinearBody``.  Collective."""
@@ -204,7 +237,8 @@ class ElasticBody(Unknowns, OverRanks):
             compat.assemble_into(self._work.x, self._residual_form)
         finally:
             self.u.x.array[:] = kept
-        return self.as_forces(self._work.x.array)
+        residual = self._work.x.array[: self.size].copy()
+        return residual if self.scale is None else self.scale * residual
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """F at a displacement of owned degrees of freedom, what supports carry included."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.step.loose import LooseMotions, LoosePart
+
+if TYPE_CHECKING:
+    from dolfinx_contact.step.loose import LooseMotions
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
@@ -54,9 +58,13 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
             turned = root.T @ vectors[:, relative < ROUNDING]
             combination = left_free @ turned
             middle, size = box(x, part[: of.count] == k, body.comm)
-            loose.append(LoosePart(where, free @ turned, combination, middle, size))
+            loose.append((where, free @ turned, combination, middle, size))
         soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
-    return np.concatenate(soft, axis=1), LooseMotions(loose) if loose else None
+    if not loose:
+        return np.concatenate(soft, axis=1), None
+    from dolfinx_contact.step.loose import LooseMotions, LoosePart
+
+    return np.concatenate(soft, axis=1), LooseMotions([LoosePart(*part) for part in loose])
 
 
 def box(x: np.ndarray, here: np.ndarray, comm) -> tuple[np.ndarray, float]:

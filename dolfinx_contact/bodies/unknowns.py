@@ -1,6 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The unknowns of a body as vectors of lengths and forces, those of a mixed space besides displacements, too."""
+"""The unknowns of a mixed space as lengths and their residuals as forces: ``u = D x`` and ``D F``.
+
+``D`` is one for displacements.  For other unknowns, as pressures, it makes ``x`` a length and the residual, as of
+volumes, a force, see ``scales``: all that compares, adds and minimises is then about lengths and forces alone, and the
+units of those unknowns do not matter.  ``D`` is that of the first stiffness, and stays.
+"""
 
 from __future__ import annotations
 
@@ -8,69 +13,34 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact import compat
 from dolfinx_contact.support.collective import raised_together
 
 
-class Unknowns:
-    """Unknowns ``u = D x`` and residuals ``D F``, of a body that has ``u``, ``bcs``, ``size``, ``displacements``, and sums over ranks.
+def scaled(K, displacements, D: np.ndarray | None = None) -> np.ndarray:
+    """Make ``D K D`` of an assembled stiffness, in place.  Collective.
 
-    ``D`` is one for displacements.  For other unknowns, as pressures, it makes ``x`` a length and the residual, as of
-    volumes, a force, see ``scales``: all that compares, adds and minimises is then about lengths and forces alone, and
-    the units of those unknowns do not matter.  ``D`` is that of the first stiffness, and stays.
+    Args:
+        K: PETSc matrix.
+        displacements: ``Displacements`` of a mixed space.
+        D: Of the first stiffness, ``shape=(owned dofs,)``; None takes it from this one.
+
+    Returns:
+        ``D``, see ``scales``.
     """
+    D, factors = scales(K, displacements) if D is None else D, K.createVecLeft()
+    factors.array_w[:] = D
+    K.diagonalScale(factors, factors)
+    factors.destroy()
+    return D
 
-    scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
-    def show(self, x: np.ndarray) -> None:
-        """Let ``u`` have these values, the first of which are the owned ones.  Collective."""
-        self.u.x.array[: self.size] = self.values(x[: self.size])
-        self.u.x.scatter_forward()
-
-    def values(self, x: np.ndarray) -> np.ndarray:
-        """``u`` of owned degrees of freedom."""
-        return x if self.scale is None else self.scale * x
-
-    def taken(self, values: np.ndarray) -> np.ndarray:
-        """``x`` of values of ``u``, the first of which are the owned ones."""
-        values = values[: self.size].copy()
-        return values if self.scale is None else values / self.scale
-
-    def boundary_values(self) -> np.ndarray:
-        """``x`` of the Dirichlet conditions' values, zero at free degrees of freedom."""
-        values = np.zeros_like(self.u.x.array)
-        compat.set_bc_values(values, self.bcs)
-        return self.taken(values)
-
-    def farthest(self, x: np.ndarray) -> float:
-        """Largest component of a displacement, of either sign, over all ranks."""
-        return self.largest(np.abs(self.displacements.rows(x)))
-
-    def as_forces(self, residual: np.ndarray) -> np.ndarray:
-        """Residuals of which the first are the owned ones, as forces."""
-        residual = residual[: self.size].copy()
-        return residual if self.scale is None else self.scale * residual
-
-    def balance(self, K) -> None:
-        """Make ``D K D`` of an assembled matrix, in place, where there are other unknowns.  Collective."""
-        if not self.displacements.mixed:
-            return
-        if self.scale is None:
-            self.scale = scales(K, self.displacements)
-        factors = K.createVecLeft()
-        factors.array_w[:] = self.scale
-        K.diagonalScale(factors, factors)
-        factors.destroy()
-
-    def sizes(self, K) -> np.ndarray:
-        """Size of the entries in each row: the diagonal one, of unknowns besides displacements the norm of all."""
-        diagonal = K.getDiagonal()
-        values = np.abs(diagonal.array_r)
-        diagonal.destroy()
-        if self.displacements.mixed:
-            norms = np.sqrt(_rows(K).power(2).sum(axis=1)).A1
-            values = np.where(self.displacements.are, values, norms)
-        return values
+def row_sizes(K, displacements) -> np.ndarray:
+    """Size of the entries in each row: the diagonal one, of unknowns besides displacements the norm of all."""
+    diagonal = K.getDiagonal()
+    values = np.abs(diagonal.array_r)
+    diagonal.destroy()
+    norms = np.sqrt(_rows(K).power(2).sum(axis=1)).A1
+    return np.where(displacements.are, values, norms)
 
 
 def scales(K, displacements) -> np.ndarray:

@@ -96,7 +96,7 @@ class Laws:
 
     def described(self, surface) -> dict[str, str]:
         """Surface and laws, but coefficients per node, in words: the same on all ranks."""
-        driven = surface.driven() if surface.free else "by displacement"
+        driven = surface.driver.driven() if surface.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         moved, turned = (repr(v.tolist()) for v in (surface.displacement, surface.rotation))
         return {

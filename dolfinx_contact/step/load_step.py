@@ -8,7 +8,6 @@ from copy import copy
 
 import numpy as np
 
-from dolfinx_contact.contact.shared import shared_nodes
 from dolfinx_contact.contact.state import Status
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.results.record import Counts, counts
@@ -23,8 +22,7 @@ from dolfinx_contact.step.errors import (
     contact_rounding,
 )
 from dolfinx_contact.support.collective import raised_together
-from dolfinx_contact.surfaces.driven import driven_surfaces
-from dolfinx_contact.surfaces.sliding import lost_far_away, nothing_holds
+from dolfinx_contact.surfaces.surface import driven_surfaces
 
 
 def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
@@ -35,6 +33,15 @@ def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
     size = body.largest(np.abs(body.displacements.x))
     # Any unit that keeps squares within the range of double precision.
     return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
+
+
+def _shared_nodes(contacts, stiffness, fixed):
+    """The ``SharedNodes``, None where no node belongs to several contacts.  Collective."""
+    if len(contacts) < 2:
+        return None
+    from dolfinx_contact.contact.shared import shared_nodes
+
+    return shared_nodes(contacts, stiffness, fixed)
 
 
 class LoadStep:
@@ -67,7 +74,7 @@ class LoadStep:
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
         self.surfaces = driven_surfaces(body, contacts)
-        self._shared = shared_nodes(contacts, stiffness, body.fixed)
+        self._shared = _shared_nodes(contacts, stiffness, body.fixed)
         self.statics, self.holding = None, holding
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before, self._told = None, 0  # reactions of the state judged before, states told
@@ -115,6 +122,8 @@ class LoadStep:
         if self.surfaces is not None:
             said = said or self.surfaces.beyond(True) or self.surfaces.beyond()
             if not said and self.statics is not None:
+                from dolfinx_contact.surfaces.sliding import nothing_holds
+
                 said = nothing_holds(self.contacts)
         return said
 
@@ -333,7 +342,11 @@ class LoadStep:
             cancelling = np.append(cancelling, EPSILON * terms[mine])
         parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
         errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
-        lost = errors.blind and lost_far_away(
-            self.body, self.statics, self.surfaces, x, errors.acts
-        )
+        lost = errors.blind and self.may_slide and self._is_lost(x, errors.acts)
         return errors._replace(error=np.inf) if lost else errors
+
+    def _is_lost(self, x: np.ndarray, acts: bool) -> bool:
+        """See ``lost_far_away``.  Collective."""
+        from dolfinx_contact.surfaces.sliding import lost_far_away
+
+        return lost_far_away(self.body, self.statics, self.surfaces, x, acts)

@@ -33,6 +33,21 @@ def finite(name: str, value, copy: bool = True) -> np.ndarray:
     return array.astype(np.float64, copy=copy)
 
 
+def vector(name: str, value, size: int | None = None) -> np.ndarray:
+    """A vector of finite real numbers, as floats."""
+    try:
+        array = np.asarray(value)
+        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
+    except ValueError:  # ragged nesting
+        real = False
+    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
+        wanted = "2 or 3" if size is None else str(size)
+        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {value!r}.")
+    return array.astype(np.float64)
+
+
 def number(name: str, value) -> float:
     """One finite real number, alone or in an array of one, or a ``ValueError``."""
     array = np.asarray(value)

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.support.attributes import Guarded, frozen, whole
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.attributes import frozen, whole
+from dolfinx_contact.support.checks import finite, vector
 
 # Part by which guides may miss unit length and right angles: half of the digits.
 SQUARE = 1e-8
@@ -27,34 +28,21 @@ class Motion(NamedTuple):
     spring: float  # force per length, moment per radian
 
 
-def vector(name: str, value, size: int | None = None) -> np.ndarray:
-    """A vector of finite real numbers, as floats."""
-    try:
-        array = np.asarray(value)
-        real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
-    except ValueError:  # ragged nesting
-        real = False
-    if not real or array.ndim != 1 or array.size not in ((2, 3) if size is None else (size,)):
-        wanted = "2 or 3" if size is None else str(size)
-        raise ValueError(f"{name} must be a vector of {wanted} real numbers, got {value!r}.")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {value!r}.")
-    return array.astype(np.float64)
-
-
-class Drive(Guarded):
-    """Forces that drive a surface, which has ``point``, ``displacement``, ``rotation`` and axes of its free motions.
+class Drive:
+    """Forces that drive a surface along its free motions.
 
     sum of the reactions = force + stiffness (drive - displacement),
     sum of their moments about the point = moment - stiffness rotation.
+
+    Args:
+        surface: The ``Surface``, whose ``directions`` and ``drive_axes`` are those of the free motions.
     """
 
-    def __init__(self, point: np.ndarray) -> None:
-        self.point = frozen(point)
-        size = point.size
-        self._displacement = frozen(np.zeros(size))
-        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
-        self._drive = frozen(np.zeros(size))
+    def __init__(self, surface) -> None:
+        self._surface, self._size = surface, surface.point.size
+        self._angles = 3 if self._size == 3 else 1
+        self._drive = frozen(np.zeros(self._size))
+        self._guides = frozen(np.eye(self._size))
         self._free: tuple[str, ...] = ()
         self._held: tuple[str, ...] = ()
         self._past_held = 0.0
@@ -62,8 +50,13 @@ class Drive(Guarded):
         self._force: np.ndarray | None = None
         self._moment: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
-        self._spin: np.ndarray | None = None
         self._taken = self._since = 0  # the problem that drove it last, and when
+
+    def of(self, surface) -> Drive:
+        """The same forces on another surface."""
+        other = copy(self)
+        vars(other)["_surface"] = surface
+        return other
 
     def take(self, problem: int, now: int) -> None:
         """Let a problem step with the surface: what force has moved belongs to the problem that drove it last.
@@ -77,26 +70,20 @@ class Drive(Guarded):
         """
         if problem != self._taken and problem < self._since:
             raise ValueError(
-                f"{self} is driven by force in another ContactProblem, whose motion this one would take for its own: "
+                f"{self._surface} is driven by force in another ContactProblem, whose motion this one would take for its own: "
                 "make a surface and a Contact for each problem."
             )
         if self._free or self._taken:
             self._taken, self._since = problem, now
 
     @property
-    def directions(self) -> tuple[str, ...]:
-        """Names of the directions along which the surface may be free, the rows of ``drive_axes``."""
-        return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
-
-    @property
     def turnings(self) -> tuple[str, ...]:
-        """Names of the rotations that may be free, about these directions."""
-        return ("r",) if self.point.size == 2 else tuple(f"r{name[-1]}" for name in self.directions)
+        """Names of the rotations that may be free, about the surface's ``directions``."""
+        return ("r",) if self._size == 2 else tuple(f"r{name[-1]}" for name in self._directions)
 
     @property
-    def drive_axes(self) -> np.ndarray:
-        """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
-        raise NotImplementedError
+    def _directions(self) -> tuple[str, ...]:
+        return self._surface.directions
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -105,10 +92,10 @@ class Drive(Guarded):
 
     @free.setter
     def free(self, names: Sequence[str]) -> None:
-        known = self.directions + self.turnings
+        known = self._directions + self.turnings
         if not isinstance(names, (tuple, list)) or any(name not in known for name in names):
             raise ValueError(
-                f"surface.free must be a tuple of names among {known}, such as ({self.directions[-1]!r},), got {names!r}."
+                f"surface.free must be a tuple of names among {known}, such as ({self._directions[-1]!r},), got {names!r}."
             )
         self._free = tuple(dict.fromkeys(names))
         self._ever_free = self._ever_free or bool(self._free)
@@ -120,7 +107,7 @@ class Drive(Guarded):
 
     @force.setter
     def force(self, value: ArrayLike | None) -> None:
-        size = self.point.size
+        size = self._size
         self._force = None if value is None else frozen(vector("surface.force", value, size))
 
     @property
@@ -131,7 +118,7 @@ class Drive(Guarded):
     @moment.setter
     def moment(self, value: ArrayLike | None) -> None:
         if value is not None:
-            size = self._rotation.size
+            size = self._angles
             value = frozen(vector("surface.moment", np.atleast_1d(value), size))
         self._moment = value
 
@@ -143,7 +130,7 @@ class Drive(Guarded):
 
     @stiffness.setter
     def stiffness(self, value: Mapping[str, float] | ArrayLike) -> None:
-        names, known = None, self.directions + self.turnings
+        names, known = None, self._directions + self.turnings
         if isinstance(value, Mapping):
             names = tuple(value)
             if any(name not in known for name in names):
@@ -154,7 +141,7 @@ class Drive(Guarded):
         array = np.atleast_1d(array)
         if array.ndim != 1 or array.size > len(known) or not (array >= 0).all():
             raise ValueError(
-                f"surface.stiffness must be numbers, zero or more, by name, such as {{{self.directions[0]!r}: 200.0}}, or "
+                f"surface.stiffness must be numbers, zero or more, by name, such as {{{self._directions[0]!r}: 200.0}}, or "
                 f"one for all free motions, got {value!r}."
             )
         self._stiffness = frozen(array) if names is None else dict(zip(names, array.tolist()))
@@ -166,7 +153,19 @@ class Drive(Guarded):
 
     @drive.setter
     def drive(self, value: ArrayLike) -> None:
-        self._drive = frozen(vector("surface.drive", value, self.point.size))
+        self._drive = frozen(vector("surface.drive", value, self._size))
+
+    @property
+    def guides(self) -> np.ndarray:
+        """Directions "x", "y", "z" of ``free``, rows, ``shape=(gdim, gdim)``, global frame; at first its axes.
+
+        They stay when the surface turns.
+        """
+        return whole("surface.guides", self._guides)
+
+    @guides.setter
+    def guides(self, value: ArrayLike) -> None:
+        self._guides = check_guides(value, self._size)
 
     @property
     def springs(self) -> np.ndarray:
@@ -179,15 +178,6 @@ class Drive(Guarded):
     def spins(self) -> bool:
         """Whether a rotation is free."""
         return any(name in self.turnings for name in self._free)
-
-    @property
-    def spin(self) -> np.ndarray | None:
-        """Rotation that the step at hand has found, radians, a small one; None if there is none, and between steps."""
-        return self._spin
-
-    def spin_by(self, angle: np.ndarray | None) -> None:
-        """Turn within a step, for which frames stay those of its start."""
-        self._spin = angle
 
     def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
         """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held.py``."""
@@ -203,8 +193,8 @@ class Drive(Guarded):
         """The free motions that no contact nodes hold, rotations first."""
         if not self._free:
             return []
-        axes = self.drive_axes
-        about = np.ones((1, 1)) if self.point.size == 2 else axes
+        axes = self._surface.drive_axes
+        about = np.ones((1, 1)) if self._size == 2 else axes
         springs = dict(zip(self._free, self.springs.tolist()))
         springs = {name: k for name, k in springs.items() if name not in self._held}
         turns = [
@@ -214,18 +204,31 @@ class Drive(Guarded):
         ]
         return turns + [
             Motion(name, axis, False, springs[name])
-            for name, axis in zip(self.directions, axes)
+            for name, axis in zip(self._directions, axes)
             if name in springs
         ]
+
+    @property
+    def freedom(self) -> tuple:
+        """Free motions and springs, which what solvers set up depends on; empty if there are none."""
+        motions = [(motion.name, motion.spring) for motion in self.motions]
+        return (motions, self._guides.tolist(), self._past_held) if motions else ()
+
+    @property
+    def radial(self) -> bool:
+        """Whether a translation along the first coordinate, or with a part along it, is free."""
+        along = [motion.axis[0] for motion in self.motions if not motion.turns]
+        return any(abs(part) > SQUARE for part in along)
 
     def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
         """Force or moment that drives each motion where the surface is; or the size of the terms that add up to it."""
         size = np.abs if magnitudes else np.asarray
         less = np.add if magnitudes else np.subtract
-        force = np.zeros(self.point.size) if self._force is None else self._force
-        moment = np.zeros(self._rotation.size) if self._moment is None else self._moment
-        stretched = less(size(self._drive), size(self._displacement))
-        turned = size(self._rotation) + (0.0 if self._spin is None else size(self._spin))
+        displacement, rotation, spin = self._surface.stands
+        force = np.zeros(self._size) if self._force is None else self._force
+        moment = np.zeros(self._angles) if self._moment is None else self._moment
+        stretched = less(size(self._drive), size(displacement))
+        turned = size(rotation) + (0.0 if spin is None else size(spin))
         back = less(np.zeros_like(turned), turned)
         terms = [(moment, back) if m.turns else (force, stretched) for m in motions]
         return np.array(
@@ -239,7 +242,7 @@ class Drive(Guarded):
             given += (self._moment,)
         return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
 
-    def check_drive(self) -> None:
+    def check(self) -> None:
         """Raise a ``ValueError`` if no force drives what is free, or a plane would leave the body."""
         self._check_springs()
         if not self._ever_free and not (self._force is None and self._moment is None):
@@ -247,7 +250,7 @@ class Drive(Guarded):
             warnings.warn(
                 f"surface.force is {self._force} and surface.moment {self._moment}, but surface.free is (): no force moves the "
                 "plane, it stands where surface.displacement puts it. Name the directions that force drives, such as "
-                f"surface.free = ({self.directions[-1]!r},), if that is not meant.",
+                f"surface.free = ({self._directions[-1]!r},), if that is not meant.",
                 stacklevel=2,
             )
         moving = [motion for motion in self.motions if not motion.turns]
@@ -258,7 +261,7 @@ class Drive(Guarded):
                 f"surface.free is {self._free}, but neither surface.force nor surface.stiffness drives all of them: set "
                 "surface.force."
             )
-        self._check_pressing(moving[-1])
+        self._surface.check_pressing(moving[-1])
 
     def _check_springs(self) -> None:
         """Raise a ``ValueError`` if numbers without names do not tell which spring is which."""
@@ -268,16 +271,13 @@ class Drive(Guarded):
         if stiffness.size not in (1, count):
             raise ValueError(
                 f"surface.stiffness has {stiffness.size} numbers, surface.free {count} names: name the springs, such as "
-                f"surface.stiffness = {{{self.directions[0]!r}: 200.0}}."
+                f"surface.stiffness = {{{self._directions[0]!r}: 200.0}}."
             )
         if self.spins and stiffness.size == 1 < count and stiffness.any():
             raise ValueError(
                 f"surface.stiffness is one number for {self._free}: force per length and moment per radian are two; give "
                 "one for each, by name."
             )
-
-    def _check_pressing(self, motion: Motion) -> None:
-        """Raise a ``ValueError`` if the force pulls a surface off bodies, which that of a plane may say beforehand."""
 
 
 def check_guides(value: ArrayLike, size: int) -> np.ndarray:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
 
@@ -21,29 +20,6 @@ RESISTING = 1e-8
 
 # Times that a curved surface far from the body comes nearer.
 APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
-
-
-def driven_surfaces(body, contacts) -> DrivenSurfaces | None:
-    """The planes that force drives, None where there are none."""
-    return DrivenSurfaces(body, contacts) if any(c.surface.motions for c in contacts) else None
-
-
-def freedom(contacts) -> list[tuple]:
-    """Free motions and springs of each contact's plane, which what solvers set up depends on."""
-    found = []
-    for contact in contacts:
-        surface = contact.surface
-        motions = [(motion.name, motion.spring) for motion in surface.motions]
-        found.append((motions, surface.guides.tolist(), surface.past_held))
-    return found
-
-
-def check_driven(body, contacts) -> None:
-    """Raise a ``ValueError`` on all ranks if what drives a plane makes no sense.  Collective."""
-    with raised_together(body.comm):
-        for contact in contacts:
-            contact.surface.hold()
-            contact.surface.check_drive()
 
 
 def approach(body, contacts, u: np.ndarray) -> None:
@@ -246,7 +222,7 @@ class DrivenSurfaces:
         """Sum of the reactions that the present motions ask for, ``F + k (drive - c)``, ``shape=(m,)``."""
         both = zip(self.surfaces, self._motions)
         return (
-            np.concatenate([surface.pulled_by(motions) for surface, motions in both])
+            np.concatenate([surface.driver.pulled_by(motions) for surface, motions in both])
             / self._lengths
         )
 
@@ -258,7 +234,9 @@ class DrivenSurfaces:
             sums[1] += np.tensordot(np.abs(contact.reaction), np.abs(axes), 2)
         total, size = self._body.total(sums)
         both = zip(self.surfaces, self._motions)
-        terms = np.concatenate([surface.pulled_by(motions, True) for surface, motions in both])
+        terms = np.concatenate(
+            [surface.driver.pulled_by(motions, True) for surface, motions in both]
+        )
         return total - self.driving(), size + terms / self._lengths
 
     def tangent(self, derivatives) -> np.ndarray:

@@ -40,7 +40,8 @@ def held_surfaces(body, contacts, last: np.ndarray, b: np.ndarray) -> HeldSurfac
         ValueError: on all ranks, where the law does not tell how nodes share what drives a surface.
     """
     for contact in contacts:
-        contact.surface.hold()
+        if contact.surface.driver is not None:
+            contact.surface.driver.hold()
         contact.drag(None)
     u = last.copy()
     u[body.fixed] = b[body.fixed]
@@ -126,7 +127,7 @@ class HeldSurface:
         self._holding, self._contacts = holding, contacts
         self._part = np.zeros(len(motions))
         self._slid = False
-        surface.hold(tuple(motion.name for motion in motions))
+        surface.driver.hold(tuple(motion.name for motion in motions))
 
     def follow(self, u: np.ndarray) -> None:
         """Move the plane with the held nodes.  Collective.
@@ -186,7 +187,7 @@ class HeldSurface:
             moved = [contact.carried_by(motion.axis, False) for motion in self._motions]
             sums[:, m] += [np.sum(contact.reaction * way) for way in moved]
         sums = self._body.total(sums)
-        asked = self._surface.pulled_by(self._motions) - sums[:, m]
+        asked = self._surface.driver.pulled_by(self._motions) - sums[:, m]
         with np.errstate(divide="ignore", invalid="ignore"):
             self._part = np.linalg.lstsq(sums[:, :m], asked, rcond=ALONG)[0]
         if asked.any() and not np.allclose(sums[:, :m] @ self._part, asked):
@@ -203,7 +204,7 @@ class HeldSurface:
         most = sum((c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c in self._contacts)
         most = float(self._body.total([most])[0])
         loose = [motion for motion in self._motions if motion.spring == 0.0]
-        return bool((np.abs(self._surface.pulled_by(loose)) > most).any())
+        return bool((np.abs(self._surface.driver.pulled_by(loose)) > most).any())
 
     def slide(self) -> bool:
         """Let the plane slide if its held nodes cannot hold it; whether they cannot.  Collective.
@@ -224,6 +225,6 @@ class HeldSurface:
             slip = np.zeros((contact.points.count, axes.shape[1]))
             slip[rows] = -sign * axes[:, :, 0]
             contact.drag(slip)
-        self._surface.hold(past=sign)
+        self._surface.driver.hold(past=sign)
         self._slid = True
         return True

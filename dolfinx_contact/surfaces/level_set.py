@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from dolfinx_contact.support.attributes import frozen
-from dolfinx_contact.support.checks import finite
-from dolfinx_contact.surfaces.drive import vector
+from dolfinx_contact.support.checks import finite, vector
 from dolfinx_contact.surfaces.round import CurvedSurface
 from dolfinx_contact.surfaces.surface import unit
 from dolfinx_contact.surfaces.ufl_distance import by_ufl, is_ufl

@@ -95,12 +95,13 @@ class RigidPlane(Surface):
         """The rows of ``frame``."""
         return self.frame
 
-    def _check_pressing(self, motion) -> None:
-        """See ``Drive``."""
-        pressing = float(self._force @ self.frame[-1])
+    def check_pressing(self, motion) -> None:
+        """See ``Surface``."""
+        force = np.asarray(self.force)
+        pressing = float(force @ self.frame[-1])
         if motion.name == "n" and motion.spring == 0 and pressing <= 0:
             raise ValueError(
-                f"surface.force {self._force.tolist()} does not press the plane on the body: its component along the "
+                f"surface.force {force.tolist()} does not press the plane on the body: its component along the "
                 f"normal is {pressing:g}, must be positive, and nothing else holds the plane. It is the force of the "
                 "plane on the body; a spring, surface.stiffness, also pulls."
             )

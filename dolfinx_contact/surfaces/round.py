@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import frozen
-from dolfinx_contact.support.checks import positive
-from dolfinx_contact.surfaces.drive import vector
+from dolfinx_contact.support.checks import positive, vector
 from dolfinx_contact.surfaces.surface import Surface, unit
 
 # Part of the radius within which a position has no direction from the centre; of a direction that has to be tangential.

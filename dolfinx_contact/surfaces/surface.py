@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.support.attributes import frozen, whole
-from dolfinx_contact.support.checks import finite
-from dolfinx_contact.surfaces.drive import Drive, check_guides, vector
+from dolfinx_contact.support.attributes import Guarded, frozen, whole
+from dolfinx_contact.support.checks import finite, vector
 
 
 def unit(name: str, value, size: int) -> np.ndarray:
@@ -22,7 +23,20 @@ def unit(name: str, value, size: int) -> np.ndarray:
     return along / np.linalg.norm(along)
 
 
-class Surface(Drive):
+class _OfDrive:
+    """An attribute of the surface's ``Drive``, which is made when it is first asked for."""
+
+    def __set_name__(self, owner, name: str) -> None:
+        self._name = name
+
+    def __get__(self, surface, owner=None):
+        return self if surface is None else getattr(surface.driven_by_force(), self._name)
+
+    def __set__(self, surface, value) -> None:
+        setattr(surface.driven_by_force(), self._name, value)
+
+
+class Surface(Guarded):
     """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
 
     Such positions are in axes that move with the surface: global components as long as it stands where it was made.
@@ -43,10 +57,72 @@ class Surface(Drive):
     varies = curved = False
     axis: np.ndarray | None = None
 
+    force, moment, stiffness, drive, guides = (_OfDrive() for _ in range(5))
+
     def __init__(self, point: ArrayLike) -> None:
-        super().__init__(vector("point", point))
+        self.point = frozen(vector("point", point))
+        size = self.point.size
+        self._displacement = frozen(np.zeros(size))
+        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
         self._turn: np.ndarray | None = None
-        self._guides = frozen(np.eye(self.point.size))
+        self._spin: np.ndarray | None = None
+        self._driver = None
+
+    def __copy__(self) -> Surface:
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        if self._driver is not None:
+            other._driver = self._driver.of(other)
+        return other
+
+    # -- driven by force -----------------------------------------------------------------------
+
+    @property
+    def driver(self):
+        """The ``Drive``; None as long as nobody has asked for free motions or forces."""
+        return self._driver
+
+    def driven_by_force(self):
+        """The ``Drive``, made if there is none."""
+        if self._driver is None:
+            from dolfinx_contact.surfaces.drive import Drive
+
+            self._driver = Drive(self)
+        return self._driver
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Motions that forces drive, see docs/force.md: names of ``directions`` and of rotations about them; none at first."""
+        return () if self._driver is None else self._driver.free
+
+    @free.setter
+    def free(self, names: Sequence[str]) -> None:
+        self.driven_by_force().free = names
+
+    @property
+    def motions(self) -> list:
+        """The free motions that no contact nodes hold, rotations first."""
+        return [] if self._driver is None else self._driver.motions
+
+    @property
+    def spins(self) -> bool:
+        """Whether a rotation is free."""
+        return self._driver is not None and self._driver.spins
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Names of the directions along which it may be free, the rows of ``drive_axes``."""
+        return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
+
+    @property
+    def drive_axes(self) -> np.ndarray:
+        """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
+        return self.guides
+
+    def check_pressing(self, motion) -> None:
+        """Raise a ``ValueError`` if the force pulls it off bodies, which that of a plane may say beforehand."""
+
+    # -- motion --------------------------------------------------------------------------------
 
     @property
     def displacement(self) -> np.ndarray:
@@ -73,21 +149,18 @@ class Surface(Drive):
         self._turn = rotation_less_one(self._rotation) if self._rotation.any() else None
 
     @property
-    def guides(self) -> np.ndarray:
-        """Directions "x", "y", "z" of ``free``, rows, ``shape=(gdim, gdim)``, global frame; at first its axes.
+    def spin(self) -> np.ndarray | None:
+        """Rotation that the step at hand has found, radians, a small one; None if there is none, and between steps."""
+        return self._spin
 
-        They stay when the surface turns.
-        """
-        return whole("surface.guides", self._guides)
-
-    @guides.setter
-    def guides(self, value: ArrayLike) -> None:
-        self._guides = check_guides(value, self.point.size)
+    def spin_by(self, angle: np.ndarray | None) -> None:
+        """Turn within a step, for which frames stay those of its start."""
+        self._spin = angle
 
     @property
-    def drive_axes(self) -> np.ndarray:
-        """See ``Drive``."""
-        return self._guides
+    def stands(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """``displacement``, ``rotation`` and ``spin``."""
+        return self._displacement, self._rotation, self._spin
 
     def end_step(self) -> None:
         """Add what a step has turned to ``rotation``."""
@@ -163,3 +236,12 @@ def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
     if angle.size == 1:
         return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
     return np.cross(angle, arms)
+
+
+def driven_surfaces(body, contacts):
+    """The ``DrivenSurfaces`` of some contacts, None where force drives none.  Collective."""
+    if not any(contact.surface.motions for contact in contacts):
+        return None
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
+
+    return DrivenSurfaces(body, contacts)

@@ -11,7 +11,6 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.shared import any_shared, mean_laws
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import KEPT, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
@@ -65,7 +64,7 @@ class CondensedBody:
         self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
-        self._held_by, self._shared = body.anchors or body, any_shared(self._contacts)
+        self._held_by, self._shared = body.anchors or body, self._any_shared()
         self._stiffness = stiffness
         self._set_up()
 
@@ -112,7 +111,19 @@ class CondensedBody:
     def _acting(self) -> list[Friction]:
         """Friction of each contact as it acts on this problem.  Collective."""
         laws = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        if not self._shared:
+            return laws
+        from dolfinx_contact.contact.shared import mean_laws
+
         return mean_laws(laws, self._contacts)
+
+    def _any_shared(self) -> bool:
+        """Whether any node of any rank belongs to several contacts.  Collective."""
+        if len(self._contacts) < 2:
+            return False
+        from dolfinx_contact.contact.shared import any_shared
+
+        return any_shared(self._contacts)
 
     def renew_law(self) -> bool:
         """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""

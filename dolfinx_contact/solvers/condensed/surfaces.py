@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.surfaces.driven import driven_surfaces
+from dolfinx_contact.surfaces.surface import driven_surfaces
 
 
 class CondensedSurfaces:

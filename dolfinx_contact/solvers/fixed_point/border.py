@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import block_diag
 
-from dolfinx_contact.surfaces.driven import driven_surfaces
+from dolfinx_contact.surfaces.surface import driven_surfaces
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
 STEPS, LEFT = 50, 1e-6

@@ -10,7 +10,7 @@ from scipy import sparse
 from dolfinx_contact import compat
 from dolfinx_contact.contact.interface import assembled
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
-from dolfinx_contact.surfaces.driven import driven_surfaces
+from dolfinx_contact.surfaces.surface import driven_surfaces
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
