@@ -139,7 +139,7 @@ class Law2D:
         branch: numpy.typing.NDArray[numpy.uint8],
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Part of the slip increment that the slip rule does not explain, (n,)
+        Part of the slip increment that the slip rule does not explain, (n, dim - 1)
         """
     @property
     def dim(self) -> int: ...
@@ -267,7 +267,7 @@ class Law3D:
         branch: numpy.typing.NDArray[numpy.uint8],
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Part of the slip increment that the slip rule does not explain, (n,)
+        Part of the slip increment that the slip rule does not explain, (n, dim - 1)
         """
     @property
     def dim(self) -> int: ...

@@ -16,7 +16,7 @@ bool one_node() {
     const double f = dc::load_function(law, r);          // N, zero on the surface of the cone
     const dc::Tangent<2> direction = dc::against_slip(law, r); // unit vector
     const dc::Tangent<2> slip = -1e-3 * direction;             // mm, as the slip rule wants it
-    const double left = dc::slip_defect(law, r, slip, branch); // mm
+    const dc::Tangent<2> left = dc::slip_defect(law, r, slip, branch); // mm
     const double gap = dc::bipotential_gap(law, r, 0.0, slip); // N mm, zero where the law holds
     const double rho = 5e4;                                    // N/mm
     const dc::Local<2> predicted = dc::predictor(law, r, 0.0, slip, rho); // N
@@ -28,7 +28,7 @@ bool one_node() {
               << returned.by_motion << '\n';
     const double small = 1e-12 * r.norm();
     const auto fixed = [&, r = r](const dc::Local<2> &again) { return (again - r).norm() < small; };
-    return branch == dc::Branch::slip && std::abs(f) < small && left < 1e-15 &&
+    return branch == dc::Branch::slip && std::abs(f) < small && left.norm() < 1e-15 &&
            std::abs(gap) < small && fixed(same.r) &&
            fixed(dc::bipotential_map(law, r, 0.0, slip, rho).r) && fixed(bipotential.value.r) &&
            fixed(dc::scaled_map(law, r, 0.0, slip, rho).r) && fixed(scaled.value.r) &&

@@ -632,13 +632,7 @@ class Contact(Guarded):
         ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
         on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
         """
-        slip, mu = self.slip_increment, self.friction.mu[..., :1]
-        against = self.friction.against_slip(self.reaction[:, :-1])
-        length = np.linalg.norm(slip, axis=1, keepdims=True)
-        # Compared with an enum, NumPy looks for attributes that enums do not have, and drops a Ctrl-C that comes then.
-        slips = (self.status == int(Status.SLIP))[:, None]
-        bound = (self.status != int(Status.OPEN))[:, None] & (mu > 0)
-        return np.where(bound, slip + slips * length * against, 0.0)
+        return self.law.slip_defect(self.reaction, self.slip_increment, self.status)
 
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective.

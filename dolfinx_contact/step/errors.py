@@ -1,5 +1,8 @@
 r"""The errors of a step, dimensionless numbers; see docs/errors.md.
 
+What a node has wrong is the kernel's to say, ``law.bipotential_map`` and ``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``): the
+condensed solver's judge calls the same predictor and slip rule.
+
 For a displacement ``u`` with nodal reactions ``r`` in the friction cone all errors are forces that are not as they
 should be, over the forces that act in that same state,
 

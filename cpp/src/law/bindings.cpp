@@ -97,9 +97,10 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
     law.def(
         "slip_defect",
         [](const Law &self, const Array &r, const Array &slip, const Branches &branch) {
-            return Call(self, "r", r).slip(slip).branch(branch).number(SlipDefect{});
+            return Call(self, "r", r).slip(slip).branch(branch).tangential(SlipDefect{});
         },
-        r, slip, branch, "Part of the slip increment that the slip rule does not explain, (n,)");
+        r, slip, branch,
+        "Part of the slip increment that the slip rule does not explain, (n, dim - 1)");
 }
 } // namespace
 

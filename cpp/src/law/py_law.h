@@ -96,6 +96,14 @@ template <int T> struct PyLaw {
             return value;
         }
 
+        template <class F> Array tangential(F f) const {
+            Array value = zeros<double>({n, ssize_t{T}});
+            Outputs out;
+            out.value = written(value);
+            run(out, f);
+            return value;
+        }
+
         template <class F> std::pair<Array, Branches> reaction(F f) const {
             Array value = vectors();
             Branches branch(n);

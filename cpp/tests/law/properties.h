@@ -187,7 +187,7 @@ std::string lawful_is_fixed(const Law &law, Random &random) {
     // zero exactly where r, or the motion, is; a rounded r on the boundary is not quite lawful
     wrong += at_most(bipotential_gap(law, s.r, s.gap, s.slip),
                      s.branch == Branch::slip ? 8 * epsilon * s.r[T] * w : 0.0, "gap");
-    wrong += at_most(slip_defect(law, s.r, s.slip, s.branch), 8 * epsilon * length(s.slip),
+    wrong += at_most(length(slip_defect(law, s.r, s.slip, s.branch)), 8 * epsilon * length(s.slip),
                      "slip defect");
     return wrong;
 }

@@ -80,7 +80,7 @@ TEST(MakeLaw, frictionless_nodes_of_a_field) {
         expect(return_map(law, r, gap, slip, 2.0, 1.0),
                return_map(Frictionless{}, rn, gap, none, 2.0, 1.0));
         EXPECT_EQ(bipotential_gap(law, r, std::abs(gap), slip), r[2] * std::abs(gap));
-        EXPECT_EQ(slip_defect(law, r, slip, Branch::slip), 0.0);
+        EXPECT_EQ(slip_defect(law, r, slip, Branch::slip), Tangent<2>::Zero());
     }
 }
 

@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: MIT
 /// @file exact.h
 /// The law of a contact in extended precision, for the judge: what it measures is to be the error
-/// of the reactions, not of the measurement. Written apart from the projection that solvers use.
+/// of the reactions, not of the measurement. Predictor and slip rule are those of the law's
+/// headers; the projection is written apart from the one that solvers use.
 #pragma once
 
 #include "../algebra/square.h"
-#include "../law/friction.h"
+#include "../law/bipotential.h"
+#include "../law/slip_rule.h"
 
 namespace dolfinx_contact::condensed {
 /// A contact's reaction r and motion w (T tangential components, then the normal one), and what the
@@ -77,40 +79,15 @@ Branch project_exactly(const Law &law, Eigen::Matrix<Real, T + 1, 1> &tau) {
     return Branch::slip;
 }
 
-/// w_t + |w_t| d on a slipping contact, d the unit vector along P^-2 r_t; w_t on a sticking one;
-/// zero on an open or frictionless one, and without reaction: it has no direction of slip.
-template <class Law, int T = Law::tangents> void slip_left(const Law &law, ExactState<T> &at) {
-    at.slip.setZero();
-    if constexpr (T > 0) {
-        if (at.branch == Branch::open || law.mu(0) == 0.0 || at.r.isZero(0.0L))
-            return;
-        at.slip = at.w.template head<T>();
-        if (at.branch != Branch::slip)
-            return;
-        Eigen::Matrix<Real, T, 1> d;
-        for (int i = 0; i < T; ++i)
-            d[i] = at.r[i] / (static_cast<Real>(divisor(law, i)) * divisor(law, i) * law.q2(i));
-        const Real largest = d.template lpNorm<Eigen::Infinity>();
-        if (largest > 0.0L) {
-            d /= largest;
-            at.slip += (at.slip.norm() / d.norm()) * d;
-        }
-    }
-}
-
-/// Fills in defect, slip and branch.
+/// Fills in defect, slip and branch. Without reaction there is no direction of slip.
 template <class Law, int T = Law::tangents>
 void judge_exactly(const Law &law, Real kappa, ExactState<T> &at) {
-    Eigen::Matrix<Real, T + 1, 1> tau = at.r;
-    Real dual2 = 0.0L;
-    for (int i = 0; i < T; ++i) {
-        const Real q2_w = law.q2(i) * at.w[i], dual = law.mu(i) * q2_w;
-        tau[i] -= kappa * q2_w;
-        dual2 += dual * dual;
-    }
-    tau[T] -= kappa * (at.w[T] + std::sqrt(dual2));
+    const Eigen::Matrix<Real, T, 1> moved = at.w.template head<T>();
+    Eigen::Matrix<Real, T + 1, 1> tau = predictor(law, at.r, at.w[T], moved, kappa);
     at.branch = project_exactly(law, tau);
     at.defect = at.r - tau;
-    slip_left(law, at);
+    at.slip.setZero();
+    if (!at.r.isZero(0.0L))
+        at.slip = slip_defect(law, at.r, moved, at.branch);
 }
 } // namespace dolfinx_contact::condensed

@@ -35,7 +35,7 @@ struct Inputs {
 
 /// Arrays that a function writes, where there. A frictionless law writes normal components alone.
 struct Outputs {
-    View<double> value{};        ///< scalar, or vector
+    View<double> value{};        ///< scalar, vector, or its tangential components
     View<std::uint8_t> branch{}; ///< scalar, number of the enum
     View<double> by_reaction{};  ///< (tangents + 1)^2 components, row by row
     View<double> by_motion{};    ///< likewise
@@ -87,6 +87,14 @@ void put_matrix(const Jacobian<T> &J, const View<double> &out, int tangents, std
 template <int T>
 void store(double value, const Jacobian<T> &, const Outputs &out, int, std::size_t node) {
     out.value(node) = value;
+}
+
+template <int T>
+void store(const Tangent<T> &along, const Jacobian<T> &R, const Outputs &out, int,
+           std::size_t node) {
+    const Tangent<T> v = R.template topLeftCorner<T, T>().transpose() * along;
+    for (int k = 0; k < T; ++k)
+        out.value(node, k) = v[k];
 }
 
 template <int T>

@@ -18,9 +18,9 @@ template <int T> struct Linearisation {
 };
 
 /// w_t = M Q^2 du_t, whose norm is the dual norm ||Q^2 (-du_t)||*_mu of [dSFMH07, Section 1].
-template <class Law, int T = Law::tangents>
-Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
-    Tangent<T> w;
+template <class Law, class Real, int T = Law::tangents>
+Tangent<T, Real> scaled_slip(const Law &law, const Eigen::Matrix<Real, T, 1> &slip) {
+    Tangent<T, Real> w;
     for (int i = 0; i < T; ++i)
         w[i] = law.mu(i) * (law.q2(i) * slip[i]);
     return w;
@@ -28,10 +28,10 @@ Tangent<T> scaled_slip(const Law &law, const Tangent<T> &slip) {
 
 /// Predictor of [dSFMH07, Section 2]:
 /// tau_t = r_t - rho Q^2 du_t,  tau_n = r_n - rho (x_n + |M Q^2 du_t|).
-template <class Law, int T = Law::tangents>
-Local<T> predictor(const Law &law, const Local<T> &r, double gap, const Tangent<T> &slip,
-                   double rho) {
-    Local<T> tau;
+template <class Law, class Real, int T = Law::tangents>
+Local<T, Real> predictor(const Law &law, const Eigen::Matrix<Real, T + 1, 1> &r, Real gap,
+                         const Eigen::Matrix<Real, T, 1> &slip, Real rho) {
+    Local<T, Real> tau;
     for (int i = 0; i < T; ++i)
         tau[i] = r[i] - rho * (law.q2(i) * slip[i]);
     tau[T] = r[T] - rho * (gap + norm<T>(scaled_slip(law, slip)));

@@ -16,11 +16,11 @@
 #include <cstdint>
 
 namespace dolfinx_contact {
-/// Tangential vector, shape (T,).
-template <int T> using Tangent = Eigen::Matrix<double, T, 1>;
+/// Tangential vector, shape (T,). Real is double, or long double where errors are measured.
+template <int T, class Real = double> using Tangent = Eigen::Matrix<Real, T, 1>;
 
 /// Vector in the local frame, shape (T+1,): tangential components, then the normal one.
-template <int T> using Local = Eigen::Matrix<double, T + 1, 1>;
+template <int T, class Real = double> using Local = Eigen::Matrix<Real, T + 1, 1>;
 
 /// Derivative of a vector in the local frame by another, shape (T+1, T+1).
 template <int T> using Jacobian = Eigen::Matrix<double, T + 1, T + 1>;

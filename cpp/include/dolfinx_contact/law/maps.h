@@ -55,7 +55,7 @@ struct BipotentialGap {
 };
 
 struct SlipDefect {
-    template <class Law, class S> double operator()(const Law &law, const S &s) const {
+    template <class Law, class S> auto operator()(const Law &law, const S &s) const {
         return slip_defect(law, s.r, s.slip, s.branch);
     }
 };

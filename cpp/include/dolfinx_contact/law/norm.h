@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace dolfinx_contact {
 /// Added to a length that is a divisor, against 0 / 0; lengths above 1e-291 stay what they are.
@@ -33,19 +34,21 @@ inline PowerOfTwo power_of_two(double magnitude) {
 }
 
 /// max |v_i|
-template <int N> double largest(const Eigen::Matrix<double, N, 1> &v) {
-    double magnitude = std::abs(v[0]);
+template <int N, class Real> Real largest(const Eigen::Matrix<Real, N, 1> &v) {
+    Real magnitude = std::abs(v[0]);
     for (int i = 1; i < N; ++i)
         magnitude = std::max(magnitude, std::abs(v[i]));
     return magnitude;
 }
 
-/// |v|, for all finite v whose norm is representable.
-template <int T> double norm(const Tangent<T> &v) {
+/// |v|, for all finite v whose norm is representable; in long double without scaling.
+template <int T, class Real> Real norm(const Tangent<T, Real> &v) {
     if constexpr (T == 0)
         return 0.0;
     else if constexpr (T == 1)
         return std::abs(v[0]);
+    else if constexpr (!std::is_same_v<Real, double>)
+        return std::sqrt(v.squaredNorm());
     else {
         const PowerOfTwo scale = power_of_two(largest<T>(v));
         double sum = 0.0;
