@@ -55,9 +55,9 @@ class Search:
         self.iterations += iterations
         self.left -= iterations
 
-    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, np.ndarray]:
-        """``x`` and its forces out of balance; takes note of its errors."""
-        residual, errors = self.step.residual(x, maps)
+    def residual(self, x: np.ndarray, maps, forces: np.ndarray) -> np.ndarray:
+        """Forces out of balance of ``x``, with the step's ``forces`` there; takes note of its errors."""
+        residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol
         self._errors.append(self.error)
         change = errors.change * self._contraction()
@@ -73,7 +73,7 @@ class Search:
         stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error
         rounded = stalled and errors.within(0.0)
         self.over = bool(solved or rounded or self._late())
-        return x, residual
+        return residual
 
     def _contraction(self) -> float:
         """What is left to go over the last step, were errors to fall on as in the last steps."""

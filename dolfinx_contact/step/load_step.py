@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.contact.state import Status
+from dolfinx_contact.contact.state import State, Status
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.results.record import Counts, counts
 from dolfinx_contact.step.errors import (
@@ -42,6 +43,16 @@ def _shared_nodes(contacts, stiffness, fixed):
     from dolfinx_contact.contact.shared import shared_nodes
 
     return shared_nodes(contacts, stiffness, fixed)
+
+
+class Judged(NamedTuple):
+    """A state of a step, judged by F itself."""
+
+    x: np.ndarray  # displacement, (owned dofs,)
+    forces: np.ndarray  # -F(x)
+    states: list[State]  # of the contacts
+    surfaces: np.ndarray | None  # motions of surfaces that force drives
+    errors: Errors
 
 
 class LoadStep:
@@ -78,8 +89,7 @@ class LoadStep:
         self.statics, self.holding = None, holding
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self._before, self._told = None, 0  # reactions of the state judged before, states told
-        self._known = None  # a displacement, and the forces b - K x that it leaves
-        self._measured = None  # displacement and contact states whose errors were measured with F
+        self._judged: Judged | None = None  # the state judged last by F
 
     @property
     def may_slide(self) -> bool:
@@ -96,7 +106,7 @@ class LoadStep:
 
     def with_laws_of(self, x: np.ndarray) -> LoadStep:
         """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet."""
-        return self._but(_starts=[x], _measured=None)
+        return self._but(_starts=[x], _judged=None)
 
     def _but(self, **parts) -> LoadStep:
         other = copy(self)
@@ -146,14 +156,8 @@ class LoadStep:
     # -- forces --------------------------------------------------------------------------------
 
     def forces(self, x: np.ndarray) -> np.ndarray:
-        """``b - K x``; of the array that was asked for last without another product."""
-        if self._known is None or self._known[0] is not x:
-            self._known = (x, self.b - self.body.multiply(x))
-        return self._known[1]
-
-    def know(self, x: np.ndarray, forces: np.ndarray) -> None:
-        """Take note of the forces at a displacement that were found without a product."""
-        self._known = x, forces
+        """``b - K x``."""
+        return self.b - self.body.multiply(x)
 
     def free(self, forces: np.ndarray) -> np.ndarray:
         """Forces without what supports carry."""
@@ -175,21 +179,28 @@ class LoadStep:
         """Norm of forces at free degrees of freedom."""
         return self.body.norm(self.free(forces))
 
-    def out_of_balance(self, x: np.ndarray, maps) -> np.ndarray:
-        """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``."""
-        return self._left(x, self.forces(x), maps)
+    def out_of_balance(self, x: np.ndarray, maps, forces: np.ndarray | None = None) -> np.ndarray:
+        """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``.
 
-    def derivatives(self, x: np.ndarray, maps) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of the new reactions of each contact, by the reactions before and by the motion."""
-        forces = self.forces(x)
+        Args:
+            x: Displacement.
+            maps: Of the contacts.
+            forces: ``forces(x)``, where they are known; so with the other methods.
+        """
+        return self._left(x, self.forces(x) if forces is None else forces, maps)
+
+    def derivatives(self, x: np.ndarray, maps, forces: np.ndarray | None = None) -> list[tuple]:
+        """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``."""
+        forces = self.free(self.forces(x) if forces is None else forces)
         self._balance_surfaces(x, forces, maps)
         both = zip(self._asked(x, forces), maps)
         derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
         return derivatives if self._shared is None else self._shared.coupled(derivatives)
 
-    def along(self, x: np.ndarray, dx: np.ndarray, maps):
+    def along(self, x: np.ndarray, dx: np.ndarray, maps, forces: np.ndarray | None = None):
         """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
-        forces, change = self.forces(x), self.body.multiply(dx)
+        forces = self.forces(x) if forces is None else forces
+        change = self.body.multiply(dx)
 
         def size(length: float) -> float:
             return self.size(self._left(x + length * dx, forces - length * change, maps))
@@ -207,47 +218,53 @@ class LoadStep:
             if still.any():
                 contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
 
-    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
+    def residual(
+        self, x: np.ndarray, maps, forces: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state.
 
         The reactions that enter the predictor are those the body asks for, ``K x - b``.  Once the
         errors fall below the tolerance they are measured again with F itself, assembled by DOLFINx.
         """
-        left = self.out_of_balance(x, maps)
+        left = self.out_of_balance(x, maps, forces)
         self.errors = self._errors(left, x, self.body.support_forces(x))
         if self.errors.within(self.tol):
-            change = self.errors.change
-            self._judge(x, self.by_form(x))
-            self.errors = self.errors._replace(change=change)
+            self._judge(x, self.by_form(x), self.errors.change)
         self._tell()
         return left, self.errors
 
     def measure(self, x: np.ndarray) -> Errors:
-        """Errors of a displacement by F itself; also takes its reactions, gaps and slips.
+        """Errors of a displacement by F itself; also takes its reactions, gaps and slips, see ``judged``."""
+        return self.judged(x).errors
+
+    def judged(self, x: np.ndarray) -> Judged:
+        """The state of a displacement, judged by F itself; contacts and surfaces are in that state then.  Collective.
 
         Reactions by the return map: beside large slip their direction is that of the slip, not that of rounding in forces.
         """
-        if not self._is_measured(x):
+        if not self._is_judged(x):
             forces = self.by_form(x)
             maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
             self._respond(x, self.free(forces), maps)
             self._judge(x, forces)
             self._tell()
         elif self.surfaces is not None:  # where they were judged
-            self.surfaces.move_to(self._measured[2])
-        return self.errors
+            self.surfaces.move_to(self._judged.surfaces)
+        self.errors = self._judged.errors
+        return self._judged
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
         """``-F(x)``, by which errors are measured."""
         return -self.body.residual(x)
 
-    def _is_measured(self, x: np.ndarray) -> bool:
-        """Whether the errors are those of ``x``, and nobody has moved the contacts since."""
-        if self._measured is None:
+    def _is_judged(self, x: np.ndarray) -> bool:
+        """Whether the state judged last is that of ``x``, and contacts are in it.  Collective."""
+        last = self._judged
+        if last is None:
             return False
-        measured, states, _ = self._measured
-        stand = all(contact.present is state for contact, state in zip(self.contacts, states))
-        return self.body.same(x, measured if stand else None)  # asked on all ranks
+        both = zip(self.contacts, last.states)
+        stand = all(same_states(contact.present, state) for contact, state in both)
+        return self.body.same(x, last.x if stand else None)  # asked on all ranks
 
     def measure_open(self, x: np.ndarray) -> Errors:
         """Errors of a displacement without reactions."""
@@ -296,6 +313,7 @@ class LoadStep:
             self.holding.share()
 
     def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+        forces = self.free(forces)
         self._respond(x, forces, maps)
         return self.with_reactions(forces)
 
@@ -306,11 +324,13 @@ class LoadStep:
             contact.assemble_reaction(forces)
         return forces
 
-    def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
-        """Errors of the contacts' present state, ``forces = -F(x)``."""
-        self.errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
+    def _judge(self, x: np.ndarray, forces: np.ndarray, change: float | None = None) -> None:
+        """Errors of the contacts' present state, ``forces = -F(x)``; with a ``change`` that is known."""
+        errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
+        self.errors = errors if change is None else errors._replace(change=change)
         moved = None if self.surfaces is None else self.surfaces.moved
-        self._measured = x.copy(), [contact.present for contact in self.contacts], moved
+        states = [contact.present for contact in self.contacts]
+        self._judged = Judged(x.copy(), forces, states, moved, self.errors)
 
     def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
         """Errors of the contacts' present state.
@@ -350,3 +370,11 @@ class LoadStep:
         from dolfinx_contact.surfaces.sliding import lost_far_away
 
         return lost_far_away(self.body, self.statics, self.surfaces, x, acts)
+
+
+def same_states(one: State, other: State) -> bool:
+    """Whether two states of a contact have the same values."""
+    return one is other or all(
+        a is b or (a is not None and b is not None and np.array_equal(a, b, equal_nan=True))
+        for a, b in zip(one, other)
+    )

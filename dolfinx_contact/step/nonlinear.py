@@ -31,33 +31,28 @@ class NonlinearStep(LoadStep):
         return different[int(np.argmin(np.nan_to_num(sizes, nan=np.inf)))]
 
     def forces(self, x: np.ndarray) -> np.ndarray:
-        """``-F(x)``, zero at fixed degrees of freedom; of the array that was asked for last without assembly."""
-        if self._known is None or self._known[0] is not x:
-            forces = -self.body.residual(x)
-            self._known = (x, self.free(forces), forces)
-        return self._known[1]
+        """``-F(x)``; at fixed degrees of freedom what supports carry."""
+        return self.by_form(x)
 
-    def by_form(self, x: np.ndarray) -> np.ndarray:
-        self.forces(x)
-        return self._known[2]
-
-    def residual(self, x: np.ndarray, maps) -> tuple[np.ndarray, Errors]:
+    def residual(
+        self, x: np.ndarray, maps, forces: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state."""
-        left = self.out_of_balance(x, maps)
-        self._judge(x, self.by_form(x))
+        forces = self.forces(x) if forces is None else forces
+        left = self.out_of_balance(x, maps, forces)
+        self._judge(x, forces)
         self._tell()
         return left, self.errors
 
-    def _judge(self, x: np.ndarray, forces: np.ndarray) -> None:
-        super()._judge(x, forces)
-        if not self.held(x):
-            self.errors = self.errors._replace(error=np.inf)
+    def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
+        errors = super()._errors(left, x, supports)
+        return errors if self.held(x) else errors._replace(error=np.inf)
 
 
 class LinearisedStep(LoadStep):
     """As ``LoadStep`` of a linear body; errors are measured with its ``K``, too."""
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
-        forces = self.forces(x).copy()
+        forces = self.forces(x)
         forces[self.body.fixed] = -self.body.support_forces(x)
         return forces

@@ -11,6 +11,7 @@ from dolfinx_contact.bodies.forms import times_volume
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed.input import principal_axes
 from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
+from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
@@ -32,8 +33,8 @@ UNFELT, SLIDING = 1e-9, 1e-3
 # Where a body is moved to before it is taken back out of the planes, over the largest gap.
 FAR = 30.0
 
-# How often a step towards the last state is halved.
-HALVED = 12
+# The shortest part of a step towards the last state that is tried.
+SHORTEST = 2.0**-11
 
 
 class Statics:
@@ -327,8 +328,8 @@ class Statics:
             self._body.total(weighed.T @ Z),
         )
         way = Z @ np.linalg.solve(sizes, apart)
-        for halved in range(HALVED):
-            trial = x + 0.5**halved * way
+        for length in halves(SHORTEST):
+            trial = x + length * way
             if step.measure(trial).within(step.tol):
                 return trial
         step.measure(x)

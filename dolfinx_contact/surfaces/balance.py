@@ -7,6 +7,8 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.support.line_search import halves
+
 # Steps of Newton's method, and lengths of one that are tried.
 STEPS, LENGTHS = 30, 40
 
@@ -185,12 +187,11 @@ class SurfaceBalance:
             if (np.abs(left) <= BALANCED * (size + np.abs(target) + springs * np.abs(moved))).all():
                 break
             slope = slope.reshape(n, n) + np.diag(springs) + REGULAR * most
-            change, length = -np.linalg.solve(slope, left), 1.0
-            while length > 2.0**-LENGTHS:
+            change = -np.linalg.solve(slope, left)
+            for length in halves(2.0 ** (1 - LENGTHS)):
                 following = energy(moved + length * change)
                 if following[0] < least[0]:
                     break
-                length /= 2
             else:
                 break
             moved, least = moved + length * change, following

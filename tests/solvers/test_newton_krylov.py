@@ -54,7 +54,7 @@ def test_no_step_is_taken_uphill(newton, monkeypatch):
     method, step, maps, _, x = newton
     residual = step.out_of_balance(x, maps)
     along = step.along
-    monkeypatch.setattr(step, "along", lambda x, dx, maps: along(x, -dx, maps))
+    monkeypatch.setattr(step, "along", lambda x, dx, *known: along(x, -dx, *known))
     assert method.step(x, residual, maps)[1] == 0.0
 
 

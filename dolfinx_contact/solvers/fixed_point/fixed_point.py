@@ -166,8 +166,8 @@ class BoundFixedPoint:
         anderson = Anderson(x.size, self._options.depth, step.total)
         smallest, due = np.inf, search.left - every
         while True:
-            x = self.preconditioner.rigid.balanced(x, step, maps)
-            x, residual = search.residual(x, maps)
+            x, forces = self.preconditioner.rigid.balanced(x, step, maps)
+            residual = search.residual(x, maps, forces)
             if not search.goes_on or search.error > GROWTH * tangent:
                 return
             if search.left <= due:
@@ -177,7 +177,7 @@ class BoundFixedPoint:
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
                     self.preconditioner.forget_tangent()
                     if not useless:
-                        self.preconditioner.linearise(step.derivatives(x, maps))
+                        self.preconditioner.linearise(step.derivatives(x, maps, forces))
                     anderson.restart()
                     smallest = np.inf
                 tangent = np.inf if useless else search.error

@@ -11,6 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.support.line_search import enough, halves
 
 # Augmentation parameters over the nodal stiffness, along the normal and along slip. The latter weights errors of slip
 # against errors of reaction; the next one is taken where a step gets SHORT.
@@ -41,11 +42,12 @@ def search_by_newton(search, preconditioner, x: np.ndarray) -> None:
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
             length = 1.0
             while length >= SHORT:
-                x, residual = search.residual(x, maps)
+                forces = step.forces(x)
+                residual = search.residual(x, maps, forces)
                 if not search.goes_on:
                     return
-                preconditioner.linearise(step.derivatives(x, maps))
-                dx, length, iterations = newton.step(x, residual, maps)
+                preconditioner.linearise(step.derivatives(x, maps, forces))
+                dx, length, iterations = newton.step(x, residual, maps, forces)
                 search.count(max(iterations, 1))
                 x = x + length * dx
 
@@ -89,13 +91,16 @@ class NewtonKrylov:
         """PETSc's preconditioner."""
         y.array_w[:] = self._preconditioner.correct(x.array_r)
 
-    def step(self, x: np.ndarray, residual: np.ndarray, maps) -> tuple[np.ndarray, float, int]:
+    def step(
+        self, x: np.ndarray, residual: np.ndarray, maps, forces: np.ndarray | None = None
+    ) -> tuple[np.ndarray, float, int]:
         """Direction of Newton's step, how much of it makes the residual smaller, and iterations of GMRES.
 
         Args:
             x: Displacement at which the system was linearised, owned degrees of freedom.
             residual: Forces out of balance there.
             maps: Of the contacts.
+            forces: The step's at ``x``, where they are known.
 
         Returns:
             Direction, length (1 for the whole step, 0 if none is short enough), iterations.
@@ -103,9 +108,6 @@ class NewtonKrylov:
         self._residual.array_w[:] = self._step.free(residual)
         self._solver.solve(self._residual, self._direction)
         dx, iterations = self._direction.array_r.copy(), self._solver.getIterationNumber()
-        size, before, length = self._step.along(x, dx, maps), self._step.size(residual), 1.0
-        while not size(length) <= (1 - 1e-4 * length) * before:
-            length /= 2
-            if length < SHORTEST:
-                return dx, 0.0, iterations
-        return dx, length, iterations
+        size, before = self._step.along(x, dx, maps, forces), self._step.size(residual)
+        fitting = (t for t in halves(SHORTEST) if size(t) <= enough(t) * before)
+        return dx, next(fitting, 0.0), iterations

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfinx_contact.support.line_search import halves
+
 # A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
 # (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
 # stiffness (up to 2300 times) more than halves its iterations.
@@ -16,6 +18,9 @@ DEPENDENT = 1e-10
 
 # Newton's method ends when the forces along the motions are this small beside those on all nodes.
 SMALL, NEWTON = 1e-3, 20
+
+# The shortest part of a step of it that is tried.
+SHORTEST = 2.0**-11
 
 # Part of the largest slope that is none; lengths that are tried along such a motion, and part of the forces that may be left.
 FREE, ACROSS, TURNED = 1e-9, 60, 0.9
@@ -64,24 +69,24 @@ class RigidBalance:
         """Number of soft motions."""
         return len(self._energy)
 
-    def balanced(self, x: np.ndarray, step, maps) -> np.ndarray:
-        """``x``, moved along the soft motions, or as it was if there is no way down.
+    def balanced(self, x: np.ndarray, step, maps) -> tuple[np.ndarray, np.ndarray]:
+        """``x``, moved along the soft motions, or as it was if there is no way down; and the step's ``forces`` there.
 
         Args:
             x: Displacement of owned degrees of freedom.
-            step: The ``LoadStep``; knows the forces at the result.
+            step: The ``LoadStep``.
             maps: Of the contacts.
         """
-        if len(self) == 0:
-            return x
         start = (x, step.forces(x))
+        if len(self) == 0:
+            return start
         (x, forces), (left, slope, size) = start, self.left(*start, step, maps)
         for _ in range(NEWTON):
             if np.linalg.norm(left) <= SMALL * size:
                 break
             direction = self._limited(np.linalg.lstsq(slope, left, rcond=1e-13)[0])
-            for halved in range(12):
-                c = 0.5**halved * direction
+            for length in halves(SHORTEST):
+                c = length * direction
                 trial = x + self.modes @ c, forces - self.forces @ c
                 result = self.left(*trial, step, maps)
                 if np.linalg.norm(result[0]) < np.linalg.norm(left):
@@ -92,8 +97,7 @@ class RigidBalance:
                     x, forces = start
                     break
             (x, forces), (left, slope, size) = trial, result
-        step.know(x, forces)
-        return x
+        return x, forces
 
     def _across(self, start, left, slope, step, maps) -> tuple:
         """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
@@ -137,8 +141,7 @@ class RigidBalance:
         """
         n, surfaces = len(self), step.surfaces
         slope, pushed, pushing = np.zeros((n, n)), 0.0, 0.0
-        step.know(x, forces)
-        derivatives = step.derivatives(x, maps)
+        derivatives = step.derivatives(x, maps, forces)
         for k, (contact, both) in enumerate(zip(self._contacts, derivatives)):
             Z, KZ = (contact.points.motion(part) for part in (self.modes, self.forces))
             change = both[0] @ KZ + both[1] @ Z

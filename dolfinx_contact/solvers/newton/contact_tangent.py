@@ -131,13 +131,14 @@ def next_change(step, x: np.ndarray) -> float:
     body, tangent = step.body, ContactTangent(step.body, step.contacts)
     maps = [ReturnMap(of.normal, of.normal) for of in step.stiffness]
     try:
-        tangent.linearise(step.derivatives(x, maps))
-        dx = tangent.solve(step.free(step.out_of_balance(x, maps)))
+        forces = step.forces(x)
+        tangent.linearise(step.derivatives(x, maps, forces))
+        dx = tangent.solve(step.free(step.out_of_balance(x, maps, forces)))
     except (LinearSolverError, PETSc.Error):
         return np.inf
     finally:
         tangent.destroy()
-    acting = max(step.size(step.forces(x)), body.norm(step.external))
+    acting = max(step.size(forces), body.norm(step.external))
     return step.size(body.multiply(dx)) / acting if acting > 0.0 else np.inf
 
 

@@ -12,7 +12,9 @@ import numpy as np
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
+from dolfinx_contact.step.load_step import Judged
 from dolfinx_contact.step.nonlinear import LinearisedStep
+from dolfinx_contact.support.line_search import halves
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
 # largest of the last BEFORE ones.
@@ -60,35 +62,34 @@ class BoundLinearised:
             start: Where to begin; None asks the step.
         """
         x = step.start() if start is None else start
-        best, forward, iterations, used = x, np.inf, 0, []
+        best, forces, forward, iterations, used = x, step.by_form(x), np.inf, 0, []
         errors, last = deque([np.inf], maxlen=BEFORE), np.inf
         while len(used) < MOST:
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
-                    found = self._linear_step(step, x, last)
+                    found = self._linear_step(step, x, forces, last)
             except (LinearSolverError, np.linalg.LinAlgError):
                 break
             iterations += found.iterations
             used.append(found.chosen)
-            x, error = self._part(step, x, found.x, max(errors))
-            if x is None:
+            judged = self._part(step, x, found.x, max(errors))
+            if judged is None:
                 break
-            rate = min(error / last, 0.9)
-            change = step.errors.change * rate / (1 - rate)
-            best, forward = x, max(found.forward_error, change)
-            errors.append(error)
-            last = error
-            rounded = step.errors.within(0.0)
-            if step.errors.within(step.tol) and (forward <= step.tol or rounded):
+            x, forces, now = judged.x, judged.forces, judged.errors
+            rate = min(now.largest / last, 0.9)
+            change = now.change * rate / (1 - rate)
+            best, forward, last = x, max(found.forward_error, change), now.largest
+            errors.append(last)
+            if now.within(step.tol) and (forward <= step.tol or now.within(0.0)):
                 break
         names = ", ".join(dict.fromkeys(used)) or type(self._solver).__name__
         return SolverResult(best, iterations, forward, f"{names}, linearised {len(used)} times")
 
-    def _linear_step(self, step, x: np.ndarray, error: float) -> SolverResult:
-        """The contact step of the body linearised at ``x``, whose error is known."""
+    def _linear_step(self, step, x: np.ndarray, forces: np.ndarray, error: float) -> SolverResult:
+        """The contact step of the body linearised at ``x``, whose forces ``-F(x)`` and error are known."""
         body = self._body
         body.linearise(x)
-        b = body.linear_load(step.b, -step.by_form(x))
+        b = body.linear_load(step.b, -forces)
         tol = max(PART * min(error * error, ROUGH / PART), PART * step.tol, 1e-13)
         linear = LinearisedStep(
             body, self._contacts, step.stiffness, b, step.external, [x], tol, step.unit
@@ -112,15 +113,12 @@ class BoundLinearised:
         except ValueError:
             return FixedPoint().bind(*arguments)
 
-    def _part(self, step, x: np.ndarray, to: np.ndarray, most: float):
-        """The iterate at a part of the way, and its largest error; None if no part helps."""
-        whole, length = to - x, 1.0
-        while length >= SHORTEST:
-            following = to if length == 1.0 else x + length * whole
-            error = step.measure(following).largest
-            moved = np.isfinite(step.size(step.forces(following)))
+    def _part(self, step, x: np.ndarray, to: np.ndarray, most: float) -> Judged | None:
+        """The iterate at a part of the way, judged; None if no part helps."""
+        for length in halves(SHORTEST):
+            judged = step.judged(to if length == 1.0 else x + length * (to - x))
+            error, moved = judged.errors.largest, np.isfinite(step.size(judged.forces))
             # Supports that are not yet where they should be make any error infinite.
             if moved and (error < most or error == np.inf == most):
-                return following, error
-            length /= 2
-        return None, np.inf
+                return judged
+        return None

@@ -77,7 +77,7 @@ class BoundSNES(OnTangent):
         said = "converged at its start"
         with np.errstate(all="ignore"):  # a trial may turn elements inside out
             if step.held(x):
-                search.residual(x, maps)
+                search.residual(x, maps, step.forces(x))
             if not search.over:
                 try:
                     x = self._supports_moved(step, x, maps, search, stands=start is None)
@@ -88,10 +88,10 @@ class BoundSNES(OnTangent):
 
     def _supports_moved(self, step, x: np.ndarray, maps, search, stands: bool) -> np.ndarray:
         """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""
-        descent, length = Descent(step, self._tangent, stands), 1.0
+        descent, forces, length = Descent(step, self._tangent, stands), step.forces(x), 1.0
         descent.begin(maps)
         while length > 0.0:
-            x, length = descent.advance(x, chord=False)
+            x, forces, length = descent.advance(x, forces, chord=False)
             search.count(1)
             if step.held(x):
                 return x
@@ -133,7 +133,8 @@ class _Equations:
 
     def __init__(self, step, tangent: ContactTangent, maps, search: Search):
         self.search, self.failure = search, None
-        self._step, self._tangent, self._maps, self._x = step, tangent, maps, None
+        self._step, self._tangent, self._maps = step, tangent, maps
+        self._last: tuple | None = None  # a displacement, and the step's forces there
 
     def calls(self, work: Callable) -> Callable:
         """A callback of PETSc that leaves what it raises in ``failure``."""
@@ -147,26 +148,28 @@ class _Equations:
 
         return call
 
-    def _at(self, X: PETSc.Vec) -> np.ndarray:
-        """The displacement, the same array as long as it is the same: its forces are known."""
-        if self._x is None or not self._step.body.same(X.array_r, self._x):
-            self._x = X.array_r.copy()
-        return self._x
+    def _at(self, X: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
+        """The displacement and its forces, which PETSc asks for several times."""
+        if self._last is None or not self._step.body.same(X.array_r, self._last[0]):
+            x = X.array_r.copy()
+            self._last = x, self._step.forces(x)
+        return self._last
 
     def function(self, snes, X, residual) -> None:
         """Forces that are too much; zero at fixed degrees of freedom."""
-        step = self._step
-        residual.array_w[:] = -step.free(step.out_of_balance(self._at(X), self._maps))
+        step, (x, forces) = self._step, self._at(X)
+        residual.array_w[:] = -step.free(step.out_of_balance(x, self._maps, forces))
 
     def jacobian(self, snes, X, J, P) -> None:
         """Their derivative, written into the tangent's matrix."""
-        x, body = self._at(X), self._step.body
+        (x, forces), body = self._at(X), self._step.body
         if body.nonlinear:
             body.linearise(x)
-        self._tangent.linearise(self._step.derivatives(x, self._maps))
+        self._tangent.linearise(self._step.derivatives(x, self._maps, forces))
 
     def test(self, snes, iteration: int, norms) -> int:
         """Judge the iterate by the errors of the step."""
-        self.search.residual(self._at(snes.getSolution()), self._maps)
+        x, forces = self._at(snes.getSolution())
+        self.search.residual(x, self._maps, forces)
         done = self.search.over
         return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE if done else 0

@@ -18,6 +18,7 @@ from dolfinx_contact.solvers.base import BoundSolver, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.line_search import enough, halves
 
 NAME = "SparseNewton"
 
@@ -76,30 +77,30 @@ class BoundSparseNewton(OnTangent):
         x = step.start() if start is None else start
         search = Search(step, x, self._options.max_seconds)
         search.begin(self._options.max_iterations, PATIENCE)
-        descent = Descent(step, self._tangent, stands=start is None)
+        descent, forces = Descent(step, self._tangent, stands=start is None), step.forces(x)
         for tangential in cycle(TANGENTIAL):
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
-                    x = self._fall(search, descent, x, maps)
+                    x, forces = self._fall(search, descent, x, forces, maps)
             except LinearSolverError:
                 break
             if not search.goes_on:
                 break
         return SolverResult(search.best, search.iterations, search.forward_error, NAME)
 
-    def _fall(self, search, descent, x: np.ndarray, maps) -> np.ndarray:
-        """Steps with the same maps until the search ends or one gets short."""
+    def _fall(self, search, descent, x: np.ndarray, forces: np.ndarray, maps) -> tuple:
+        """Steps with the same maps until the search ends or one gets short: the last iterate and its forces."""
         descent.begin(maps)
         while True:
             if search.step.held(x):
-                x, _ = search.residual(x, maps)
+                search.residual(x, maps, forces)
                 if not search.goes_on:
-                    return x
-            x, length = descent.advance(x, chord=search.error <= search.step.tol)
+                    return x, forces
+            x, forces, length = descent.advance(x, forces, search.error <= search.step.tol)
             search.count(1)
             if length < SHORT:
-                return x
+                return x, forces
 
 
 class Descent:
@@ -117,22 +118,23 @@ class Descent:
         """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
         self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
 
-    def advance(self, x: np.ndarray, chord: bool) -> tuple[np.ndarray, float]:
-        """The next iterate, and the part of the step that leads to it: 0 if none helps.
+    def advance(self, x: np.ndarray, forces: np.ndarray, chord: bool) -> tuple:
+        """The next iterate, its forces, and the part of the step that leads to it: 0 if none helps.
 
         Args:
             x: Displacement of owned degrees of freedom.
+            forces: Those of the step there.
             chord: Whether the last tangent is good enough.
         """
         step, maps = self._step, self._maps
         if not chord or self._tangent.matrix is None:
             if self._body.nonlinear and not self._stands:
                 self._body.linearise(x)
-            maps = self._following(x) if self._stands else maps
+            maps = self._following(x, forces) if self._stands else maps
             self._stands = False
             closing = self._closing(x, maps) if self._free else maps
-            self._tangent.linearise(step.derivatives(x, closing))
-        left, carried = step.free(step.out_of_balance(x, maps)), np.zeros_like(x)
+            self._tangent.linearise(step.derivatives(x, closing, forces))
+        left, carried = step.free(step.out_of_balance(x, maps, forces)), np.zeros_like(x)
         missing = step.missing(x)
         if not step.held(x):
             carried = self._tangent.multiply(missing, self._body.carried(missing))
@@ -140,25 +142,25 @@ class Descent:
         dx[self._body.fixed] = missing[self._body.fixed]
         self._sizes.append(step.size(left - carried))
         most, self._free = np.inf if self._free else max(self._sizes), False
-        length = 1.0
-        while length >= SHORTEST:
+        for length in halves(SHORTEST):
             following = x + length * dx
             if length == 1.0:
                 following[self._body.fixed] = step.b[self._body.fixed]
-            left = step.out_of_balance(following, self._maps) - (1 - length) * carried
-            if step.size(left) < (1 - 1e-4 * length) * most:
-                return following, length
-            length /= 2
-        return x, 0.0
+            there = step.forces(following)
+            left = step.out_of_balance(following, self._maps, there) - (1 - length) * carried
+            if step.size(left) < enough(length) * most:
+                return following, there, length
+        return x, forces, 0.0
 
-    def _following(self, x: np.ndarray) -> list:
+    def _following(self, x: np.ndarray, forces: np.ndarray) -> list:
         """Maps for which nodes under load stay pressed where their plane moves off: Newton's step closes their gaps.
 
         Let go, all would spring back at once. Where gaps close does not depend on the augmentation parameter ``rho``, as
         long as the predictor ``r - rho g`` is positive. With friction they are let go, along the plane, too: held, steps
         that turn back took more iterations.
         """
-        self._step.out_of_balance(x, [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps])
+        asked = [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps]
+        self._step.out_of_balance(x, asked, forces)
         maps = []
         for contact, map in zip(self._step.contacts, self._maps):
             pressed, gap = contact.reaction[:, -1], contact.gap
