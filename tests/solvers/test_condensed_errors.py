@@ -230,6 +230,24 @@ def test_contacts_far_apart(W, q):
         assert found.local_error <= TOL
 
 
+def test_contacts_far_apart_that_are_not_solved():
+    """Compliances 1e9 apart and friction of 5: each contact obeys the law to half the digits of tol, or a warning says by how much one does not."""
+    warned = dict.fromkeys((True, False), 0)
+    for seed in (11, 12, 14, 20, 22, 27):
+        parts = [random_problem(seed + k, 10, rank=30, mu_range=(5, 5), ratio=1) for k in (0, 100)]
+        W, q = np.zeros((60, 60)), np.vstack([part.q for part in parts])
+        W[:30, :30], W[30:, 30:] = parts[0].W, 1e-9 * parts[1].W
+        for fallbacks, of in warned.items():
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                found = solve_condensed(W, q, 5.0, CondensedNewton(fallbacks=fallbacks))
+            assert max(found.error, found.slip_error) <= TOL
+            said = any("local_error" in str(warning.message) for warning in caught)
+            assert said == (found.local_error > np.sqrt(TOL))
+            warned[fallbacks] = of + said
+    assert warned[True] < warned[False]
+
+
 def test_the_error_of_one_contact():
     """Of two blocks the one that bears a millionth is off by 9 %: no error sees it but that of one contact.
 

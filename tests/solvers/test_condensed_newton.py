@@ -65,7 +65,8 @@ def test_random_problems_of_every_rank():
     A solution exists in all of them; the worst have more contacts than degrees of freedom, mu above 5
     and a slip rule at right angles to friction.
     """
-    branches = Counter(check(random_problem(seed)).branch for seed in range(150))
+    patient = CondensedNewton(max_iterations=20_000)  # seven of them need more than is usual
+    branches = Counter(check(random_problem(seed), solver=patient).branch for seed in range(150))
     assert branches["newton, 3 rho_t"] > 10 and branches["interior_point"] > 10
 
 
@@ -195,7 +196,7 @@ def test_coefficients_far_apart_in_a_contact():
         A = rng.normal(size=(3 * n, 3 * n))
         W = A @ A.T / (3 * n) + 1e-3 * np.eye(3 * n)
         mu, q = 10 ** rng.uniform(-3, 3, size=(n, 2)), rng.normal(size=(n, 3))
-        r = solve_condensed(W, q, Friction(mu)).reaction
+        r = solve_condensed(W, q, Friction(mu), CondensedNewton(max_iterations=20_000)).reaction
         w = q + (W @ r.ravel()).reshape(n, 3)
         small, force = 1e-6 * np.abs(q).max(), 1e-6 * np.abs(r).max()
         assert (w[:, 2] >= -small).all() and (r[:, 2] >= 0).all()
@@ -253,6 +254,25 @@ def test_infeasible_raises():
         solve_condensed(W, q, Friction(0.3))
     assert caught.value.best.error > 1e-3
     assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "proximal_point"}
+
+
+def test_a_refusal_takes_few_times_a_solution():
+    """Friction of 1e7, of which most are refused: at most 60 times the iterations of a usual solution, unless more are asked for."""
+    scenes = [random_problem(seed, contacts=30, mu_range=(0.1, 0.6), ratio=2) for seed in range(5)]
+    usual = [check(scene).iterations for scene in scenes]
+    refused = 0
+    for seed in range(4):
+        scene = random_problem(seed, contacts=30, mu_range=(1e7, 1e8))
+        try:
+            solve_condensed(scene.W, scene.q, friction(scene))
+        except CondensedNotConverged as failure:
+            refused += 1
+            assert failure.best.iterations <= 60 * np.median(usual)
+            patient = CondensedNewton(max_iterations=2 * failure.best.iterations)
+            with pytest.raises(CondensedNotConverged, match="max_iterations") as again:
+                solve_condensed(scene.W, scene.q, friction(scene), patient)
+            assert again.value.best.iterations > failure.best.iterations
+    assert refused >= 2
 
 
 def test_caps():

@@ -26,6 +26,7 @@ def check(W, q, friction, mu, p=None, **options):
     return found
 
 
+@pytest.mark.filterwarnings("ignore:local_error")  # of contacts that bear next to nothing
 @pytest.mark.parametrize("kind", KINDS)
 def test_piles_and_towers(kind):
     """Rigid bodies, 1 to 16, seeds other than the benchmark's: every problem is solved."""

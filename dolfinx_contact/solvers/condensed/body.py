@@ -211,7 +211,7 @@ class CondensedBody:
     def _limited(self, step) -> dict:
         """Limits of the search for a loose body.  Collective."""
         most = FEW if step.statics.slides(step) else MANY
-        return {"max_iterations": min(most, self._options.max_iterations)}
+        return {"max_iterations": min(most, self._options.max_iterations or most)}
 
     def _tell_shares(self, reaction: np.ndarray) -> None:
         """Give contacts their reactions: at nodes of several ``x`` tells no more than the sums."""

@@ -29,12 +29,20 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import BoundSolver
 
 
+UNLIMITED = 200_000  # iterations; methods have limits of their own
+
+# By default a refusal takes some 10 to 60 times as long as a usual solution: iterations at least, which piles of rigid bodies need,
+# and iterations times the unknowns squared.
+LEAST, WORK = 600, 3e5
+
+
 class CondensedNewton:
     """Options of the globalised semismooth Newton method and its fallbacks.
 
     Args:
         slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
-        max_iterations: Iterations of all methods together.
+        max_iterations: Iterations of all methods together; by default as many as ``solve_condensed`` gives problems of that
+            size, and 200,000 for a body.
         newton_iterations: Newton iterations of one attempt.
         max_seconds: Wall time after which the search ends, seconds.
         fallbacks: Try other methods where Newton's fails.
@@ -50,13 +58,15 @@ class CondensedNewton:
         self,
         *,
         slip_tol: float | None = None,
-        max_iterations: int = 200_000,
+        max_iterations: int | None = None,
         newton_iterations: int = 60,
         max_seconds: float = math.inf,
         fallbacks: bool = True,
     ) -> None:
         self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol, finite=True)
-        self.max_iterations = int(positive("max_iterations", max_iterations, whole=True))
+        if max_iterations is not None:
+            max_iterations = int(positive("max_iterations", max_iterations, whole=True))
+        self.max_iterations = max_iterations
         self.newton_iterations = int(positive("newton_iterations", newton_iterations, whole=True))
         self.max_seconds = positive("max_seconds", max_seconds)
         self.fallbacks = bool(fallbacks)
@@ -91,7 +101,7 @@ class CondensedNewton:
             tol=tol,
             slip_tol=self.slip_tol or tol,
             max_seconds=self.max_seconds,
-            max_iterations=self.max_iterations,
+            max_iterations=self.max_iterations or UNLIMITED,
             newton_iterations=self.newton_iterations,
             fallbacks=self.fallbacks,
             monitor=monitor,
@@ -147,9 +157,9 @@ def solve_condensed(
     - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector along ``P^-2 r_t``),
       ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that vector.
 
-    Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the
-    load ``|kappa (q_t, min(q_n, 0))|``, they are relative to that.  An answer whose errors are above ``tol``
-    but below ``rounding`` is returned with a ``RoundingWarning``: double precision has no better one.
+    Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the load ``|kappa (q_t, min(q_n, 0))|``,
+    they are relative to that.  An answer whose errors are above ``tol`` but below ``rounding`` is returned with a ``RoundingWarning``,
+    one whose ``local_error`` is above the root of ``tol`` with a ``UserWarning``.
 
     Args:
         W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
@@ -167,7 +177,7 @@ def solve_condensed(
 
     Raises:
         ValueError: input that makes no sense.
-        CondensedNotConverged: no method reached ``tol``, or there is no solution; carries the best state.
+        CondensedNotConverged: nothing reached ``tol``, with the best state.  ``CondensedNewton(max_iterations=20_000)`` searches longer.
 
     Example:
         >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
@@ -181,7 +191,7 @@ def solve_condensed(
         W, q = _turned_matrix(W, turns), _turned(q, turns)
     operator = condensed_operator(W, q.shape[1])
     try:
-        found = solver.solve_condensed(operator, friction, q, tol, starts)
+        found = _usual(solver, q.size).solve_condensed(operator, friction, q, tol, starts)
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
@@ -199,6 +209,12 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
     return solver, tol
 
 
+def _usual(solver: CondensedNewton, unknowns: int) -> CondensedNewton:
+    """The solver with the usual limit of iterations, if it has none."""
+    most = solver.max_iterations or max(LEAST, int(WORK / unknowns**2))
+    return CondensedNewton(**vars(solver) | {"max_iterations": most})
+
+
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
     """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
 
@@ -207,7 +223,7 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     stay open anyway.
     """
     cheap = solver.fallbacks and q.size <= 100
-    most = min(solver.max_iterations, 100 * solver.newton_iterations)
+    most = min(solver.max_iterations or UNLIMITED, 100 * solver.newton_iterations)
     left = max(solver.max_seconds - found.seconds, 1e-3)
     options = {"slip_tol": None, "max_iterations": most, "max_seconds": left}
     finer = CondensedNewton(**vars(solver) | options)
@@ -228,11 +244,17 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
                 if found.change > 0.1 * change:  # no smaller error tells them
                     break
         if found.local_error > tol:
-            found = again(tol, False, local_tol=tol)
+            found = again(tol, cheap, local_tol=tol)
     except CondensedNotConverged as failure:
         best = failure.best
         if max(best.error, best.slip_error) <= tol and best.local_error < found.local_error:
             found = replace(best, branch=found.branch, tried=found.tried + best.tried)
+    if found.local_error > math.sqrt(tol):  # half the digits that were asked for
+        warnings.warn(
+            f"local_error {found.local_error:.1e}, tol {tol:.1e}: the contacts together obey the law, but not one that is far "
+            "softer, or bears far less, than others. Solve such contacts by themselves, or with a smaller tol.",
+            stacklevel=3,
+        )
     return found
 
 
