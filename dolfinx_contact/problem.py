@@ -53,6 +53,7 @@ from dolfinx_contact.step.nonlinear import NonlinearStep
 from dolfinx_contact.step.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
+from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
@@ -91,6 +92,8 @@ class ContactProblem(Guarded):
             it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
             "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, by volume: with the least integral of |du|^2.
+        geometry_tol: Largest ``step.geometry_error``: of forces that distances, normals and arms at the end of a step may differ by
+            from those with which it was solved, on surfaces that are curved, turn or are wavy, see docs/surfaces.md.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
@@ -118,8 +121,8 @@ class ContactProblem(Guarded):
     """
 
     monitor: Callable[[int, float, Counts], object] | None
-    _settable = ("monitor", "solver", "tol", "undetermined")
-    _remedy = "monitor, solver, tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
+    _settable = ("monitor", "solver", "tol", "undetermined", "geometry_tol")
+    _remedy = "monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
         self,
@@ -137,6 +140,7 @@ class ContactProblem(Guarded):
         after_step: Callable[[fem.Function], object] | None = None,
         undetermined: str = "refused",
         entity_maps: Any = None,
+        geometry_tol: float = 1e-3,
     ) -> None:
         if not isinstance(u, fem.Function):
             raise ValueError(f"u must be a DOLFINx Function, got {type(u).__name__}.")
@@ -145,11 +149,11 @@ class ContactProblem(Guarded):
             self.contacts = checked_contacts(contacts, u)
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
-            self.undetermined = undetermined
+            self.undetermined, self.geometry_tol = undetermined, geometry_tol
             petsc_options = checked_options(petsc_options)
             self._variables = variables_of(state, after_step)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
-        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined)
+        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol)  # fmt: skip
         self.u, self.monitor = u, None
         of = self.contacts[0].displacements if self.contacts else None
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of, entity_maps)  # fmt: skip
@@ -189,6 +193,15 @@ class ContactProblem(Guarded):
     @tol.setter
     def tol(self, tol: float) -> None:
         self._tol = checked_tolerance(tol)
+
+    @property
+    def geometry_tol(self) -> float:
+        """Largest ``step.geometry_error``; another one may be assigned between steps, on all ranks."""
+        return self._geometry_tol
+
+    @geometry_tol.setter
+    def geometry_tol(self, tol: float) -> None:
+        self._geometry_tol = positive("geometry_tol", tol)
 
     @property
     def undetermined(self) -> str:
@@ -256,11 +269,18 @@ class ContactProblem(Guarded):
         """Record and displacement of a step that has converged, shown and given to internal variables."""
         self._check_input()
         step, found = self._search()
+        missed, said = 0.0, ""
+        if any(contact.changes for contact in self.contacts):
+            step, found, missed, said = self._at_its_end(step, found)
         step.rest()
-        done = record(self.body, self.contacts, step.errors, found, perf_counter() - start)
-        if not converged(step.errors, done, self.tol):
+        done = record(self.body, self.contacts, step.errors, found, perf_counter() - start, missed)
+        if said or not converged(step.errors, done, self.tol):
+            if not said:
+                said = (
+                    f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {step.refusal()}"
+                )
             raise NotConverged(
-                f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {step.refusal()}.",
+                f"{said}.",
                 done,
                 self.body.values(found.x),
                 [contact.reaction for contact in self.contacts],
@@ -270,21 +290,24 @@ class ContactProblem(Guarded):
             self._variables.move_on(self.u)
         return done, found
 
-    def load_step(self, holding: HeldSurfaces | None = None) -> LoadStep:
+    def load_step(
+        self, holding: HeldSurfaces | None = None, at: np.ndarray | None = None
+    ) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.
 
         For solvers of one's own and for measurements; ``solve`` makes it for itself.
 
         Args:
             holding: Planes that held nodes hold, or cannot hold, if that is known.
+            at: Displacement for which tangent planes and arms are taken, owned degrees of freedom; None is the last one.
         """
-        body = self.body
+        body, here = self.body, self._states.last if at is None else at
         assembled = body.refresh(self._states.last)
         if any(contact.surface.free and contact.surface.curved for contact in self.contacts):
             from dolfinx_contact.surfaces.driven import approach
 
-            approach(body, self.contacts, self._states.last)
-        turned = follow(self.contacts, body, self._states.last, self._points)
+            approach(body, self.contacts, here)
+        turned = follow(self.contacts, body, here, self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
             if turned or not body.nonlinear:  # else its stiffness is new in every iteration
@@ -293,7 +316,7 @@ class ContactProblem(Guarded):
         self._renew_laws(begin=True)  # in the frames of this step
         b, external = body.load()
         last, before = self._states.last, self._states.before
-        starts = [body.taken(self.u.x.array), 2 * last - before]
+        starts = [body.taken(self.u.x.array), 2 * last - before] if at is None else [at]
         if holding is None and any(contact.surface.free for contact in self.contacts):
             from dolfinx_contact.surfaces.held import held_surfaces
 
@@ -329,6 +352,32 @@ class ContactProblem(Guarded):
                 return step, unmoved(self.body, step, self._states.last)
             step, found = self._with_friction(step)
         return step, found
+
+    def _at_its_end(self, step, found) -> tuple[LoadStep, SolverResult, float, str]:
+        """The step repeated with the geometry of its end, what that still misses, and why it is refused, in words.  Collective."""
+        from dolfinx_contact.step.geometry import REPEATED, geometry_error, too_long, undivided
+
+        said, missed, known = "", 0.0, self._keep_one_start(None)
+        for repeated in range(REPEATED + 1):
+            if not step.errors.within(step.tol):
+                break
+            both = [two for two in zip(self.contacts, step.stiffness) if two[0].changes]
+            contacts, stiffness = map(list, zip(*both))
+            said = "" if repeated else too_long(self.body, contacts, found.x)
+            missed = geometry_error(self.body, contacts, stiffness, found.x, step.scale)
+            if said or missed <= self.geometry_tol:
+                break
+            if repeated == REPEATED:
+                said = undivided(missed, self.geometry_tol)
+                break
+            for surface in {id(c.surface): c.surface for c in self.contacts}.values():
+                surface.end_step()
+            for contact in self.contacts:
+                contact.restore()
+            step, again = self._with_friction(self.load_step(step.holding, found.x))
+            known = self._keep_one_start(known)
+            found = again._replace(iterations=found.iterations + again.iterations)
+        return step, found, missed, said
 
     def _with_friction(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
         """What is found with friction that belongs to the state found.  Collective.
@@ -396,6 +445,8 @@ class ContactProblem(Guarded):
         pressed = np.concatenate([contact.last.reaction[:, -1] for contact in self.contacts])
         if not body.largest(pressed) > 0.0:
             statics.place()
+        else:
+            statics.follow()
         found = found or self._solved(step)
         if not step.errors.within(step.tol):
             return step, found

@@ -3,7 +3,8 @@
 """The judge (judge.py) on bodies over planes, balls and rollers that force drives.
 
 Gaps, normals and lever arms are computed here from points, radii and quaternions; equilibrium of the surface is a sum of nodal
-forces.  For the motion that was found the body is judged as over a surface that moves so.  Of the package's objects it
+forces.  Both are those of the start of a step: it has to be solved with an infinite ``geometry_tol``.  For the motion that was
+found the body is judged as over a surface that moves so.  Of the package's objects it
 reads ``nodes``, ``frame`` and ``reaction`` of the contact, ``displacement`` and ``rotation`` of the surface, and ``u``.
 """
 

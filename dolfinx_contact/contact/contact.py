@@ -294,8 +294,8 @@ class Contact(Guarded):
 
     @property
     def arms(self) -> np.ndarray:
-        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
-        return self._placement.arms
+        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the end of the last step."""
+        return self._placement.arms(self.displacement)
 
     @property
     def _wanders(self) -> bool:
@@ -307,9 +307,19 @@ class Contact(Guarded):
         """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
         return self._placement.follows(self._wanders)
 
+    @property
+    def changes(self) -> bool:
+        """Whether distances, normals or arms may change within a step; the same on all ranks."""
+        return self._placement.changes
+
+    @property
+    def placement(self) -> Placement:
+        """Frames, gaps and motions relative to the surface."""
+        return self._placement
+
     def follow(self, u: np.ndarray) -> None:
         """Take frames and gaps for the next step, where the surface is at present; see ``Placement.follow``."""
-        self._placement.follow(u, self._wanders)
+        self._placement.follow(u, self._wanders, self._settled)
         self._history.last = self._placement.carried(self._settled)
         self._history.restore()
         self._forget_supported()
@@ -485,6 +495,7 @@ class Contact(Guarded):
         if self.surface.spin is not None:
             self.take(displacement=self._placement.turned_past(self.displacement))
         self._history.settle(law, work.sum(axis=1), path, depth, kept)
+        self._placement.end()
         self._settle_here()
 
     @property
@@ -541,8 +552,10 @@ class Contact(Guarded):
         self._history.load(saved)
         surface.displacement = saved["plane"]
         self._history.settled_by = self._laws.load(self, saved)
+        found = saved.get("found_rotation_of_plane", surface.rotation)
+        self._placement.end(found)
         self._settle_here()
-        surface.rotation = saved.get("found_rotation_of_plane", surface.rotation)
+        surface.rotation = found
 
     # -- results -------------------------------------------------------------------------------
 
@@ -560,6 +573,11 @@ class Contact(Guarded):
     def displacement(self) -> np.ndarray:
         """Displacement of the nodes relative to the surface, ``shape=(n, gdim)``, local frame, length."""
         return self.present.displacement
+
+    @property
+    def settled(self) -> State:
+        """The last converged state in the frames of its own step; ``last`` is in those of the present one."""
+        return self._settled
 
     @property
     def reaction(self) -> np.ndarray:
@@ -646,8 +664,8 @@ class Contact(Guarded):
     def moment(self) -> np.ndarray:
         """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
 
-        With the lever arms of the step: from where the point was put before it to where the nodes were then.  After a
-        step it is ``surface.moment`` about the axes that are free.
+        With lever arms from where the point is to where the nodes are.  After a step it is ``surface.moment`` about the axes
+        that are free.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
         arms = self.arms

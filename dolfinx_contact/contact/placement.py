@@ -4,8 +4,9 @@
 
 A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose material point at ``x`` has moved by ``s``,
 in components of its frame ``F``.  On planes gaps are linear in this motion.  On other surfaces frame and gap are taken
-for the surface as it stands in the step and the node as the last step has left it, and in the step the surface is its
-tangent plane there, see docs/surfaces.md.
+for the surface as it stands in the step and a position of the node, and in the step the surface is its tangent plane
+there.  That position is where the last step has left the node, and then, while it matters, where this one takes it, see
+``step/geometry.py``.
 """
 
 from __future__ import annotations
@@ -20,10 +21,13 @@ from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import EPSILON
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
-from dolfinx_contact.surfaces.surface import Surface, cross
+from dolfinx_contact.surfaces.surface import Surface, composed, cross, rotation_between
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
 CLEAR = 1e-9
+
+# Radians up to which a way turns: longer ones are refused.
+LONGEST = 2.0
 
 
 class Placed(NamedTuple):
@@ -36,6 +40,10 @@ class Placed(NamedTuple):
     flat: np.ndarray  # gap less the displacement along the normal, (n,)
     points: ContactPoints
     arms: np.ndarray | None  # of nodes about the surface's point, (n, gdim), if rotations are free
+    way: (
+        np.ndarray | None
+    )  # by what the way along the surface is more than its chord, (n, gdim - 1)
+    ended: np.ndarray  # rotation of the surface at the end of the step
 
 
 class Placement:
@@ -75,18 +83,25 @@ class Placement:
         """
         self._place(self.surface.relative(self.x) if wanders else self.x, self.x, self.now)
 
-    def follow(self, u: np.ndarray, wanders: bool) -> None:
+    def follow(self, u: np.ndarray, wanders: bool, last: State) -> None:
         """Take frames and gaps for the next step, where the surface is at present.  Collective.
 
         Directions held by supports are not known for the new frames.
 
         Args:
-            u: Displacement of owned degrees of freedom with which nodes stand there, that of the last step.
+            u: Displacement of owned degrees of freedom with which nodes stand there.
             wanders: As in ``stand``.
+            last: The last converged state, in the frames of its step.
         """
         there = self.x + u[self._dofs]
         home = self.surface.relative(there) if wanders else self.settled.home
         self._place(home, there, self.now)
+        if self.changes:
+            here = home if wanders else self.surface.relative(there)
+            with raised_together(self._comm):
+                distance = self.surface.distance(here)
+                way = self.way(self.surface, here, self.now.own, distance, last)
+            self.now = self.now._replace(way=frozen(way))
 
     def back_to(self, home: np.ndarray | None) -> None:
         """Take frames and gaps at positions relative to the surface that were saved; None is where they were taken last."""
@@ -110,11 +125,20 @@ class Placement:
             frames = np.broadcast_to(frame, (*x.shape, x.shape[1])).copy()
             points = ContactPoints(self._dofs, frames, self._size)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
-        self.now = Placed(home, surface.rotation, own, frame, flat, points, arms)
+        turned = surface.rotation
+        self.now = Placed(home, turned, own, frame, flat, points, arms, None, turned)
 
     def settle(self) -> None:
         """These are the frames of the last step that converged."""
         self.settled = self.now
+
+    def end(self, rotation: np.ndarray | None = None) -> None:
+        """The step ends, and its way, where the surface has turned to at present, or to another rotation."""
+        surface = self.surface
+        if rotation is None:
+            turned = surface.rotation
+            rotation = turned if surface.spin is None else composed(surface.spin, turned)
+        self.now = self.now._replace(ended=rotation, way=None)
 
     def restore(self, placed: Placed | None = None) -> None:
         """Return to the frames of the last step that converged, or to others that were kept."""
@@ -126,11 +150,61 @@ class Placement:
         turned = not np.array_equal(surface.rotation, self.now.rotation)
         return wanders or surface.spins or turned
 
+    # -- the way of a step ---------------------------------------------------------------------
+
     @property
-    def arms(self) -> np.ndarray:
-        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the start of a step."""
-        surface, arms = self.surface, self.now.arms
-        return self.x - surface.point - surface.displacement if arms is None else arms
+    def changes(self) -> bool:
+        """Whether distances, normals or arms may change within a step; the same on all ranks."""
+        surface = self.surface
+        turned = not np.array_equal(surface.rotation, self.settled.ended)
+        return surface.varies or surface.spins or turned
+
+    def turned_to(self, surface: Surface) -> np.ndarray:
+        """Rotation vector, in 2-D angle, by which a surface has turned since the last step, in its axes."""
+        return surface.own_axes(rotation_between(self.settled.ended, surface.rotation))
+
+    def way(self, surface: Surface, y, own, distance, last: State) -> np.ndarray:
+        """By what the way along the surface since the last step is more than its chord, ``shape=(n, gdim - 1)``, local frame.
+
+        Relative to the surface the nearest point goes round from one normal to the other, and about the normal as the
+        surface turns.  A chord ``c`` of a turn ``psi`` belongs to the way ``(a cot a) c + psi x c / 2``, ``a = |psi| / 2``, in
+        directions of its end, with ``a cot a`` across the axis and 1 along it.
+
+        Args:
+            surface: As it stands at the end.
+            y: Positions at the end, relative to the surface, in its axes, ``shape=(n, gdim)``.
+            own, distance: Frames and distances there.
+            last: The last converged state, in the frames of its step.
+        """
+        began = self.started(last)
+        n1, n0 = own[..., -1, :], surface.frames(began)[..., -1, :]
+        chord = y - began - distance[:, None] * n1 + last.gap[:, None] * n0
+        way = _round(chord, n0, n1, self.turned_to(surface))
+        return times(own[..., :-1, :], way - (y - began))
+
+    def started(self, last: State) -> np.ndarray:
+        """Positions relative to the surface at the end of the last step, in its axes, ``shape=(n, gdim)``."""
+        return self.x + turned_back(self.settled.own, last.displacement)
+
+    def ended_at(self, u: np.ndarray) -> tuple[Surface, np.ndarray]:
+        """The surface with what it turns in the step, and positions in space for a displacement of owned degrees of freedom."""
+        surface = self.surface
+        if surface.spin is not None:
+            surface = copy(surface)
+            surface.end_step()
+        return surface, self.x + u[self._dofs]
+
+    def arms(self, displacement: np.ndarray) -> np.ndarray:
+        """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, as the step has them.
+
+        Args:
+            displacement: Relative to the surface, local frame.
+        """
+        surface, now = self.surface, self.now
+        if now.arms is not None:
+            return now.arms
+        moved = turned_back(now.frame, displacement) + self.of_surface()
+        return self.x + moved - surface.point - surface.displacement
 
     def carried(self, last: State) -> State:
         """The last state in the frames of the next step."""
@@ -174,6 +248,8 @@ class Placement:
         displacement = motion - moved
         gap = self.now.flat + worn + displacement[:, -1]
         slip = displacement - last.displacement
+        if self.now.way is not None:
+            slip[:, :-1] += self.now.way
         known = points.known(slip, (motion, moved, last.displacement))
         slip = slip[:, :-1]
         points.without_held(slip)
@@ -242,6 +318,32 @@ def times(frame: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 def turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
     """Vectors of these components, ``shape=(n, gdim)``, in one frame or a frame each."""
     return (components[:, None, :] @ frame)[:, 0]
+
+
+def _round(chord: np.ndarray, n0: np.ndarray, n1: np.ndarray, turned: np.ndarray) -> np.ndarray:
+    """Ways of these chords, see ``Placement.way``; ``turned`` is the surface's rotation in its own axes."""
+    n0, n1 = np.broadcast_to(n0, chord.shape), np.broadcast_to(n1, chord.shape)
+    if chord.shape[1] == 2:
+        across = n0[:, 0] * n1[:, 1] - n0[:, 1] * n1[:, 0]
+        psi = np.arctan2(across, (n0 * n1).sum(axis=1))
+        psi = np.clip(psi, -LONGEST, LONGEST)[:, None]
+        turning = psi * np.column_stack((-chord[:, 1], chord[:, 0]))
+        return _cot(np.abs(psi) / 2) * chord + turning / 2
+    across = np.cross(n0, n1)
+    sine = np.linalg.norm(across, axis=1)
+    angle = np.arctan2(sine, (n0 * n1).sum(axis=1))
+    psi = across * np.divide(angle, sine, np.zeros_like(sine), where=sine > 0)[:, None]
+    psi -= (n1 @ turned)[:, None] * n1
+    size = np.linalg.norm(psi, axis=1, keepdims=True)
+    axis = np.divide(psi, size, np.zeros_like(psi), where=size > 0)
+    size = np.minimum(size, LONGEST)
+    along = (axis * chord).sum(axis=1, keepdims=True) * axis
+    return _cot(size / 2) * (chord - along) + along + size * np.cross(axis, chord) / 2
+
+
+def _cot(a: np.ndarray) -> np.ndarray:
+    """``a cot a``, 1 at zero."""
+    return np.divide(a, np.tan(a), np.ones_like(a), where=a > 0)
 
 
 def carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:

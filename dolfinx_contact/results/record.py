@@ -45,6 +45,8 @@ class Step:
             and supports, forces of the contact are as accurate as this says; 0 without reactions.
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
         penetration: Largest penetration, >= 0, length.
+        geometry_error: Forces by which distances, normals and arms at the end of the step differ from those with which it was solved, over
+            the forces that act; 0 on planes that are flat and do not turn, see docs/surfaces.md.
         iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
             started (the last step's, or its continuation), already was the solution.
         seconds: Wall time of the step.
@@ -70,6 +72,7 @@ class Step:
     solver: str
     tried: tuple[Any, ...] = ()
     contact_error: float = 0.0
+    geometry_error: float = 0.0
 
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
@@ -117,7 +120,7 @@ def counts(body, contacts) -> Counts:
     return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
 
 
-def record(body, contacts, errors, found, seconds: float) -> Step:
+def record(body, contacts, errors, found, seconds: float, geometry_error: float = 0.0) -> Step:
     """Record of the contacts' present state.  Collective.
 
     Args:
@@ -126,6 +129,7 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         errors: ``Errors`` of the state.
         found: ``SolverResult``.
         seconds: That the step took on this rank.
+        geometry_error: As ``Step`` has it.
     """
     gap, penetration = 0.0, 0.0
     for contact in contacts:
@@ -145,6 +149,7 @@ def record(body, contacts, errors, found, seconds: float) -> Step:
         solver=found.chosen,
         tried=found.tried,
         contact_error=errors.of_contact(found.forward_error),
+        geometry_error=geometry_error,
     )
 
 

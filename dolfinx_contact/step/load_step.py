@@ -144,8 +144,8 @@ class LoadStep:
     def start(self) -> np.ndarray:
         """The start with the smallest error, by the return map: the paper's takes extrapolations for worse than they are."""
         guesses = [start.copy() for start in self._starts]
-        if self.statics is not None and self.statics.placed:
-            guesses = [self.statics.start.copy()]
+        if self.statics is not None:
+            guesses = [*guesses[: 0 if self.statics.placed else None], self.statics.start.copy()]
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
@@ -208,6 +208,11 @@ class LoadStep:
         return size
 
     # -- errors --------------------------------------------------------------------------------
+
+    @property
+    def scale(self) -> float:
+        """Forces that act in the state judged last."""
+        return self.errors.scale * self.unit
 
     def rest(self) -> None:
         """Call sticking what slips by less than the tolerance leaves unknown of the state judged last."""

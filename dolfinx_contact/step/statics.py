@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.forms import times_volume
+from dolfinx_contact.contact.nodal import times
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed.input import principal_axes
 from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
@@ -48,6 +49,7 @@ class Statics:
 
     Attributes:
         loads: Their sums along the motions, ``shape=(m,)``; zero where they are rounding.
+        last: The last converged displacement.
         start: Displacement near which the solution may lie; ``placed`` if it is not the last one.
         said: Why there is no static state, in words; empty where there may be one.
 
@@ -78,7 +80,7 @@ class Statics:
         b = step.free(step.b)
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
-        self.start, self._last, self.placed, self.said = last, last, False, ""
+        self.start, self.last, self.placed, self.said = last, last, False, ""
         escape, self._balancing = self._escape(self._motion, self.loads)
         if escape is None and step.surfaces is not None:
             escape, _ = self._escape(*self._with_surfaces(step.surfaces))
@@ -190,6 +192,26 @@ class Statics:
         if motion is not None:
             self.start, self.placed = self.start + self._modes @ motion, True
 
+    def follow(self) -> None:
+        """Let the start move along with surfaces that have moved, by the rigid motion nearest to theirs.  Collective.
+
+        By least squares over nodes that were pressed: without slip where there is friction, with the gap that they had.
+        """
+        m, dim = self._motion.shape[2], self._dim
+        left, weights = [np.zeros((0, dim))], [np.zeros((0, dim))]
+        for contact in self._contacts:
+            contact.move(self.last)
+            off = np.column_stack((contact.slip_increment, contact.gap - contact.last.gap))
+            left.append(times(principal_axes(contact.free_friction, len(off), dim), off))
+            weights.append(np.repeat(contact.last.reaction[:, -1:], dim, axis=1))
+        off, weight = np.concatenate(left), np.concatenate(weights)
+        weight[:, :-1] *= self._mu > 0.0
+        square = np.einsum("ni,nij,nik->jk", weight, self._motion, self._motion)
+        sums = np.einsum("ni,nij,ni->j", weight, self._motion, off)
+        both = self._body.total(np.concatenate((square.ravel(), sums)))
+        way = -np.linalg.lstsq(both[: m * m].reshape(m, m), both[m * m :], rcond=SMALL**2)[0]
+        self.start = self.last + self._modes @ way
+
     def share(self) -> float:
         """What the loads are of those that the last reactions balance: these may only have to be scaled.  Collective."""
         forces = np.zeros(self._body.size)
@@ -269,9 +291,9 @@ class Statics:
         total, unit = self._body.total, step.unit
         rounding = [np.zeros(0)]
         for contact, of in zip(self._contacts, step.stiffness):
-            contact.move(self._last)
-            rounding.append(contact_rounding(contact, of, self._last).ravel())
-        forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self._last)
+            contact.move(self.last)
+            rounding.append(contact_rounding(contact, of, self.last).ravel())
+        forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self.last)
         hiding = np.sqrt(max(total(np.square(force / unit).sum()) for force in forces))
         acting = self._body.norm(step.external / unit)
         if not 0.0 < BLIND * acting <= hiding:
@@ -324,7 +346,7 @@ class Statics:
             self._body.displacements, Z
         )  # nearest is least the integral of |du|^2
         apart, sizes = (
-            self._body.total(weighed.T @ (self._last - x)),
+            self._body.total(weighed.T @ (self.last - x)),
             self._body.total(weighed.T @ Z),
         )
         way = Z @ np.linalg.solve(sizes, apart)

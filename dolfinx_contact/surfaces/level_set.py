@@ -31,7 +31,7 @@ class RigidSurface(CurvedSurface):
 
     Any smooth function does that is zero on the surface and positive where the body may be: gaps are its value over the
     length of its gradient, which on the surface, and for a distance everywhere, is exact.  Within a step a node feels the
-    tangent plane where the node was at the start of the step, see docs/surfaces.md.
+    tangent plane where the node is at its end, see docs/surfaces.md.
 
     Args:
         distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface, global components

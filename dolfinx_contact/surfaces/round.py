@@ -100,8 +100,7 @@ class _Round(CurvedSurface):
 class RigidSphere(_Round):
     """A rigid sphere, in two dimensions a circle, driven by displacement and rotation.
 
-    Within a step a node feels the plane that touches the sphere where the node was at the start of the step, see
-    docs/surfaces.md.
+    Within a step a node feels the plane that touches the sphere where the node is at its end, see docs/surfaces.md.
 
     Args:
         centre: Its centre, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
@@ -147,7 +146,7 @@ class RigidCylinder(_Round):
     """A rigid cylinder without ends, driven by displacement and rotation; in two dimensions take ``RigidSphere``.
 
     Its axis is the first principal friction direction.  Within a step a node feels the plane that touches the cylinder
-    where the node was at the start of the step, see docs/surfaces.md.
+    where the node is at its end, see docs/surfaces.md.
 
     Args:
         point: Any point of its axis, ``shape=(3,)``, global frame, length units.

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, vector
 
+# Part of a length across another vector below which both are parallel.
+PARALLEL = 1e-12
+
 
 def unit(name: str, value, size: int) -> np.ndarray:
     """A vector that is not zero, of length one."""
@@ -189,6 +192,10 @@ class Surface(Guarded):
         """Frames in the surface's axes, in global components."""
         return frames if self._turn is None else frames + frames @ self._turn.T
 
+    def own_axes(self, vector: np.ndarray) -> np.ndarray:
+        """Components of a vector in its axes; a rotation of two dimensions stays."""
+        return vector if self._turn is None or vector.size == 1 else vector + vector @ self._turn
+
     def distance(self, y: np.ndarray) -> np.ndarray:
         """Distance to the surface, ``shape=(n,)``, positive on the side where the body may be."""
         raise NotImplementedError
@@ -229,6 +236,16 @@ def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
 
     first, second = (Rotation.from_rotvec(angle.copy()) for angle in (before, after))
     return (second * first).as_rotvec()
+
+
+def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Rotation vector, in two dimensions angle, from one rotation to another; of any size about one axis."""
+    if after.size == 1:
+        return after - before
+    size = np.linalg.norm(before) * np.linalg.norm(after)
+    if np.linalg.norm(np.cross(before, after)) <= PARALLEL * size:
+        return after - before
+    return composed(after, -before)
 
 
 def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:

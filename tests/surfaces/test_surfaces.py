@@ -310,7 +310,7 @@ def test_a_large_sphere_is_a_plane(d, solver):
 
 
 def pulled_over(steps):
-    """A block without friction, pulled from 0.2 to 0.6 over a circle: errors of direction and depth of its force."""
+    """A block without friction, pulled from 0.2 to 0.6 over a circle: largest errors of direction and depth of its force."""
     scene = block(dc.RigidSphere((0.0, -1.0), 1.0), edge=0.1)
     for slide in np.linspace(0.2, 0.6, steps + 1):
         scene.step(slide, np.sqrt(1 - slide**2) - 1)
@@ -339,15 +339,12 @@ def test_a_nonlinear_body_on_a_sphere(solver):
     assert found[2][0] < -0.01 * found[2][2]
 
 
-def test_sliding_far_over_a_circle_converges_with_the_steps():
-    """Normals of a step are those of its start, first order; gaps miss the curvature of a step, second order."""
-    steps = np.array([8, 16, 32])
-    normal, gap = np.array([pulled_over(n) for n in steps]).T
-    length = 0.4 / steps / 0.8  # of the last step, along the circle at 0.6
-    assert normal == pytest.approx(length, rel=0.25)
-    assert gap == pytest.approx(length**2 / 2, rel=0.4)
-    assert normal[:-1] / normal[1:] == pytest.approx(2.0, abs=0.25)
-    assert gap[:-1] / gap[1:] == pytest.approx(4.0, abs=0.6)
+@pytest.mark.parametrize("steps", [1, 2, 8])
+def test_sliding_far_over_a_circle_ends_on_it(steps):
+    """Normals and gaps are those of the end, however long the steps are, to the tolerance of the geometry."""
+    normal, gap = pulled_over(steps)
+    assert normal <= 1e-3
+    assert gap <= 1e-5
 
 
 @pytest.mark.parametrize("kind", ["circle", "sphere", "cylinder"])
@@ -458,7 +455,7 @@ def test_steps_back_and_files(kind, tmp_path):
         if k == 2:
             tried.surface.displacement = (0.01, 0, 0)
             turned = tried.surface.rotation
-            tried.surface.rotation = (0, 0, 1.0)
+            tried.surface.rotation = (0, 0, 0.4)
             tried.step(0.1, 0, -0.03)
             tried.problem.rewind()
             assert (tried.surface.rotation == turned).all()

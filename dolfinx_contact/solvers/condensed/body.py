@@ -160,8 +160,7 @@ class CondensedBody:
         q = rows = self._motion(step, free)
         placed, starts = np.zeros(q.size), self._starts(q)
         if step.statics is not None:
-            q, placed = self._placed(step, free)
-            starts += [step.statics.share() * last for last in starts[:1]]
+            q, placed, starts = self._placed(step, free, starts)
         iterations, error, rounding, best = 0, np.inf, 0.0, None
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
@@ -223,16 +222,18 @@ class CondensedBody:
             contact.take(reaction=local[of : of + contact.points.count])
             of += contact.points.count
 
-    def _placed(self, step, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of a loose body: q where it stands at first, and the forces of all rows that hold it there."""
+    def _placed(self, step, free: np.ndarray, starts) -> tuple[np.ndarray, np.ndarray, list]:
+        """Of a loose body: q where it stands at first, the forces of all rows that hold it there, and starts moved there."""
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
         anchors, rows = slice(first, first + self._anchored), self._parts[1]
-        placed = np.zeros(first + self._tied)
-        held = rows.gather(rows.of(step.statics.start))
+        placed, moved = np.zeros((2, first + self._tied))
+        held, before = (rows.gather(rows.of(x)) for x in (step.statics.start, step.statics.last))
         placed[anchors] = stiffness[: self._anchored] * held
+        moved[anchors] = stiffness[: self._anchored] * (held - before)
         q = self._motion(step, self.displacement(free, placed))
         q[anchors] -= held
-        return q, placed
+        starts = [start + moved for start in starts]
+        return q, placed, starts + [step.statics.share() * last for last in starts[:1]]
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""

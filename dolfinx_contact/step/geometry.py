@@ -1,0 +1,172 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The geometry of a step: whether its way can be followed, and how far it is from that with which the step was solved.
+
+A step is solved with a tangent plane, arms and a way along the surface for each node.  They are exact at one position.
+What is missed at the end counts as force: a length times the stiffness of its node, an angle times the reaction, an arm
+times the reaction over the largest arm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dolfinx_contact.step.errors import NodalStiffness
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import cross, rotation_less_one
+
+# How often a step is repeated with the geometry of its end.
+REPEATED = 5
+
+# Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
+TURNED, PLACES = 0.5, 32
+
+
+def geometry_error(
+    body, contacts, stiffness: list[NodalStiffness], u: np.ndarray, S: float
+) -> float:
+    """Forces by which the geometry at the end of a step differs from that used, over the forces that act.  Collective.
+
+    Args:
+        body: The body.
+        contacts: Those whose geometry changes; in the state of ``u``.
+        stiffness: Of their nodes.
+        u: Displacement of owned degrees of freedom.
+        S: Forces that act.
+    """
+    squares = np.zeros(3)
+    for contact, of in zip(contacts, stiffness):
+        with raised_together(body.comm):  # the user's functions
+            missed = _missed(contact, of, u)
+        squares += [np.square(force).sum() for force in missed]
+    parts = [*np.sqrt(body.total(squares)), *_moments(body, contacts, u)]
+    left = float(max(parts))
+    return left / S if S > 0.0 else (np.inf if left > 0.0 else 0.0)
+
+
+def _missed(contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Of gaps, normals and ways, as forces on each node, ``shape=(n,)``."""
+    placement, r, gap = contact.placement, contact.reaction, contact.gap
+    surface, there = placement.ended_at(u)
+    y = surface.relative(there)
+    own, distance = surface.frames(y), surface.distance(y)
+    size = np.linalg.norm(r, axis=1)
+    presses = r[:, -1] > 0.0
+    exact = distance + contact.wear_depth
+    off = np.where(presses, np.abs(exact - gap), np.maximum(-exact, 0.0))
+    off[contact.points.closed] = 0.0
+    turned = surface.turned(own)[..., -1, :] - contact.frame[..., -1, :]
+    angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
+    way = placement.way(surface, y, own, distance, contact.settled)
+    missed = way - (0.0 if placement.now.way is None else placement.now.way)
+    contact.points.without_held(missed)
+    made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, missed), axis=1)
+    # Friction of what slips turns at most as its slip does.
+    slip = np.linalg.norm(contact.slip_increment, axis=1)
+    friction, length = np.linalg.norm(r[:, :-1], axis=1), np.linalg.norm(missed, axis=1)
+    turns = np.divide(friction * length, slip, made.copy(), where=slip > 0.0)
+    way = np.where(friction > 0.0, np.minimum(made, turns), 0.0)
+    return stiffness.normal * off, size * angle, way
+
+
+def _moments(body, contacts, u: np.ndarray) -> list[float]:
+    """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
+    missed = []
+    for surface in {id(c.surface): c.surface for c in contacts if c.surface.spins}.values():
+        sums, arms = np.zeros(surface.rotation.size), [np.zeros(1)]
+        for contact in contacts:
+            if contact.surface is surface:
+                _, there = contact.placement.ended_at(u)
+                used = contact.arms
+                off = there - surface.point - surface.displacement - used
+                forces = np.einsum("ni,nij->nj", contact.reaction, contact.points.frames)
+                turning = np.eye(sums.size)
+                sums += [(cross(axis, off) * forces).sum() for axis in turning]
+                arms.append(np.linalg.norm(used, axis=1))
+        largest = body.largest(np.concatenate(arms))
+        moment = float(np.linalg.norm(body.total(sums)))
+        missed.append(moment / largest if largest > 0.0 else 0.0)
+    return missed
+
+
+def too_long(body, contacts, u: np.ndarray) -> str:
+    """Where the way of a step cannot be followed, in words; empty where it can.  Collective.
+
+    The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
+    opens.  Its normal must not turn by more than half a radian: then the way is shorter than half of the least radius, and
+    the side of the surface stays.
+
+    Args:
+        body: The body.
+        contacts: Those whose geometry changes; in the state of ``u``.
+        u: Displacement of owned degrees of freedom.
+    """
+    lost = [(2.0, "")]
+    for contact in contacts:
+        with raised_together(body.comm):  # the user's functions
+            turned = _turned_on_the_way(contact, u)
+        some = np.flatnonzero((turned > TURNED).any(axis=0))
+        if some.size:
+            first = (turned > TURNED)[:, some].argmax(axis=0)
+            node = some[first.argmin()]
+            at = contact.x[node, : contact.points.dim].tolist()
+            lost.append((float(first.min()) / PLACES, f"{at} on {contact.surface!r}"))
+    part, at = min(body.comm.allgather(min(lost)))
+    if part > 1.0:
+        return ""
+    return (
+        f"the step is too long: after {part:.2g} of it the contact node at {at} has gone so far along the surface that the "
+        f"normal has turned by {TURNED:g}. Divide the step, or let dc.advance do so"
+    )
+
+
+def undivided(missed: float, tol: float) -> str:
+    """What to say of a step whose geometry stays different, in words."""
+    return (
+        f"distances, normals or arms at the end of the step differ by {missed:.1e} of the forces from those with which it was "
+        f"solved, after {REPEATED} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "
+        "it, or let dc.advance do so"
+    )
+
+
+def _turned_on_the_way(contact, u: np.ndarray) -> np.ndarray:
+    """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
+    placement = contact.placement
+    surface, there = placement.ended_at(u)
+    count, dim = there.shape
+    if not count:
+        return np.zeros((PLACES + 1, 0))
+    y = _way(surface, placement, contact.settled, surface.relative(there))
+    flat = y.reshape(-1, dim)
+    normals = np.broadcast_to(surface.frames(flat)[..., -1, :], flat.shape).reshape(y.shape)
+    touches = surface.distance(flat).reshape(-1, count) < 0.0
+    touches[0] |= contact.last.reaction[:, -1] > 0.0
+    touches[-1] |= contact.reaction[:, -1] > 0.0
+    touches[:, contact.points.closed] = False
+    touched = np.logical_or.accumulate(touches)[:-1]
+    opens = np.logical_or.accumulate(touches[::-1])[::-1][1:]
+    bends = np.linalg.norm(np.diff(normals, axis=0), axis=2)
+    if dim == 3:  # and about the normal
+        bends = np.hypot(bends, (normals[-1] @ placement.turned_to(surface)) / PLACES)
+    return np.concatenate((np.zeros((1, count)), np.cumsum(bends * touched * opens, axis=0)))
+
+
+def _way(surface, placement, last, end: np.ndarray) -> np.ndarray:
+    """Positions along the way, relative to the surface, in its axes, ``shape=(PLACES + 1, n, gdim)``.
+
+    In space nodes go straight, and the surface moves and turns evenly.
+    """
+    turned = placement.turned_to(surface)
+    start, end = placement.started(last) - surface.point, end - surface.point
+    parts = np.linspace(0.0, 1.0, PLACES + 1)
+    if not turned.any():
+        return surface.point + start + parts[:, None, None] * (end - start)
+    first = start + start @ rotation_less_one(-turned).T
+    places = []
+    for part in parts:
+        straight = first + part * (end - first)
+        back = (
+            rotation_less_one((1.0 - part) * turned) if part < 1.0 else 0.0 * np.eye(end.shape[1])
+        )
+        places.append(surface.point + straight + straight @ back.T)
+    return np.array(places)
