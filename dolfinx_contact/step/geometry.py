@@ -138,17 +138,30 @@ def _turned_on_the_way(contact, u: np.ndarray) -> np.ndarray:
         return np.zeros((PLACES + 1, 0))
     y = _way(surface, placement, contact.settled, surface.relative(there))
     flat = y.reshape(-1, dim)
-    normals = np.broadcast_to(surface.frames(flat)[..., -1, :], flat.shape).reshape(y.shape)
-    touches = surface.distance(flat).reshape(-1, count) < 0.0
+    normals, distance = _looked_at(surface, flat)
+    normals, touches = normals.reshape(y.shape), distance.reshape(-1, count) < 0.0
     touches[0] |= contact.last.reaction[:, -1] > 0.0
     touches[-1] |= contact.reaction[:, -1] > 0.0
     touches[:, contact.points.closed] = False
     touched = np.logical_or.accumulate(touches)[:-1]
     opens = np.logical_or.accumulate(touches[::-1])[::-1][1:]
     bends = np.linalg.norm(np.diff(normals, axis=0), axis=2)
+    bends[np.isnan(bends)] = np.pi  # through a place without a normal, such as a centre
     if dim == 3:  # and about the normal
         bends = np.hypot(bends, (normals[-1] @ placement.turned_to(surface)) / PLACES)
-    return np.concatenate((np.zeros((1, count)), np.cumsum(bends * touched * opens, axis=0)))
+    within = touched & opens
+    return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
+
+
+def _looked_at(surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals and distances at positions; NaN where there are none."""
+    try:
+        return np.broadcast_to(surface.frames(y)[..., -1, :], y.shape), surface.distance(y)
+    except ValueError:
+        if len(y) == 1:
+            return np.full(y.shape, np.nan), np.full(1, np.nan)
+        halves = [_looked_at(surface, part) for part in np.array_split(y, 2)]
+        return tuple(map(np.concatenate, zip(*halves)))
 
 
 def _way(surface, placement, last, end: np.ndarray) -> np.ndarray:
