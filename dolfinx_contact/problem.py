@@ -330,7 +330,7 @@ class ContactProblem(Guarded):
 
     def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""
-        if self._bound_to is not self.solver:
+        if self._bound_to != self.solver:
             self._unbind()
             solver = self.solver
             if self.body.nonlinear and not getattr(solver, "nonlinear", False):

@@ -283,14 +283,14 @@ def test_where_the_second_solver_starts(end, given):
 @pytest.mark.filterwarnings("ignore:contact carries:UserWarning")  # its change is made up
 def test_one_budget_for_all_searches_of_a_step(monkeypatch):
     """All searches of a step have ``max_seconds`` together: what each may take is what is left, not the whole again."""
-    given, own = [], dc.CondensedNewton.solve_condensed
+    given, own = [], dc.CondensedNewton.search
 
     def watched(self, *arguments, **options):
         given.append(self.max_seconds)
-        found = own(self, *arguments, **options)
-        return replace(found, change=1.0)  # the step searches again
+        found, converged = own(self, *arguments, **options)
+        return replace(found, change=1.0), converged  # the step searches again
 
-    monkeypatch.setattr(dc.CondensedNewton, "solve_condensed", watched)
+    monkeypatch.setattr(dc.CondensedNewton, "search", watched)
     scene = scenes.block(solver=dc.CondensedNewton(max_seconds=25))
     scene.move_top(0.001, 0.0005, -0.01)
     with contextlib.suppress(dc.NotConverged):

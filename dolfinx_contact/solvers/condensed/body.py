@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import deque
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -22,10 +22,8 @@ from dolfinx_contact.solvers.condensed.compliance import (
 )
 from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
-from dolfinx_contact.solvers.condensed.result import CondensedNotConverged
 from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
 from dolfinx_contact.solvers.newton.contact_tangent import next_change
-from dolfinx_contact.support.checks import RoundingWarning
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 # Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
@@ -303,19 +301,12 @@ class CondensedBody:
 
     def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
-        left = {"max_seconds": max(self._until - perf_counter(), 1e-9)}
-        options = type(self._options)(**vars(self._options) | left | limits)
+        left = max(self._until - perf_counter(), 1e-9)
+        options = replace(self._options, **limits | {"max_seconds": left})
 
         def solve(monitor):
-            try:
-                with warnings.catch_warnings():  # the body's own rounding counts
-                    warnings.simplefilter("ignore", RoundingWarning)
-                    return options.solve_condensed(
-                        self.operator, self.friction, q, max(tol, 1e-14), starts,
-                        monitor=monitor, external=acting, **self._scales,
-                    )  # fmt: skip
-            except CondensedNotConverged as failure:
-                return failure.best
+            given = self.operator, self.friction, q, max(tol, 1e-14), starts, monitor
+            return options.search(*given, external=acting, **self._scales)[0]
 
         return by_first_rank(self.comm, solve, step.tell if step.monitored else None)
 

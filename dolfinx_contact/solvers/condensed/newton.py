@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,7 @@ UNLIMITED = 200_000  # iterations; methods have limits of their own
 LEAST, WORK = 600, 3e5
 
 
+@dataclass(frozen=True, kw_only=True)
 class CondensedNewton:
     """Options of the globalised semismooth Newton method and its fallbacks.
 
@@ -54,30 +55,45 @@ class CondensedNewton:
         >>> solver = dc.CondensedNewton(max_seconds=60)  # for ContactProblem(..., solver=solver)
     """
 
-    def __init__(
-        self,
-        *,
-        slip_tol: float | None = None,
-        max_iterations: int | None = None,
-        newton_iterations: int = 60,
-        max_seconds: float = math.inf,
-        fallbacks: bool = True,
-    ) -> None:
-        self.slip_tol = None if slip_tol is None else positive("slip_tol", slip_tol, finite=True)
-        if max_iterations is not None:
-            max_iterations = int(positive("max_iterations", max_iterations, whole=True))
-        self.max_iterations = max_iterations
-        self.newton_iterations = int(positive("newton_iterations", newton_iterations, whole=True))
-        self.max_seconds = positive("max_seconds", max_seconds)
-        self.fallbacks = bool(fallbacks)
+    slip_tol: float | None = None
+    max_iterations: int | None = None
+    newton_iterations: int = 60
+    max_seconds: float = math.inf
+    fallbacks: bool = True
 
-    def __repr__(self) -> str:
-        return f"CondensedNewton({', '.join(f'{k}={v!r}' for k, v in vars(self).items())})"
+    def __post_init__(self) -> None:
+        if self.slip_tol is not None:
+            positive("slip_tol", self.slip_tol, finite=True)
+        if self.max_iterations is not None:
+            positive("max_iterations", self.max_iterations, whole=True)
+        positive("newton_iterations", self.newton_iterations, whole=True)
+        positive("max_seconds", self.max_seconds)
 
     def solve_condensed(
-        self, operator, friction: Friction, q, tol, starts=(), monitor=None, **scales
+        self, operator, friction: Friction, q, tol, starts=(), **given
     ) -> CondensedResult:
-        """Solve with a kernel operator; ``solve_condensed`` is the public entry.
+        """As ``search``, of which no result but a solution is returned; ``solve_condensed`` is the public entry.
+
+        Raises:
+            CondensedNotConverged: nothing that was tried reached ``tol`` or, if that is larger, the
+                rounding of the errors; the latter is a ``RoundingWarning``.
+        """
+        found, converged = self.search(operator, friction, q, tol, starts, **given)
+        if not converged:
+            raise CondensedNotConverged(found)
+        if found.error > tol or found.slip_error > (self.slip_tol or tol):
+            warnings.warn(
+                f"error {found.error:.1e}, slip error {found.slip_error:.1e} instead of tol "
+                f"{tol:.1e}: limited by rounding, {found.rounding:.1e}.",
+                RoundingWarning,
+                stacklevel=2,
+            )
+        return found
+
+    def search(
+        self, operator, friction: Friction, q, tol, starts=(), monitor=None, **scales
+    ) -> tuple[CondensedResult, bool]:
+        """The best state found with a kernel operator, and whether it is a solution.
 
         Args:
             q, starts: With the tied rows of the operator, if it has any, at the end.
@@ -85,10 +101,6 @@ class CondensedNewton:
             scales: Of the errors: ``stiffness`` (n,), ``tangential_stiffness`` (n, T, T),
                 ``tied_stiffness`` (tied,), force per length, and ``external``, a force that acts
                 beside the reactions.
-
-        Raises:
-            CondensedNotConverged: nothing that was tried reached ``tol`` or, if that is larger, the
-                rounding of the errors; the latter is a ``RoundingWarning``.
         """
         tangents = operator.dim - 1
         # Friction(0) has no slip rule; a frictionless node of a field gets one that does not matter.
@@ -101,9 +113,9 @@ class CondensedNewton:
             tol=tol,
             slip_tol=self.slip_tol or tol,
             max_seconds=self.max_seconds,
-            max_iterations=self.max_iterations or UNLIMITED,
-            newton_iterations=self.newton_iterations,
-            fallbacks=self.fallbacks,
+            max_iterations=int(self.max_iterations or UNLIMITED),
+            newton_iterations=int(self.newton_iterations),
+            fallbacks=bool(self.fallbacks),
             monitor=monitor,
             **scales,
         )
@@ -116,16 +128,7 @@ class CondensedNewton:
             found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
             found.tied, found.local_error,
         )  # fmt: skip
-        if not found.converged:
-            raise CondensedNotConverged(result)
-        if found.error > tol or found.slip_error > (self.slip_tol or tol):
-            warnings.warn(
-                f"error {found.error:.1e}, slip error {found.slip_error:.1e} instead of tol "
-                f"{tol:.1e}: limited by rounding, {found.rounding:.1e}.",
-                RoundingWarning,
-                stacklevel=2,
-            )
-        return result
+        return result, bool(found.converged)
 
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``Solver``."""
@@ -202,7 +205,7 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
     if not isinstance(solver, CondensedNewton):
         raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
     if max_seconds is not None:
-        solver = CondensedNewton(**vars(solver) | {"max_seconds": max_seconds})
+        solver = replace(solver, max_seconds=max_seconds)
     tol = positive("tol", tol, finite=True)
     if tol < 1e-13:
         raise ValueError(f"tol must be at least 1e-13 (rounding forbids less), got {tol!r}.")
@@ -212,7 +215,7 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
 def _usual(solver: CondensedNewton, unknowns: int) -> CondensedNewton:
     """The solver with the usual limit of iterations, if it has none."""
     most = solver.max_iterations or max(LEAST, int(WORK / unknowns**2))
-    return CondensedNewton(**vars(solver) | {"max_iterations": most})
+    return replace(solver, max_iterations=most)
 
 
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
@@ -225,30 +228,25 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     cheap = solver.fallbacks and q.size <= 100
     most = min(solver.max_iterations or UNLIMITED, 100 * solver.newton_iterations)
     left = max(solver.max_seconds - found.seconds, 1e-3)
-    options = {"slip_tol": None, "max_iterations": most, "max_seconds": left}
-    finer = CondensedNewton(**vars(solver) | options)
+    limits = {"max_iterations": most, "max_seconds": left}
+    finer = replace(solver, slip_tol=None, fallbacks=cheap, **limits)
 
-    def again(tol, fallbacks, **limits):
-        finer.fallbacks = fallbacks
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RoundingWarning)
-            nearer = finer.solve_condensed(operator, friction, q, tol, [found.reaction], **limits)
-        return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried)
+    def again(tol, **limits):
+        nearer, done = finer.search(operator, friction, q, tol, [found.reaction], **limits)
+        return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried), done
 
-    try:
-        for factor in (1e-2, 1e-4):
-            if found.change <= tol or found.error <= 10 * found.rounding:
+    done = True
+    for factor in (1e-2, 1e-4):
+        if found.change <= tol or found.error <= 10 * found.rounding:
+            break
+        if max(found.error, found.slip_error) > factor * tol:
+            nearer, done = again(max(factor * tol, 1e-14))
+            before, found = found, nearer if done else _better(nearer, found, tol)
+            if not done or found.change > 0.1 * before.change:  # no smaller error tells them
                 break
-            if max(found.error, found.slip_error) > factor * tol:
-                change, found = found.change, again(max(factor * tol, 1e-14), cheap)
-                if found.change > 0.1 * change:  # no smaller error tells them
-                    break
-        if found.local_error > tol:
-            found = again(tol, cheap, local_tol=tol)
-    except CondensedNotConverged as failure:
-        best = failure.best
-        if max(best.error, best.slip_error) <= tol and best.local_error < found.local_error:
-            found = replace(best, branch=found.branch, tried=found.tried + best.tried)
+    if done and found.local_error > tol:
+        nearer, done = again(tol, local_tol=tol)
+        found = nearer if done else _better(nearer, found, tol)
     if found.local_error > math.sqrt(tol):  # half the digits that were asked for
         warnings.warn(
             f"local_error {found.local_error:.1e}, tol {tol:.1e}: the contacts together obey the law, but not one that is far "
@@ -256,6 +254,12 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
             stacklevel=3,
         )
     return found
+
+
+def _better(nearer: CondensedResult, found: CondensedResult, tol: float) -> CondensedResult:
+    """The best state of a search that failed, if it is a solution with a smaller local error than the one found before."""
+    solves = max(nearer.error, nearer.slip_error) <= tol
+    return nearer if solves and nearer.local_error < found.local_error else found
 
 
 def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
