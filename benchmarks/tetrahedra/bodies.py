@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.compat import cell_nodes
+from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.solvers.condensed.compliance import Rows, compliance
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 
@@ -47,10 +48,13 @@ class Body:
         triangles = facet_nodes(body.V, facets)
         nodes, self.T = np.unique(triangles, return_inverse=True)
         self.T, self.X = self.T.reshape(-1, 6), body.V.tabulate_dof_coordinates()[nodes]
-        dofs = np.repeat(3 * nodes[:, None] + np.arange(3), 3, axis=0)
-        frames = np.tile(frame, (len(nodes), 1)) * ~np.isin(dofs, body.fixed)
-        self._rows = Rows(body.comm, dofs, frames)
-        self.S, self._body = compliance(body, [self._rows], 0), body
+        dofs = 3 * nodes[:, None] + np.arange(3)
+        owned, free = body.displacements.owned, np.ones(body.size, dtype=bool)
+        free[body.fixed] = False
+        points = ContactPoints(dofs, np.tile(frame, (len(nodes), 1, 1)), owned)
+        rows = points.rows(np.tile(np.eye(3), (len(nodes), 1, 1)), free)
+        self._rows = Rows(body.comm, rows, 0, body.size)
+        self.S, self._body = compliance(body, [self._rows]), body
         self.unknowns, self.seconds = body.size, process_time() - start
 
     def free(self) -> np.ndarray:

@@ -109,8 +109,8 @@ class Contact(Guarded):
         x, dofs = self.x[:, :gdim], self.displacements.dofs(self.nodes)
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
-        extent, size = np.abs(mesh.geometry.x).max(initial=0.0), self.displacements.size
-        self._placement = Placement(surface, x, dofs, size, extent, mesh.comm)
+        extent, owned = np.abs(mesh.geometry.x).max(initial=0.0), self.displacements.owned
+        self._placement = Placement(surface, x, dofs, owned, extent, mesh.comm)
         self._laws, self._history, self.rho = Laws(), History(), None
         self._laws.assign(self, friction, empty=True)
         self.wear = wear

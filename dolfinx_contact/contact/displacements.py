@@ -54,6 +54,7 @@ class Displacements:
         V: The space of displacements alone, whose numbering of nodes is meant everywhere.
         mixed: Whether there are other unknowns.
         size: Owned degrees of freedom of all unknowns.
+        owned: The same, the global number of the first, and how many all ranks have.
         count: Owned nodes of the displacements.
         dim: Their components.
         degree: Of their shape functions.
@@ -62,7 +63,9 @@ class Displacements:
     def __init__(self, V):
         part, self.V, self._dofs = displacement_part(V), V, None
         self.mixed = part is not None
-        self.size = V.dofmap.index_map.size_local * V.dofmap.index_map_bs
+        index_map, bs = V.dofmap.index_map, V.dofmap.index_map_bs
+        self.size = index_map.size_local * bs
+        self.owned = self.size, index_map.local_range[0] * bs, index_map.size_global * bs
         if self.mixed:
             self.V, parent = part.collapse()
             self._dofs = np.array(parent, dtype=np.int32).reshape(-1, self.V.dofmap.index_map_bs)
@@ -98,11 +101,3 @@ class Displacements:
     def are(self) -> np.ndarray:
         """Which owned degrees of freedom are displacements, booleans."""
         return self.vectors(np.ones((self.count, self.dim, 1)))[:, 0] > 0.0
-
-    def beside(self, dofs: np.ndarray) -> np.ndarray:
-        """All degrees of freedom of the nodes to which these displacements belong, ``shape=(n, dim)``."""
-        if not self.mixed:
-            return self.dofs(dofs // self.dim)
-        mine = self._dofs[: self.count].ravel()
-        order = np.argsort(mine)
-        return self.dofs(order[np.searchsorted(mine, dofs, sorter=order)] // self.dim)

@@ -20,7 +20,7 @@ class ContactPoints:
     Args:
         dofs: Owned degrees of freedom of each point's node, ``shape=(n, gdim)``.
         frames: Rows (t1, t2, n) of each point, ``shape=(n, gdim, gdim)``, global components, orthonormal.
-        size: Number of owned degrees of freedom.
+        owned: Number of owned degrees of freedom, global number of the first, and number of all on all ranks.
 
     Attributes:
         B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
@@ -33,9 +33,9 @@ class ContactPoints:
         along: Their tangential direction that is left free, unit vectors, zero where none is, ``shape=(k, gdim - 1)``.
     """
 
-    def __init__(self, dofs: np.ndarray, frames: np.ndarray, size: int):
-        self.size, (self.count, self.dim) = size, dofs.shape
-        self.dofs, self.frames = dofs, frames
+    def __init__(self, dofs: np.ndarray, frames: np.ndarray, owned: tuple[int, int, int]):
+        (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
+        self.size, self.dofs, self.frames = size, dofs, frames
         columns = np.repeat(dofs, self.dim, axis=0).ravel()
         starts = np.arange(0, frames.size + 1, self.dim)
         self.B = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
@@ -104,8 +104,8 @@ class ContactPoints:
         return (self._magnitudes @ np.abs(u)).reshape(self.count, self.dim)
 
     def reactions(self, forces: np.ndarray) -> np.ndarray:
-        """Reactions, ``shape=(n, gdim)``, local, that are these forces on the body at the points' nodes."""
-        return self.motion(forces)  # the frames are orthonormal
+        """Reactions, ``shape=(n, gdim, ...)``, local, that are these forces on the body at the points' nodes: ``S f``, ``S B^T = I``."""
+        return self.motion(forces)  # the frames are orthonormal, and a point is a node
 
     def add_forces(self, reaction: np.ndarray, forces: np.ndarray) -> None:
         """Add the forces on the body that are these reactions to those on owned degrees of freedom."""
@@ -115,11 +115,30 @@ class ContactPoints:
         """Add the magnitudes of these reactions' components to forces on owned degrees of freedom."""
         forces += self._sizes @ np.abs(reaction).ravel()
 
-    def matrix(self, blocks: np.ndarray):
-        """``B^T D B`` of nodal blocks, ``shape=(n, gdim, gdim)``, local frame: sparse, owned rows and columns."""
-        n = self.count
-        D = sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * self.dim,) * 2)
-        return self._forces @ D.tocsr() @ self.B
+    def matrix(self, blocks: np.ndarray) -> sparse.csr_matrix:
+        """``B^T D B`` of blocks ``D`` of points, ``shape=(n, gdim, gdim)``, local frame: owned rows, columns in global numbers."""
+        product = self._forces @ _block_diagonal(blocks) @ self.B
+        columns = product.indices + self.first
+        return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
+
+    def of_reactions(self, blocks: np.ndarray) -> sparse.csr_matrix:
+        """``B^T D S``: forces by the forces that make reactions, which blocks ``D`` turn into others.  As ``matrix``."""
+        return self.matrix(blocks)
+
+    def rows(self, turns: np.ndarray, free: np.ndarray) -> sparse.csr_matrix:
+        """Rows of ``B`` along other directions of each point, columns in global numbers.
+
+        Args:
+            turns: The directions, local components, ``shape=(n, k, gdim)``.
+            free: Which owned degrees of freedom count, booleans.
+        """
+        kept = turns @ self.frames * free[self.dofs][:, None, :]
+        kept[np.linalg.norm(kept, axis=2) < FREE] = 0.0  # fixed but for rounding
+        columns = np.repeat(self.dofs + self.first, turns.shape[1], axis=0)
+        starts = np.arange(0, kept.size + 1, self.dim)
+        return sparse.csr_matrix(
+            (kept.ravel(), columns.ravel(), starts), (len(starts) - 1, self._whole)
+        )
 
     def free_of(self, fixed: np.ndarray) -> np.ndarray:
         """Length of what boundary conditions leave of each local direction, ``shape=(n, gdim)``: 1, 0 or a part."""
@@ -162,25 +181,46 @@ class ContactPoints:
         return NodalStiffness(normal, tangential)
 
 
-def assembled(points, derivatives, size: int) -> tuple:
-    """``B^T R_r B`` and ``B^T R_u B`` of all contacts, sparse, owned rows and columns.
+def _block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
+    n, dim = len(blocks), blocks.shape[1]
+    return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * dim,) * 2).tocsr()
+
+
+def responses(K, points, derivatives) -> tuple:
+    """``B^T R_r S`` and ``B^T R_u B`` of all contacts, sparse: owned rows, columns in global numbers.  Collective.
 
     Args:
+        K: PETSc matrix of the same layout.
         points: ``ContactPoints`` of each contact.
         derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
-        size: Number of owned degrees of freedom.
     """
-    sums = [sparse.csr_matrix((size, size))] * 2
-    for of, parts in zip(points, derivatives):
-        sums = [one + of.matrix(part) for one, part in zip(sums, parts)]
+    sums = [sparse.csr_matrix((K.getLocalSize()[0], K.getSize()[1]))] * 2
+    for of, (R_r, R_u) in zip(points, derivatives):
+        sums = [sums[0] + of.of_reactions(R_r), sums[1] + of.matrix(R_u)]
     return tuple(sums)
 
 
-def add_to(K, values) -> None:
-    """Add a sparse matrix of owned rows and columns to an assembled PETSc matrix.  Collective."""
+def response(points, derivatives, forces: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """``B^T (R_r S f + R_u B x)`` of all contacts, on owned degrees of freedom."""
+    change = np.zeros_like(forces)
+    for of, (R_r, R_u) in zip(points, derivatives):
+        reaction = np.einsum("nij,nj->ni", R_r, of.reactions(forces))
+        reaction += np.einsum("nij,nj->ni", R_u, of.motion(x))
+        of.add_forces(reaction, change)
+    return change
+
+
+def like(K, values: sparse.csr_matrix) -> PETSc.Mat:
+    """A PETSc matrix of the layout of ``K`` with these owned rows, columns in global numbers.  Collective."""
+    csr = (values.indptr.astype(PETSc.IntType), values.indices.astype(PETSc.IntType), values.data)
+    return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
+
+
+def add_to(K, values: sparse.csr_matrix) -> None:
+    """Add a sparse matrix of owned rows, columns in global numbers, to an assembled PETSc matrix.  Collective."""
     first = K.getOwnershipRange()[0]
     for row in np.flatnonzero(np.diff(values.indptr)):
         part = slice(values.indptr[row], values.indptr[row + 1])
-        columns = (first + values.indices[part]).astype(PETSc.IntType)
+        columns = values.indices[part].astype(PETSc.IntType)
         K.setValues([first + row], columns, values.data[part], addv=PETSc.InsertMode.ADD_VALUES)
     K.assemble()

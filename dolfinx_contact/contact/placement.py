@@ -53,7 +53,7 @@ class Placement:
         surface: The surface.
         x: Reference positions of the nodes, ``shape=(n, gdim)``.
         dofs: Their degrees of freedom, ``shape=(n, gdim)``.
-        size: Number of owned degrees of freedom.
+        owned: As ``ContactPoints`` has it.
         extent: Largest coordinate of the mesh.
         comm: MPI communicator.
 
@@ -66,10 +66,10 @@ class Placement:
     settled: Placed
 
     def __init__(
-        self, surface: Surface, x: np.ndarray, dofs: np.ndarray, size: int, extent: float, comm
+        self, surface: Surface, x: np.ndarray, dofs: np.ndarray, owned: tuple, extent: float, comm
     ):
         self.surface, self.x, self._comm = surface, x, comm
-        self._dofs, self._size, self._apart = dofs, size, CLEAR * extent
+        self._dofs, self._owned, self._apart = dofs, owned, CLEAR * extent
         self._place(surface.relative(x) if surface.varies else x, x, None)
         self.settle()
 
@@ -123,7 +123,7 @@ class Placement:
             points = before.points
         else:
             frames = np.broadcast_to(frame, (*x.shape, x.shape[1])).copy()
-            points = ContactPoints(self._dofs, frames, self._size)
+            points = ContactPoints(self._dofs, frames, self._owned)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
         turned = surface.rotation
         self.now = Placed(home, turned, own, frame, flat, points, arms, None, turned)

@@ -14,7 +14,7 @@ def points(request):
     rng, dim = np.random.default_rng(request.param), request.param
     nodes = np.sort(rng.choice(9, 5, replace=False))
     frames = np.array([np.linalg.qr(rng.normal(size=(dim, dim)))[0] for _ in nodes])
-    return ContactPoints(dim * nodes[:, None] + np.arange(dim), frames, 9 * dim), rng
+    return ContactPoints(dim * nodes[:, None] + np.arange(dim), frames, (9 * dim, 0, 9 * dim)), rng
 
 
 def test_motion_is_that_of_the_node_in_its_frame(points):

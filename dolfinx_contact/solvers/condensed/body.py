@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
+from scipy import sparse
 
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import KEPT, SolverResult
@@ -225,7 +226,7 @@ class CondensedBody:
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
         anchors, rows = slice(first, first + self._anchored), self._parts[1]
         placed, moved = np.zeros((2, first + self._tied))
-        held, before = (rows.gather(rows.of(x)) for x in (step.statics.start, step.statics.last))
+        held, before = (rows.of(x) for x in (step.statics.start, step.statics.last))
         placed[anchors] = stiffness[: self._anchored] * held
         moved[anchors] = stiffness[: self._anchored] * (held - before)
         q = self._motion(step, self.displacement(free, placed))
@@ -235,23 +236,20 @@ class CondensedBody:
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
-        return compliance(self._held_by, self._parts, self._body.K.getOwnershipRange()[0])
+        return compliance(self._held_by, self._parts)
 
     def _rows(self) -> Rows:
         """One row per local direction of a node: its global components, none at fixed dofs."""
-        gdim = self._contacts[0].points.dim
-        dofs, frames = [np.zeros((0, gdim), int)], [np.zeros((0, gdim))]
-        turns = [np.zeros((0, self.dim, gdim))]
+        gdim, body = self._contacts[0].points.dim, self._body
+        free = np.ones(body.size, dtype=bool)
+        free[body.fixed] = False
+        rows, turns = [], []
         for contact, law in zip(self._contacts, self._laws):
             points = contact.points
-            free = ~np.isin(points.dofs, self._body.fixed)
-            dofs.append(np.repeat(points.dofs, self.dim, axis=0))
             turns.append(principal_axes(law, points.count, gdim)[:, -self.dim :])
-            rows = turns[-1] @ points.frames * free[:, None, :]
-            rows[np.linalg.norm(rows, axis=2) < 1e-12] = 0.0  # fixed but for rounding
-            frames.append(rows.reshape(-1, gdim))
+            rows.append(points.rows(turns[-1], free))
         self._turns = np.concatenate(turns)
-        return Rows(self.comm, np.concatenate(dofs), np.concatenate(frames))
+        return Rows(self.comm, sparse.vstack(rows), points.first, body.size)
 
     def _prescribed(self) -> tuple[np.ndarray, np.ndarray]:
         """Tangential rows of nodes that supports move in one direction, and that direction's dyads, in the order of rows."""
@@ -267,10 +265,11 @@ class CondensedBody:
         return first[:, None] + np.arange(2), self.gather(turned[:, :, None] * turned[:, None, :])
 
     def _anchor_rows(self) -> Rows:
-        """One row per anchor, of all components of its node, as blocks of right-hand sides want them."""
+        """One row per anchor."""
         dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
-        node = self._body.displacements.beside(dofs)
-        return Rows(self.comm, node, (node == dofs[:, None]).astype(float))
+        size, first, whole = self._body.displacements.owned
+        rows = (np.ones(dofs.size), first + dofs, np.arange(dofs.size + 1))
+        return Rows(self.comm, sparse.csr_matrix(rows, (dofs.size, whole)), first, size)
 
     def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
@@ -281,7 +280,7 @@ class CondensedBody:
             rows.append(np.column_stack((slip, contact.gap)))
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
-        held = anchored.gather(anchored.of(displacement))
+        held = anchored.of(displacement)
         return np.concatenate((nodes.gather(local), held, self._surfaces.driving(step)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -291,12 +290,11 @@ class CondensedBody:
         return base + correction
 
     def _nodal(self, force: np.ndarray) -> np.ndarray:
-        """Forces of all rows on owned degrees of freedom."""
-        forces = np.zeros(self._body.size)
-        self._parts[0].add_forces(force[: self.dim * self.nodes], forces)
-        self._parts[1].add_forces(
-            force[self.dim * self.nodes :], forces
-        )  # those of planes act on no node
+        """Forces of all rows on owned degrees of freedom; those of surfaces act on no node."""
+        forces, start = np.zeros(self._body.size), 0
+        for part in self._parts:
+            part.add_forces(force[start : start + part.size], forces)
+            start += part.size
         return forces
 
     def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
+from scipy import sparse
 
 from dolfinx_contact.petsc.linear_solver import check_solved, mumps_factors
 from dolfinx_contact.support.checks import free_memory
@@ -16,58 +17,59 @@ _MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
 
 
 class Rows:
-    """Linear functionals of the displacement, in the order of ranks: one row a direction of a node.
+    """Linear functionals of the displacement, in the order of ranks; all of them are known to every rank.
 
     Args:
         comm: MPI communicator.
-        dofs: Local degrees of freedom of each row, ``shape=(rows, k)``, all different.
-        values: Their factors, ``shape=(rows, k)``, dimensionless.  Collective.
+        rows: This rank's, sparse, columns in global numbers of degrees of freedom.  Collective.
+        first: Global number of this rank's first degree of freedom.
+        owned: Number of its degrees of freedom.
     """
 
-    def __init__(self, comm, dofs: np.ndarray, values: np.ndarray):
-        self.comm, self.dofs, self.values = comm, dofs, values
-        self._counts = comm.allgather(len(dofs))
-        self.size = sum(self._counts)
+    def __init__(self, comm, rows: sparse.csr_matrix, first: int, owned: int):
+        self.comm = comm
+        self.all = sparse.vstack(comm.allgather(rows)).tocsr()
+        self.size = self.all.shape[0]
+        self._mine = self.all[:, first : first + owned].tocsr()
+        self._forces = self._mine.T.tocsr()
+
+    def part(self, u: np.ndarray) -> np.ndarray:
+        """What this rank's displacements, ``shape=(dofs, ...)``, add to the values of all rows."""
+        return self._mine @ u
 
     def of(self, u: np.ndarray) -> np.ndarray:
-        """Values of this rank's rows for displacements of owned dofs, ``shape=(dofs, ...)``."""
-        return np.einsum("rk,rk...->r...", self.values, u[self.dofs])
+        """Values of all rows for displacements of owned dofs, on all ranks.  Collective."""
+        return self.comm.allreduce(self.part(u))
 
     def add_forces(self, force: np.ndarray, forces: np.ndarray) -> None:
-        """Add what a force on each row of all ranks is on owned degrees of freedom."""
-        first = sum(self._counts[: self.comm.rank])
-        mine = force[first : first + len(self.dofs)]
-        terms = mine[:, None] * self.values
-        forces += np.bincount(self.dofs.ravel(), terms.ravel(), forces.size)
+        """Add what a force on each row is on owned degrees of freedom."""
+        forces += self._forces @ force
 
     def gather(self, local: np.ndarray) -> np.ndarray:
-        """Values of all rows, on all ranks."""
+        """Values that ranks have for their own rows, on all ranks.  Collective."""
         return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
 
 
-def compliance(solver, rows: list[Rows], first: int) -> np.ndarray:
+def compliance(solver, rows: list[Rows]) -> np.ndarray:
     """Motion of all rows by a unit force on each, ``A^-1`` between them.
 
     Args:
         solver: What has the PETSc solver of ``A`` as its ``ksp``.
         rows: In the order of the result.
-        first: Global number of this rank's first degree of freedom.
 
     Returns:
         Symmetric, on rank 0; an empty array on the others.  Collective.
     """
     comm, size = rows[0].comm, sum(part.size for part in rows)
-    columns = np.concatenate([part.gather(part.dofs + first) for part in rows])
-    values = np.concatenate([part.gather(part.values) for part in rows])
+    loads = sparse.vstack([part.all for part in rows]).tocsr()
     W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
     solve_block = block_solver(solver.ksp)
     for start in range(0, size, _BLOCK):
         block = slice(start, min(start + _BLOCK, size))
-        answer = solve_block(columns[block], values[block])  # (owned dofs, right-hand sides)
-        found = [comm.gather(part.of(answer), root=0) for part in rows]
+        answer = solve_block(loads[block])  # (owned dofs, right-hand sides)
+        found = comm.reduce(np.concatenate([part.part(answer) for part in rows]), root=0)
         if comm.rank == 0:
             # Symmetric, but not to the last bit as it is computed: the mean of both halves.
-            found = np.concatenate([np.concatenate(part) for part in found])
             found[block] = (found[block] + found[block].T) / 2
             found[:start] = (found[:start] + W[block, :start].T) / 2
             W[:, block], W[block, :start] = found, found[:start].T
@@ -125,24 +127,24 @@ def block_solver(ksp):
     the forward substitution; any other solver takes one column after another.
 
     Returns:
-        ``solve(columns, values)``: right-hand side k has ``values[k]`` at the global dofs
-        ``columns[k]``; both are the same on all ranks.  Gives ``shape=(owned dofs, k)``.
+        ``solve(rows)``: a right-hand side a row, sparse, columns in global numbers, the same on all ranks.  Gives
+        ``shape=(owned dofs, k)``.
     """
     A = ksp.getOperators()[0]
     comm, (owned, size) = A.comm, A.getSizes()[0]
     ksp.setUp()
     factors = mumps_factors(ksp) if ksp.getType() == "preonly" else None
 
-    def by_block(columns, values):
-        count = len(columns)
+    def by_block(rows):
+        count = rows.shape[0]
         # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
         mine = comm.rank == 0
         transposed = PETSc.Mat().createAIJ(
             ((count if mine else 0, count), (size if mine else 0, size)),
             csr=(
-                np.arange(count + 1 if mine else 1, dtype=np.int32) * columns.shape[1],
-                columns[: count if mine else 0].ravel().astype(np.int32),
-                values[: count if mine else 0].ravel(),
+                rows.indptr[: count + 1 if mine else 1].astype(np.int32),
+                rows.indices[: rows.nnz if mine else 0].astype(np.int32),
+                rows.data[: rows.nnz if mine else 0],
             ),
             comm=comm,
         )
@@ -157,11 +159,13 @@ def block_solver(ksp):
             matrix.destroy()
         return result
 
-    def by_column(columns, values):
+    def by_column(rows):
         right, left = A.createVecs()
         first, last = A.getOwnershipRange()
-        result = np.empty((owned, len(columns)))
-        for k, (column, value) in enumerate(zip(columns, values)):
+        result = np.empty((owned, rows.shape[0]))
+        for k in range(rows.shape[0]):
+            part = slice(rows.indptr[k], rows.indptr[k + 1])
+            column, value = rows.indices[part], rows.data[part]
             here = (column >= first) & (column < last)
             left.array_w[:] = 0.0
             left.array_w[column[here] - first] = value[here]

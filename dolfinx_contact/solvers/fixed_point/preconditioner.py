@@ -9,6 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from dolfinx_contact.contact.interface import like
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.solvers.fixed_point.border import Border
 from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
@@ -75,13 +76,11 @@ class ContactPreconditioner:
         K, S = self._body.K, None
         for contact, springs in zip(self._contacts, self._spring_rates):
             blocks = springs[:, :, None] * np.eye(contact.points.dim)
-            matrix = contact.points.matrix(blocks).tocsr()
+            matrix = contact.points.matrix(blocks)
             S = matrix if S is None else S + matrix
-        S = sparse.csr_matrix((self._body.size,) * 2) if S is None else S
-        S.resize(self._body.size, K.getSize()[1])
-        indices = K.getOwnershipRange()[0] + S.indices
-        csr = (S.indptr.astype(PETSc.IntType), indices.astype(PETSc.IntType), S.data)
-        return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
+        if S is None:
+            S = sparse.csr_matrix((self._body.size, K.getSize()[1]))
+        return like(K, S)
 
     def linearise(self, derivatives) -> None:
         """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.

@@ -143,7 +143,7 @@ class RigidBalance:
         slope, pushed, pushing = np.zeros((n, n)), 0.0, 0.0
         derivatives = step.derivatives(x, maps, forces)
         for k, (contact, both) in enumerate(zip(self._contacts, derivatives)):
-            Z, KZ = (contact.points.motion(part) for part in (self.modes, self.forces))
+            Z, KZ = contact.points.motion(self.modes), contact.points.reactions(self.forces)
             change = both[0] @ KZ + both[1] @ Z
             slope -= np.tensordot(Z, change, ((0, 1), (0, 1)))
             if surfaces is not None:

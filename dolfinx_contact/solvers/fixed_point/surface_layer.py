@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
-from scipy import sparse
 
 from dolfinx_contact import compat
-from dolfinx_contact.contact.interface import assembled
+from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
+from dolfinx_contact.solvers.newton.contact_tangent import change_of
 from dolfinx_contact.surfaces.surface import driven_surfaces
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
@@ -43,12 +43,8 @@ class SurfaceLayer:
         # K on displacements of the layers: a product with all of K would cost a tenth of a cycle more.
         self._columns = body.K.createSubMatrix(rows, layer)
         self._near, self._forces = self._columns.createVecs()
-        self._offset = self._columns.getOwnershipRangeColumn()[0]
-        width = self._columns.getSizes()[1]
-        indptr, indices, values = self._columns.getValuesCSR()
-        stiffness = sparse.csr_matrix((values, indices, indptr), shape=(body.size, width[1]))
-        self._stiffness = stiffness[self.dofs]
-        self._size = (width, width)
+        self._layer, self._block = layer, body.K.createSubMatrix(layer, layer)
+        self._points = [contact.points for contact in contacts]
         self._solver = None
         self._surfaces = driven_surfaces(body, contacts)
         self._pushing = None if self._surfaces is None else self._surfaces.columns()
@@ -56,6 +52,7 @@ class SurfaceLayer:
     def destroy(self) -> None:
         """Free the factorisation and the columns of K.  Collective."""
         self._columns.destroy()
+        self._block.destroy()
         if self._solver is not None:
             self._solver.destroy()
 
@@ -65,23 +62,20 @@ class SurfaceLayer:
         Args:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
-        points = [contact.points for contact in self._contacts]
-        self._by_forces, self._by_motion = assembled(points, derivatives, self._body.size)
+        self._derivatives = derivatives
         if self._surfaces is not None:
-            self._pushed = self._by_motion @ self._pushing
+            none = np.zeros(self._body.size)
+            pushed = [response(self._points, derivatives, none, way) for way in self._pushing.T]
+            self._pushed = np.array(pushed).T
             self._resisting = self._surfaces.tangent(derivatives)
-        near = sparse.csr_matrix(
-            (np.ones(self.dofs.size), (np.arange(self.dofs.size), self.dofs)),
-            (self.dofs.size, self._body.size),
-        )
-        mix, motion = (near @ part @ near.T for part in (self._by_forces, self._by_motion))
-        motion.resize(motion.shape[0], self._stiffness.shape[1] - self._offset)
-        shifted = sparse.csr_matrix(
-            (motion.data, motion.indices + self._offset, motion.indptr), self._stiffness.shape
-        )
-        block = (self._stiffness - mix @ self._stiffness - shifted).tocsr()
-        csr = (block.indptr.astype(PETSc.IntType), block.indices.astype(PETSc.IntType), block.data)
-        A = PETSc.Mat().createAIJ(self._size, csr=csr, comm=self._body.comm)
+        whole = [
+            like(self._body.K, part) for part in responses(self._body.K, self._points, derivatives)
+        ]
+        near = [part.createSubMatrix(self._layer, self._layer) for part in whole]
+        change, A = change_of(self._block, near), self._block.copy()
+        A.axpy(-1.0, change, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        for part in (*whole, change):
+            part.destroy()
         if self._solver is not None:
             self._solver.destroy()
         self._solver = LinearSolver(A, DIRECT, self._prefix, None)
@@ -102,7 +96,7 @@ class SurfaceLayer:
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
-        change = self._by_forces @ forces + self._by_motion @ x
+        change = response(self._points, self._derivatives, forces, x)
         product = forces - change
         if self._surfaces is not None:  # which follow
             pushed = self._body.total(self._pushing.T @ change)

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
-from scipy import sparse
 
-from dolfinx_contact.contact.interface import assembled
+from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
@@ -27,12 +26,8 @@ class ContactTangent:
     def __init__(self, body, contacts):
         self._body, self._points = body, [contact.points for contact in contacts]
         self._A = self._solver = None
-        free = np.ones(body.size)
-        free[body.fixed] = 0.0
-        self._free = sparse.diags(free)
-        dofs = [np.zeros(0, dtype=int), *(points.dofs.ravel() for points in self._points)]
-        rows = np.unique(np.concatenate(dofs))  # of nodes in several contacts once
-        self._rows = rows[free[rows] > 0]
+        self._free = np.ones(body.size)
+        self._free[body.fixed] = 0.0
 
     def destroy(self) -> None:
         """Free matrix and factors.  Collective."""
@@ -68,38 +63,23 @@ class ContactTangent:
         Args:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
-        K, size = self._body.K, self._body.size
-        self._by_forces, self._by_motion = assembled(self._points, derivatives, size)
+        K, self._derivatives = self._body.K, derivatives
         with stage("contact: tangent"):
             if self._A is None:
                 self._A = K.copy()
                 self._A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
             else:
                 K.copy(self._A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            self._replace_rows()
-
-    def _replace_rows(self) -> None:
-        """Write the rows of contact nodes.  Collective."""
-        K, (first, _) = self._body.K, self._body.K.getOwnershipRange()
-        indptr, indices, values = K.getValuesCSR()
-        stiffness = sparse.csr_matrix((values, indices, indptr), (self._body.size, K.getSize()[1]))
-        rows = self._rows
-        mix, motion = (
-            (part @ self._free).tocsr()[rows].tocoo() for part in (self._by_forces, self._by_motion)
-        )
-        shifted = (motion.data, (motion.row, first + motion.col))
-        rates = sparse.csr_matrix(shifted, (rows.size, stiffness.shape[1]))
-        written = (stiffness[rows] - mix.tocsr() @ stiffness - rates).tocsr()
-        numbers = (first + rows).astype(PETSc.IntType)
-        self._A.zeroRows(numbers, diag=0.0)  # entries that cancel are not written below
-        csr = (written.indptr.astype(PETSc.IntType), written.indices.astype(PETSc.IntType))
-        insert = PETSc.InsertMode.INSERT_VALUES
-        self._A.setValuesIJV(*csr, written.data, addv=insert, rowmap=numbers)
-        self._A.assemble()
+            free = self._A.createVecLeft()
+            free.array_w[:] = self._free
+            change = change_of(K, responses(K, self._points, derivatives), free)
+            self._A.axpy(-1.0, change, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            change.destroy()
+            free.destroy()
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
-        product = forces - self._by_forces @ (self._free @ forces) - self._by_motion @ x
+        product = forces - response(self._points, self._derivatives, self._free * forces, x)
         product[self._body.fixed] = 0.0
         return product
 
@@ -117,6 +97,25 @@ class ContactTangent:
                 if last:
                     raise
         raise AssertionError
+
+
+def change_of(K, both, free=None) -> PETSc.Mat:
+    """``R_r K + R_u``, what the contact changes of ``K``.  Collective.
+
+    Args:
+        K: PETSc matrix.
+        both: ``responses``, or such parts of them as belong to ``K``.
+        free: PETSc vector, one at free degrees of freedom, zero at others; None where all are free.
+    """
+    P, Q = (of if isinstance(of, PETSc.Mat) else like(K, of) for of in both)
+    if free is not None:
+        P.diagonalScale(free, free)
+        Q.diagonalScale(free, free)
+    change = P.matMult(K)
+    change.axpy(1.0, Q, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    P.destroy()
+    Q.destroy()
+    return change
 
 
 def next_change(step, x: np.ndarray) -> float:
