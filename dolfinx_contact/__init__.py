@@ -54,6 +54,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.solvers.newton.snes import SNES as SNES
     from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton as SparseNewton
     from dolfinx_contact.support.checks import RoundingWarning as RoundingWarning
+    from dolfinx_contact.surfaces.deformable import DeformableSurface as DeformableSurface
     from dolfinx_contact.surfaces.level_set import RigidSurface as RigidSurface
     from dolfinx_contact.surfaces.plane import RigidPlane as RigidPlane
     from dolfinx_contact.surfaces.round import RigidCylinder as RigidCylinder
@@ -67,6 +68,7 @@ _NAMES = {  # by their module
     "surfaces.round": ["RigidCylinder", "RigidSphere"],
     "contact.state": ["Status"],
     "surfaces.level_set": ["RigidSurface"],
+    "surfaces.deformable": ["DeformableSurface"],
     "surfaces.plane": ["RigidPlane"],
     "analysis.adapt": ["Adapted", "adapt"],
     "analysis.converge": ["Converged", "converge"],

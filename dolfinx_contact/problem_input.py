@@ -138,10 +138,13 @@ def hold(contacts, body) -> None:
     Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
     """
     left_out = [np.zeros((0, 3))]
+    for contact in contacts:
+        contact.meet(body.fixed)
     with raised_together(body.comm):
         for contact in contacts:
-            contact.hold(*_held_directions(contact, body.fixed))
-            left_out.append(contact.x[contact.points.closed])
+            held = _held_directions(contact, body.fixed)
+            contact.hold(*held)
+            left_out.append(contact.x[held[1]])
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     if len(where) == 0:
@@ -206,6 +209,8 @@ def follow(contacts, body, u: np.ndarray, known: list) -> bool:
 def check_surfaces(contacts, body) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
+        if contact.surface.deformable:
+            continue
         surface, gdim = contact.surface, contact.points.dim
         x = body.displacements.x[:, :gdim]
         with raised_together(body.comm):

@@ -7,6 +7,7 @@
 
 void bind_law(pybind11::module_ &m);       // law/bindings.cpp
 void bind_condensed(pybind11::module_ &m); // condensed/bindings.cpp
+void bind_mortar(pybind11::module_ &m);    // mortar/bindings.cpp
 
 PYBIND11_MODULE(_kernel, m) {
     m.doc() =
@@ -16,6 +17,7 @@ PYBIND11_MODULE(_kernel, m) {
         "strides, read in place.";
     bind_law(m);
     bind_condensed(m);
+    bind_mortar(m);
     m.def(
         "instruction_sets",
         [] {

@@ -315,15 +315,17 @@ class ElasticBody(OverRanks):
         """The solver of another matrix on ``V`` by the options of this body."""
         return LinearSolver(A, self.options, self.prefix, self.rigid_modes)
 
-    def stiffened(self, A, S):
+    def stiffened(self, A, S, how):
         """What applies the preconditioner of ``A = K + S``, springs ``S``; GAMG's levels are those of K.
+
+        ``how`` the entries of S lie to those of K: a PETSc ``Mat.Structure``.
 
         Collective.
         """
         if preconditioner(A, self.options, self.prefix) == "gamg":
             levels = self.ksp.getPC()
             with options_given(self.prefix, self.options or {}):  # smoothers read them once more
-                return StiffenedMultigrid(levels, A, S)
+                return StiffenedMultigrid(levels, A, S, how)
         return self.solver(A)
 
     def rigid_modes(self) -> np.ndarray:

@@ -110,7 +110,12 @@ class Contact(Guarded):
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
         extent, owned = np.abs(mesh.geometry.x).max(initial=0.0), self.displacements.owned
-        self._placement = Placement(surface, x, dofs, owned, extent, mesh.comm)
+        if surface.deformable:
+            from dolfinx_contact.contact.mortar_points import MortarPlacement
+
+            self._placement = MortarPlacement(self, facets, owned, extent)
+        else:
+            self._placement = Placement(surface, x, dofs, owned, extent, mesh.comm)
         self._laws, self._history, self.rho = Laws(), History(), None
         self._laws.assign(self, friction, empty=True)
         self.wear = wear
@@ -210,6 +215,10 @@ class Contact(Guarded):
         """Take note of what boundary conditions fix, see ``ContactPoints.hold``."""
         self.points.hold(held, closed, guided, fixed)
         self._forget_supported()
+
+    def meet(self, fixed: np.ndarray) -> None:
+        """Let frames that are means of facets' know of supports at these degrees of freedom.  Collective."""
+        self._placement.meet(fixed)
 
     def _forget_supported(self) -> None:
         """Friction, points or the last state are others now."""
@@ -685,6 +694,11 @@ class Contact(Guarded):
         if self._area is None:
             self._area = frozen(fields.facing_areas(self, self._weight))
         return self._area
+
+    @property
+    def covered(self) -> np.ndarray:
+        """Part of each node's area that is opposite a deformable surface, ``shape=(n,)``; one on rigid ones."""
+        return self._placement.covered
 
     @property
     def pressure(self) -> np.ndarray:

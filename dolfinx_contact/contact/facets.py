@@ -14,6 +14,7 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
+from dolfinx_contact.contact.shapes import monomials
 
 # Points per direction of a facet: those of Gauss's rule, which no wave has at the same phase.
 POINTS = 5
@@ -27,6 +28,7 @@ class Facets(NamedTuple):
 
     nodes: np.ndarray  # local nodes of each, (m, k)
     x: np.ndarray  # where these are, (m, k, gdim)
+    local: np.ndarray  # where these are on the reference facet, (k, dim)
     vertices: np.ndarray  # which of them are vertices, (v,)
     dim: int  # of a facet
     degree: int  # of the shape functions
@@ -42,13 +44,13 @@ class Facets(NamedTuple):
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
         """Shape functions at points of the unit square or interval, ``shape=(..., dim)``: ``(..., k)``."""
-        return _monomials(self._local(at), len(self.vertices), self.degree) @ self.inverse
+        return monomials(self._local(at), len(self.vertices), self.degree) @ self.inverse
 
     def hats(self, at: np.ndarray) -> np.ndarray:
         """Linear shape functions of the vertices, ``shape=(..., v)``, at the same points."""
         corners = _corners(self.dim, len(self.vertices))
-        inverse = np.linalg.inv(_monomials(corners, len(corners), 1))
-        return _monomials(self._local(at), len(corners), 1) @ inverse
+        inverse = np.linalg.inv(monomials(corners, len(corners), 1))
+        return monomials(self._local(at), len(corners), 1) @ inverse
 
     def sag_at_nodes(self) -> np.ndarray:
         """The same at the nodes, ``shape=(m, k)``, of what is round; not beside edges, blunt or sharp."""
@@ -77,13 +79,13 @@ class Facets(NamedTuple):
         return 0.25 * ((hats @ self.bend) * hats).sum(axis=-1)
 
 
-def facets_of(contact) -> list[Facets]:
-    """The facets of a contact, those of each shape together.  Collective."""
-    V, topology = contact.displacements.V, contact.V.mesh.topology
+def facets_of(displacements, facets: np.ndarray) -> list[Facets]:
+    """Facets, local indices, of which those that this rank owns count, those of each shape together.  Collective."""
+    V, topology = displacements.V, displacements.V.mesh.topology
     fdim = topology.dim - 1
     for dims in ((fdim, fdim + 1), (fdim + 1, fdim), (fdim + 1, 0)):
         topology.create_connectivity(*dims)
-    mine = np.unique(contact.facets[contact.facets < topology.index_map(fdim).size_local])
+    mine = np.unique(facets[facets < topology.index_map(fdim).size_local])
     cell_of, within = topology.connectivity(fdim, fdim + 1), topology.connectivity(fdim + 1, fdim)
     cells = np.array([cell_of.links(facet)[0] for facet in mine], dtype=int)
     places = [list(within.links(cell)).index(facet) for cell, facet in zip(cells, mine)]
@@ -131,12 +133,12 @@ def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
         ends = (n[:, None] * (at[:, None] - at[:, :, None])).sum(axis=-1)
         other = ends.transpose(0, 2, 1)
         both = np.where(ends * other > 0.0, np.minimum(np.abs(ends), np.abs(other)), 0.0)
-        flat = _monomials(_corners(fdim, len(corners)), len(corners), 1)
+        flat = monomials(_corners(fdim, len(corners)), len(corners), 1)
         found.append(
             Facets(
-                nodes, x[nodes], corners, fdim, degree,
-                np.linalg.inv(_monomials(local, len(corners), degree)),
-                _monomials(local, len(corners), 1) @ np.linalg.inv(flat),
+                nodes, x[nodes], local, corners, fdim, degree,
+                np.linalg.inv(monomials(local, len(corners), degree)),
+                monomials(local, len(corners), 1) @ np.linalg.inv(flat),
                 ends + other, 2.0 * np.sign(ends) * both,
                 (np.einsum("mi,mvi->mv", own, n) < SHARP).any(axis=1),
                 _diameters(at),
@@ -180,12 +182,3 @@ def _along(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     dim = points.shape[1] - 1
     axes = corners[1 : dim + 1] - corners[0]
     return np.linalg.lstsq(axes.T, (points - corners[0]).T, rcond=None)[0].T
-
-
-def _monomials(at: np.ndarray, corners: int, degree: int) -> np.ndarray:
-    """Monomials that span the shape functions of intervals, triangles or quadrilaterals, ``shape=(..., k)``."""
-    powers = np.arange(degree + 1)
-    if at.shape[-1] == 1:
-        return at**powers
-    terms = [(i, j) for i in powers for j in powers if corners == 4 or i + j <= degree]
-    return np.stack([at[..., 0] ** i * at[..., 1] ** j for i, j in terms], axis=-1)

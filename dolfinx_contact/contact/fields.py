@@ -77,6 +77,9 @@ def facing_areas(contact, weight) -> np.ndarray:
         weight: Of the surface measure, as ``weight_on`` returns it.
     """
     V, surface = contact.displacements.V, contact.surface
+    if surface.deformable:
+        whole = areas(V, contact.facets, weight=weight)[V.mesh.geometry.dim * contact.nodes]
+        return whole * contact.covered
     dim = V.mesh.geometry.dim
     towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
     at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)

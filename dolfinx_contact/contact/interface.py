@@ -33,6 +33,8 @@ class ContactPoints:
         along: Their tangential direction that is left free, unit vectors, zero where none is, ``shape=(k, gdim - 1)``.
     """
 
+    local = True  # a point is one node, its springs stand where the stiffness has entries
+
     def __init__(self, dofs: np.ndarray, frames: np.ndarray, owned: tuple[int, int, int]):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
@@ -117,7 +119,7 @@ class ContactPoints:
 
     def matrix(self, blocks: np.ndarray) -> sparse.csr_matrix:
         """``B^T D B`` of blocks ``D`` of points, ``shape=(n, gdim, gdim)``, local frame: owned rows, columns in global numbers."""
-        product = self._forces @ _block_diagonal(blocks) @ self.B
+        product = self._forces @ block_diagonal(blocks) @ self.B
         columns = product.indices + self.first
         return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
 
@@ -155,21 +157,7 @@ class ContactPoints:
 
         Along directions that boundary conditions hold, where the matrix has their rows, it is that along the normal.
         """
-        first = K.getOwnershipRange()[0]
-        order = np.argsort(self.dofs, axis=None)  # PETSc wants them sorted
-        dofs = (self.dofs.ravel()[order] + first).astype(PETSc.IntType)
-        rows = PETSc.IS().createGeneral(dofs, comm=K.comm)
-        block = K.createSubMatrix(rows, rows)
-        start, columns, values = block.getValuesCSR()
-        row = np.repeat(np.arange(dofs.size), np.diff(start))
-        column = columns - block.getOwnershipRange()[0]
-        mine = (column >= 0) & (column < dofs.size)
-        row, column, values = order[row[mine]], order[column[mine]], values[mine]
-        here = row // self.dim == column // self.dim
-        blocks = np.zeros(self.frames.shape)
-        blocks[row[here] // self.dim, row[here] % self.dim, column[here] % self.dim] = values[here]
-        rows.destroy()
-        block.destroy()
+        blocks = nodal_blocks(K, self.dofs)
         local = self.frames @ blocks @ self.frames.transpose(0, 2, 1)
         normal, tangential = local[:, -1, -1].copy(), local[:, :-1, :-1]
         if self.supported.size:
@@ -181,9 +169,35 @@ class ContactPoints:
         return NodalStiffness(normal, tangential)
 
 
-def _block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
+def block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
+    """A sparse matrix of blocks, ``shape=(n, gdim, gdim)``, on its diagonal."""
     n, dim = len(blocks), blocks.shape[1]
     return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * dim,) * 2).tocsr()
+
+
+def nodal_blocks(K, dofs: np.ndarray) -> np.ndarray:
+    """Blocks of an assembled PETSc matrix at nodes, ``shape=(n, gdim, gdim)``.  Collective.
+
+    Args:
+        K: The matrix.
+        dofs: Owned degrees of freedom of each node, ``shape=(n, gdim)``.
+    """
+    dim, first = dofs.shape[1], K.getOwnershipRange()[0]
+    order = np.argsort(dofs, axis=None)  # PETSc wants them sorted
+    sorted_dofs = (dofs.ravel()[order] + first).astype(PETSc.IntType)
+    rows = PETSc.IS().createGeneral(sorted_dofs, comm=K.comm)
+    block = K.createSubMatrix(rows, rows)
+    start, columns, values = block.getValuesCSR()
+    row = np.repeat(np.arange(dofs.size), np.diff(start))
+    column = columns - block.getOwnershipRange()[0]
+    mine = (column >= 0) & (column < dofs.size)
+    row, column, values = order[row[mine]], order[column[mine]], values[mine]
+    here = row // dim == column // dim
+    blocks = np.zeros((len(dofs), dim, dim))
+    blocks[row[here] // dim, row[here] % dim, column[here] % dim] = values[here]
+    rows.destroy()
+    block.destroy()
+    return blocks
 
 
 def responses(K, points, derivatives) -> tuple:
@@ -214,6 +228,13 @@ def like(K, values: sparse.csr_matrix) -> PETSc.Mat:
     """A PETSc matrix of the layout of ``K`` with these owned rows, columns in global numbers.  Collective."""
     csr = (values.indptr.astype(PETSc.IntType), values.indices.astype(PETSc.IntType), values.data)
     return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
+
+
+def structure(points) -> PETSc.Mat.Structure:
+    """How the entries of what contacts add to a stiffness lie to its own."""
+    kinds = PETSc.Mat.Structure
+    local = all(of.local for of in points)
+    return kinds.SUBSET_NONZERO_PATTERN if local else kinds.DIFFERENT_NONZERO_PATTERN
 
 
 def add_to(K, values: sparse.csr_matrix) -> None:

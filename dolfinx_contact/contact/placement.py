@@ -128,6 +128,14 @@ class Placement:
         turned = surface.rotation
         self.now = Placed(home, turned, own, frame, flat, points, arms, None, turned)
 
+    @property
+    def covered(self) -> np.ndarray:
+        """Part of each node's area that has a surface opposite."""
+        return np.ones(len(self.x))
+
+    def meet(self, fixed: np.ndarray) -> None:
+        """Frames are the surface's, whatever supports hold."""
+
     def settle(self) -> None:
         """These are the frames of the last step that converged."""
         self.settled = self.now

@@ -7,8 +7,6 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-SUBSET = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-
 
 class StiffenedMultigrid:
     """PETSc's multigrid for ``A = K + S``, with the interpolations and smoothers of GAMG for ``K``.
@@ -19,13 +17,14 @@ class StiffenedMultigrid:
     Args:
         levels: The set-up preconditioner of ``K``, a PETSc PC of type GAMG.
         A: The matrix plus springs.
-        S: The springs alone; their entries are among those of ``K``.  Collective.
+        S: The springs alone.
+        how: How their entries lie to those of ``K``, a PETSc ``Mat.Structure``.  Collective.
 
     Attributes:
         pc: The PETSc PC.
     """
 
-    def __init__(self, levels, A, S):
+    def __init__(self, levels, A, S, how):
         finest, own = levels.getMGLevels() - 1, []
         self.pc = pc = PETSc.PC().create(A.comm)
         pc.setOptionsPrefix(levels.getOptionsPrefix())
@@ -39,7 +38,7 @@ class StiffenedMultigrid:
             pc.setMGInterpolation(level, P)
             S = S.PtAP(P)
             A = levels.getMGSmoother(level - 1).getOperators()[1].copy()
-            A.axpy(1.0, S, SUBSET)
+            A.axpy(1.0, S, how)
             pc.getMGSmoother(level - 1).setOperators(A, A)
             own += [S, A]
         pc.setUp()

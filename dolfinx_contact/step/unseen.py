@@ -72,9 +72,10 @@ class Unseen:
 
     def __init__(self, contacts):
         self._facets = {
-            contact: facets_of(contact)
+            contact: facets_of(contact.displacements, contact.facets)
             for contact in contacts
-            if contact.surface.varies or contact.displacements.degree > 1
+            if (contact.surface.varies or contact.displacements.degree > 1)
+            and not contact.surface.deformable
         }
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.surface.varies]
@@ -180,7 +181,13 @@ def _check_apart(body, contacts) -> bool:
     facing = [
         body.highest(
             np.concatenate(
-                [[-1.0], *(-of.outwards @ contact.frame[-1] for of in facets_of(contact))]
+                [
+                    [-1.0],
+                    *(
+                        -of.outwards @ contact.frame[-1]
+                        for of in facets_of(contact.displacements, contact.facets)
+                    ),
+                ]
             )
         )
         for contact in flat

@@ -50,6 +50,7 @@ class Surface(Guarded):
     Attributes:
         varies: Whether gaps are not linear in the position, so that contacts take them anew at every step.
         curved: Whether frames differ from place to place.
+        deformable: Whether it is that of a deformable body.
         axis: First principal friction direction, or None.
     """
 
@@ -57,7 +58,7 @@ class Surface(Guarded):
         "displacement", "rotation", "free", "force", "moment", "stiffness", "drive", "guides",
     )  # fmt: skip
     _remedy = "make a new surface and a new Contact; displacement and rotation move it."
-    varies = curved = False
+    varies = curved = deformable = False
     axis: np.ndarray | None = None
 
     force, moment, stiffness, drive, guides = (_OfDrive() for _ in range(5))

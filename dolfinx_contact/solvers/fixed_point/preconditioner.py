@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact.contact.interface import like
+from dolfinx_contact.contact.interface import like, structure
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.solvers.fixed_point.border import Border
 from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
@@ -35,10 +34,11 @@ class ContactPreconditioner:
         self._layer, self._linearised = None, False
         with stage("contact: set-up of springs"):
             S, A = self._springs(), (body.anchors.A if body.loose else body.K).copy()
-            A.axpy(1.0, S, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            how = structure([contact.points for contact in contacts])
+            A.axpy(1.0, S, how)
             self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
             self._softened = False
-            self.stiffened = body.stiffened(A, S)
+            self.stiffened = body.stiffened(A, S, how)
         self._A = A
         followed = body.loose is not None or any(contact.surface.motions for contact in contacts)
         self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)

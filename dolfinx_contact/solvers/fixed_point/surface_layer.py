@@ -110,7 +110,10 @@ def _near(body, contacts) -> np.ndarray:
     of = body.displacements
     gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)
     for contact in contacts:
-        near.x.array[gdim * contact.nodes[:, None] + np.arange(gdim)] = 1.0
+        touched = np.zeros(body.size)
+        contact.points.add_magnitudes(np.ones_like(contact.reaction), touched)
+        rows = of.rows(touched).any(axis=1)
+        near.x.array[gdim * np.flatnonzero(rows)[:, None] + np.arange(gdim)] = 1.0
     for _ in range(LAYERS - 1):
         near.x.scatter_forward()
         marked = near.x.array[::gdim] > 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from dolfinx_contact.contact.interface import like, response, responses
+from dolfinx_contact.contact.interface import like, response, responses, structure
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
@@ -66,16 +66,27 @@ class ContactTangent:
         K, self._derivatives = self._body.K, derivatives
         with stage("contact: tangent"):
             if self._A is None:
-                self._A = K.copy()
+                self._A = self._pattern()
                 self._A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
-            else:
-                K.copy(self._A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self._A.zeroEntries()
+            self._A.axpy(1.0, K, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             free = self._A.createVecLeft()
             free.array_w[:] = self._free
             change = change_of(K, responses(K, self._points, derivatives), free)
             self._A.axpy(-1.0, change, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             change.destroy()
             free.destroy()
+
+    def _pattern(self) -> PETSc.Mat:
+        """A matrix with room for all entries.  Collective."""
+        A, how = self._body.K.copy(), structure(self._points)
+        if how != PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN:
+            ones = [(np.ones(of.frames.shape),) * 2 for of in self._points]
+            change = change_of(self._body.K, responses(self._body.K, self._points, ones))
+            change.scale(0.0)
+            A.axpy(1.0, change, how)
+            change.destroy()
+        return A
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""

@@ -1,0 +1,345 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+r"""Two meshes that meet and do not match: which nodes of the one side a node of the other presses on, and how much.
+
+Facets of both sides are projected on the plane of a facet of the first, the slave, and clipped there; on the common part
+stand points of a Gauss rule [Puso, Laursen, CMAME 193, 2004].  From the points of a slave facet ``e`` alone follow
+
+.. math:: M_e = \sum_q w_q N N^T, \quad D_e = diag(\sum_q w_q N), \quad \psi = D_e M_e^{-1} N,
+
+the dual shape functions, which are biorthogonal and sum up to one whatever part of a facet is covered
+[Cichosz, Bischoff, CMAME 200, 2011], and with them the coefficients of the contact operator
+
+.. math:: D_{aa} = \sum_e \int_e N_a, \quad m_{ab} = \int \psi_a N_b / D_{aa}
+
+[Wohlmuth, SIAM J. Numer. Anal. 38, 2000].  Arrays in, arrays out; needs NumPy and SciPy alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from dolfinx_contact import _kernel
+from dolfinx_contact.contact.shapes import monomials
+
+# Points of Gauss's rule in each direction of a triangle or interval: products of quadratic functions are integrated exactly.
+POINTS = 4
+
+# Part of a node's area that has to be covered: of less the coefficients are rounding.
+COVERED = 0.05
+
+# Cosine of the angle between normals beyond which facets do not face each other.
+FACING = -0.1
+
+# Departure from a straight facet, over its size, that is rounding.
+STRAIGHT = 1e-12
+
+
+class Side(NamedTuple):
+    """Facets of one shape of one side.
+
+    Args:
+        nodes: Numbers, ``shape=(m, k)``.
+        x: Where they are, ``shape=(m, k, gdim)``.
+        outwards: Unit normals, away from the body, ``shape=(m, gdim)``.
+        local: Where the nodes are on the reference facet, ``shape=(k, gdim - 1)``.
+        corners: Which of them are corners, in the order of a unit interval, triangle or square, ``shape=(c,)``.
+        degree: Of the shape functions.
+    """
+
+    nodes: np.ndarray
+    x: np.ndarray
+    outwards: np.ndarray
+    local: np.ndarray
+    corners: np.ndarray
+    degree: int
+
+    def shapes(self, local: np.ndarray) -> np.ndarray:
+        """Shape functions at points of the reference facet, ``shape=(..., k)``."""
+        inverse = np.linalg.inv(monomials(self.local, len(self.corners), self.degree))
+        return monomials(local, len(self.corners), self.degree) @ inverse
+
+
+class Pieces(NamedTuple):
+    """Straight pieces of facets: whole ones, or quarters of curved ones; corners in cyclic order."""
+
+    x: np.ndarray  # (p, c, gdim)
+    local: np.ndarray  # of the corners on the reference facet, (p, c, dim)
+    facet: np.ndarray  # (p,)
+    normal: np.ndarray  # (p, gdim)
+    middle: np.ndarray  # (p, gdim)
+    radius: np.ndarray  # (p,)
+
+
+class Rows(NamedTuple):
+    """Coefficients of ``n`` slave nodes.
+
+    Args:
+        area: ``D_aa``, of their covered part, ``shape=(n,)``.
+        whole: The same, had they been covered wholly, ``shape=(n,)``.
+        m: Sparse, ``shape=(n, master nodes)``; rows sum up to one, those of nodes hardly covered are empty.
+        covered: Which nodes have a row, ``shape=(n,)``.
+    """
+
+    area: np.ndarray
+    whole: np.ndarray
+    m: sparse.csr_matrix
+    covered: np.ndarray
+
+
+def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: int, points: int = POINTS) -> Rows:  # fmt: skip
+    """The coefficients ``D_aa`` and ``m_ab``.
+
+    Args:
+        slaves: All facets that have any of the nodes.
+        masters: Those of the other side.
+        nodes: Numbers of the slave nodes whose rows are wanted, sorted, ``shape=(n,)``.
+        count: Numbers of all nodes are below.
+        points: Of Gauss's rule in each direction.
+    """
+    area, whole, entries = np.zeros(nodes.size), np.zeros(nodes.size), []
+    opposite = [(side, pieces_of(side)) for side in masters]
+    for side in slaves:
+        pieces = pieces_of(side)
+        own = _integrate(side, pieces, *_own_points(pieces, points))
+        whole += _at_nodes(side, own[0], nodes)
+        D, part = _coupled(side, pieces, opposite, points)
+        area += _at_nodes(side, D, nodes)
+        entries += part
+    m = sparse.coo_matrix((nodes.size, count))
+    for rows, columns, values in entries:
+        at = np.searchsorted(nodes, rows)
+        at[at == nodes.size] = 0
+        mine = nodes[at] == rows if nodes.size else np.zeros(rows.shape, dtype=bool)
+        m += sparse.coo_matrix((values[mine], (at[mine], columns[mine])), m.shape)
+    covered = area > COVERED * whole
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=covered)
+    return Rows(area, whole, (sparse.diags(inverse) @ m).tocsr(), covered)
+
+
+def _coupled(side: Side, pieces: Pieces, opposite: list, points: int) -> tuple:
+    """``D_e`` of slave facets, ``shape=(m, k)``, and entries of ``sum w psi N'``: rows, columns, values."""
+    met = []
+    for other, others in opposite:
+        a, b = candidates(pieces, others)
+        if a.size:
+            pair, weight, at, there = _common_points(pieces, others, a, b, points)
+            met.append((other, pieces.facet[a[pair]], others.facet[b[pair]], weight, at, there))
+    m, k = side.nodes.shape
+    D, M = np.zeros((m, k)), np.zeros((m, k, k))
+    shapes = [side.shapes(at) for *_, at, _ in met]
+    for (_, facet, _, weight, _, _), N in zip(met, shapes):
+        np.add.at(D, facet, weight[:, None] * N)
+        np.add.at(M, facet, weight[:, None, None] * N[:, :, None] * N[:, None, :])
+    dual = D[:, :, None] * np.linalg.pinv(M, 1e-13, hermitian=True)
+    entries = []
+    for (other, facet, there, weight, _, at), N in zip(met, shapes):
+        psi = np.einsum("qij,qj->qi", dual[facet], N)
+        terms = weight[:, None, None] * psi[:, :, None] * other.shapes(at)[:, None, :]
+        rows = np.broadcast_to(side.nodes[facet][:, :, None], terms.shape)
+        columns = np.broadcast_to(other.nodes[there][:, None, :], terms.shape)
+        entries.append((rows.ravel(), columns.ravel(), terms.ravel()))
+    return D, entries
+
+
+def _integrate(side: Side, pieces: Pieces, piece, weight, at) -> tuple[np.ndarray]:
+    """Integrals of the shape functions over points of pieces, ``shape=(m, k)``."""
+    D = np.zeros(side.nodes.shape)
+    np.add.at(D, pieces.facet[piece], weight[:, None] * side.shapes(at))
+    return (D,)
+
+
+def _at_nodes(side: Side, values: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Sums at nodes of values at facets' nodes, ``shape=(m, k)``."""
+    found = np.zeros(nodes.size)
+    if nodes.size:
+        at = np.minimum(np.searchsorted(nodes, side.nodes), nodes.size - 1)
+        np.add.at(found, at, np.where(nodes[at] == side.nodes, values, 0.0))
+    return found
+
+
+# -- pieces of facets --------------------------------------------------------------------------
+
+
+def pieces_of(side: Side) -> Pieces:
+    """Straight pieces of facets: those of second order in quarters where any is curved."""
+    cyclic, m = _cyclic(side.corners), len(side.nodes)
+    hats = monomials(side.local, len(side.corners), 1) @ np.linalg.inv(
+        monomials(side.local[side.corners], len(side.corners), 1)
+    )
+    straight = hats @ side.x[:, side.corners]
+    size = np.abs(side.x - side.x[:, :1]).max(initial=0.0)
+    curved = side.degree > 1 and np.abs(side.x - straight).max(initial=0.0) > STRAIGHT * size
+    parts = _quarters(side.local, side.corners) if curved else [cyclic]
+    x = np.concatenate([side.x[:, part] for part in parts])
+    local = np.concatenate([np.broadcast_to(side.local[part], (m, *side.local[part].shape)) for part in parts])  # fmt: skip
+    facet = np.tile(np.arange(m), len(parts))
+    middle = x.mean(axis=1)
+    radius = np.linalg.norm(x - middle[:, None], axis=2).max(axis=1, initial=0.0)
+    normal = _normals(x)
+    normal *= np.where((normal * side.outwards[facet]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return Pieces(x, local, facet, normal, middle, radius)
+
+
+def _cyclic(corners: np.ndarray) -> np.ndarray:
+    """Corners of a unit square in cyclic order."""
+    return corners[[0, 1, 3, 2]] if len(corners) == 4 else corners
+
+
+def _quarters(local: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
+    """Nodes of the halves of an interval, the quarters of a triangle or square, in cyclic order."""
+
+    def at(*points) -> np.ndarray:
+        return np.array([np.abs(local - point).sum(axis=1).argmin() for point in points])
+
+    if local.shape[1] == 1:
+        return [at([0.0], [0.5]), at([0.5], [1.0])]
+    h = 0.5
+    if len(corners) == 3:
+        return [
+            at((0, 0), (h, 0), (0, h)), at((h, 0), (1, 0), (h, h)),
+            at((0, h), (h, h), (0, 1)), at((h, h), (0, h), (h, 0)),
+        ]  # fmt: skip
+    square = [(0, 0), (h, 0), (h, h), (0, h)]
+    return [at(*[(x + i, y + j) for x, y in square]) for i in (0, h) for j in (0, h)]
+
+
+def _normals(x: np.ndarray) -> np.ndarray:
+    """Unit normals of intervals, triangles and quadrilaterals, ``shape=(p, gdim)``."""
+    if x.shape[2] == 2:
+        along = x[:, 1] - x[:, 0]
+        normal = np.column_stack((along[:, 1], -along[:, 0]))
+    elif x.shape[1] == 3:
+        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    else:
+        normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.divide(normal, length, np.zeros_like(normal), where=length > 0)
+
+
+def candidates(pieces: Pieces, others: Pieces) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of pieces that may have a common part: near each other, as near as any, and facing."""
+    if not len(pieces.x) or not len(others.x):
+        return np.zeros((2, 0), dtype=int)
+    tree = cKDTree(others.middle)
+    nearest, _ = tree.query(pieces.middle)
+    near = tree.query_ball_point(
+        pieces.middle, 1.01 * (nearest + pieces.radius + 2 * others.radius.max())
+    )
+    a = np.repeat(np.arange(len(near)), [len(found) for found in near])
+    b = np.concatenate([np.asarray(found, dtype=int) for found in near])
+    facing = (pieces.normal[a] * others.normal[b]).sum(axis=1) < FACING
+    return a[facing], b[facing]
+
+
+# -- points of common parts --------------------------------------------------------------------
+
+
+def _common_points(pieces: Pieces, others: Pieces, a, b, points: int) -> tuple:
+    """Points on common parts of pairs of pieces: pair, weight, local coordinates on both facets."""
+    axes = _axes(pieces.normal)[a]
+    origin = pieces.middle[a][:, None]
+    one, other = (np.einsum("pij,pcj->pci", axes, x - origin) for x in (pieces.x[a], others.x[b]))
+    if one.shape[2] == 1:
+        pair, at, weight = _common_intervals(one[..., 0], other[..., 0], points)
+    else:
+        pair, at, weight = _common_triangles(one, other, points)
+    return (
+        pair,
+        weight,
+        _on_facet(one[pair], pieces.local[a[pair]], at),
+        _on_facet(other[pair], others.local[b[pair]], at),
+    )
+
+
+def _own_points(pieces: Pieces, points: int) -> tuple:
+    """Points on pieces themselves: piece, weight, local coordinates."""
+    axes = _axes(pieces.normal)
+    own = np.einsum("pij,pcj->pci", axes, pieces.x - pieces.middle[:, None])
+    if own.shape[2] == 1:
+        piece, at, weight = _common_intervals(own[..., 0], own[..., 0], points)
+    else:
+        piece, at, weight = _common_triangles(own, own, points)
+    return piece, weight, _on_facet(own[piece], pieces.local[piece], at)
+
+
+def _axes(normal: np.ndarray) -> np.ndarray:
+    """Unit vectors across unit vectors, ``shape=(p, gdim - 1, gdim)``."""
+    if normal.shape[1] == 2:
+        return np.stack((normal[:, 1], -normal[:, 0]), axis=-1)[:, None]
+    first = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first -= (first * normal).sum(axis=1, keepdims=True) * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack((first, np.cross(normal, first)), axis=1)
+
+
+def _common_intervals(one: np.ndarray, other: np.ndarray, points: int) -> tuple:
+    """Points and weights on the common parts of intervals, ``shape=(p, 2)`` each, and whose they are."""
+    low = np.maximum(one.min(axis=1), other.min(axis=1))
+    length = np.minimum(one.max(axis=1), other.max(axis=1)) - low
+    pair = np.flatnonzero(length > 0.0)
+    at, weight = _gauss(points)
+    x = low[pair, None] + length[pair, None] * at
+    return np.repeat(pair, points), x.reshape(-1, 1), (length[pair, None] * weight).ravel()
+
+
+def _common_triangles(one: np.ndarray, other: np.ndarray, points: int) -> tuple:
+    """Points and weights on the common parts of polygons in the plane, and whose they are."""
+    corners, counts = _kernel.clip(one, other)
+    fans, pair = [], []
+    for k in range(1, corners.shape[1] - 1):
+        some = np.flatnonzero(counts > k + 1)
+        fans.append(corners[some][:, [0, k, k + 1]])
+        pair.append(some)
+    triangles, pair = np.concatenate(fans), np.concatenate(pair)
+    edges = triangles[:, 1:] - triangles[:, :1]
+    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    # The unit square collapsed on the triangle: its Jacobian is one degree more.
+    at, weight = _gauss(points)
+    s, t = np.meshgrid(at, at, indexing="ij")
+    w = np.outer(weight * at, weight).ravel()
+    local = np.stack((s * (1 - t), s * t), axis=-1).reshape(-1, 2)
+    x = triangles[:, :1] + local @ edges
+    return np.repeat(pair, w.size), x.reshape(-1, 2), (twice[:, None] * w).ravel()
+
+
+def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
+    at, weight = np.polynomial.legendre.leggauss(points)
+    return 0.5 + 0.5 * at, 0.5 * weight
+
+
+def _on_facet(corners: np.ndarray, local: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Local coordinates of points, ``shape=(q, dim)``, on pieces with these corners in the plane and on the reference facet."""
+    if corners.shape[2] == 1:
+        start, end = corners[:, 0], corners[:, 1]
+        s = (at - start) / (end - start)
+        return local[:, 0] + s * (local[:, 1] - local[:, 0])
+    if corners.shape[1] == 3:
+        edges = corners[:, 1:] - corners[:, :1]
+        s = np.linalg.solve(edges.transpose(0, 2, 1), (at - corners[:, 0])[..., None])[..., 0]
+        return local[:, 0] + np.einsum("qi,qij->qj", s, local[:, 1:] - local[:, :1])
+    s = _on_square(corners, at)
+    weights = np.stack(
+        ((1 - s[:, 0]) * (1 - s[:, 1]), s[:, 0] * (1 - s[:, 1]), s[:, 0] * s[:, 1], (1 - s[:, 0]) * s[:, 1]),
+        axis=1,
+    )  # fmt: skip
+    return np.einsum("qc,qcj->qj", weights, local)
+
+
+def _on_square(corners: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Where on the unit square points are that a quadrilateral's bilinear map takes to ``at``: Newton's method."""
+    a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    d = corners[:, 2] - corners[:, 1] - c
+    s = np.full(at.shape, 0.5)
+    for _ in range(20):
+        left = a + b * s[:, :1] + c * s[:, 1:] + d * s[:, :1] * s[:, 1:] - at
+        slope = np.stack((b + d * s[:, 1:], c + d * s[:, :1]), axis=2)
+        step = np.linalg.solve(slope, left[..., None])[..., 0]
+        s -= step
+        if not (np.abs(step) > 1e-15).any():
+            break
+    return s

@@ -1,0 +1,72 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""The surface of a second body, or of another part of the same mesh, as what a contact presses on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import exterior_facet_indices
+from numpy.typing import ArrayLike
+
+from dolfinx_contact import compat
+from dolfinx_contact.contact.input import checked_facets
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import Surface, unit
+
+
+class DeformableSurface(Surface):
+    """Facets of a deformable body on which the facets of a contact press: two bodies, whose meshes need not match.
+
+    Both bodies are in one mesh, as parts that need not be connected.  The facets of the ``Contact`` carry the unknowns, the
+    slave; forces go over by dual mortar functions, see ``contact/mortar.py``.  The slave is better the softer, finer or curved
+    side.  Sliding is small: who presses on whom is found once, in the undeformed state.
+
+    Args:
+        V: The space of displacements, that of the contact.
+        facets: Local indices of boundary facets of the other side; a rank may have none.
+        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node;
+            needed unless friction is isotropic or bodies two-dimensional.
+
+    Raises:
+        ValueError: on all ranks, for facets that are not on the boundary.
+
+    Example:
+        >>> upper, lower = (facet_tags.find(tag) for tag in (3, 4))
+        >>> contact = dc.Contact(V, upper, dc.DeformableSurface(V, lower), dc.Friction(mu=0.3))
+    """
+
+    _settable = ()
+    _remedy = (
+        "a deformable surface moves with its body: prescribe that by boundary conditions and loads."
+    )
+    curved = deformable = True
+
+    def __init__(self, V: Any, facets: ArrayLike, axis: ArrayLike | None = None) -> None:
+        if not compat.is_function_space(V):
+            raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
+        mesh = V.mesh
+        super().__init__(np.zeros(mesh.geometry.dim))
+        fdim = mesh.topology.dim - 1
+        for dims in ((fdim, fdim + 1), (fdim, 0)):
+            mesh.topology.create_connectivity(*dims)
+        boundary = exterior_facet_indices(mesh.topology)
+        with raised_together(mesh.comm):
+            found = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
+            if axis is not None:
+                self.axis = frozen(unit("axis", axis, mesh.geometry.dim))
+        if mesh.comm.allreduce(found.size) == 0:
+            raise ValueError("facets of the deformable surface are empty on all ranks.")
+        self.V, self.facets = V, frozen(found)
+        self._made = True
+
+    def described(self) -> np.ndarray:
+        """How many facets, and the axis."""
+        count = self.V.mesh.comm.allreduce(self.facets.size)
+        return np.concatenate(([count], np.zeros(3) if self.axis is None else self.axis))
+
+    def __repr__(self) -> str:
+        axis = None if self.axis is None else self.axis.tolist()
+        return f"DeformableSurface(V, facets, axis={axis})"
