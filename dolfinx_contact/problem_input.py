@@ -54,7 +54,25 @@ def checked_contacts(contacts, u) -> tuple[Contact, ...]:
         raise ValueError(
             "contacts mean different sub-spaces of a mixed space as displacements: build all on the same."
         )
+    check_sides(contacts)
     return tuple(contacts)
+
+
+def check_sides(contacts) -> None:
+    """Raise a ``ValueError`` if a node that carries unknowns of one contact is opposite to another one's.  On this rank alone."""
+    for contact in contacts:
+        if not contact.surface.deformable:
+            continue
+        for other in contacts:
+            if np.isin(contact.opposite, other.nodes).any():
+                raise ValueError(
+                    "a node of a contact is on the deformable surface of another one, or of its own: every node is slave or master. "
+                    "Swap the sides of one of them, or leave out facets."
+                )
+            if other is not contact and np.isin(other.nodes, contact.nodes).any():
+                raise ValueError(
+                    "nodes of a contact with a deformable surface belong to another contact, too: take the facets out of one."
+                )
 
 
 def check_mesh(contact: Contact) -> None:

@@ -696,6 +696,11 @@ class Contact(Guarded):
         return self._area
 
     @property
+    def opposite(self) -> np.ndarray:
+        """Local indices of this rank's nodes on the deformable surface, none on rigid ones, ``shape=(k,)``."""
+        return self._placement.opposite
+
+    @property
     def covered(self) -> np.ndarray:
         """Part of each node's area that is opposite a deformable surface, ``shape=(n,)``; one on rigid ones."""
         return self._placement.covered

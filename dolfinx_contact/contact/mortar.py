@@ -26,11 +26,18 @@ from scipy.spatial import cKDTree
 from dolfinx_contact import _kernel
 from dolfinx_contact.contact.shapes import monomials
 
-# Points of Gauss's rule in each direction of a triangle or interval: products of quadratic functions are integrated exactly.
-POINTS = 4
+# Points of Gauss's rule in each direction of a triangle or interval: products of quadratic functions are integrated exactly;
+# and where quadrilaterals are no parallelograms, whose inverse maps are no polynomials, to ten digits.
+POINTS, MORE = 4, 10
+
+# Facets of the slave side at a time.
+BLOCK = 128
 
 # Part of a node's area that has to be covered: of less the coefficients are rounding.
 COVERED = 0.05
+
+# Area of a node over the largest that is none: of vertices of triangles of second order.
+NOTHING = 1e-9
 
 # Cosine of the angle between normals beyond which facets do not face each other.
 FACING = -0.1
@@ -57,6 +64,11 @@ class Side(NamedTuple):
     local: np.ndarray
     corners: np.ndarray
     degree: int
+
+    def some(self, which) -> Side:
+        """Those of the facets that a slice or a mask names."""
+        rows = {name: getattr(self, name)[which] for name in ("nodes", "x", "outwards")}
+        return self._replace(**rows)
 
     def shapes(self, local: np.ndarray) -> np.ndarray:
         """Shape functions at points of the reference facet, ``shape=(..., k)``."""
@@ -91,75 +103,76 @@ class Rows(NamedTuple):
     covered: np.ndarray
 
 
-def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: int, points: int = POINTS) -> Rows:  # fmt: skip
+def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: int) -> Rows:
     """The coefficients ``D_aa`` and ``m_ab``.
 
     Args:
         slaves: All facets that have any of the nodes.
         masters: Those of the other side.
         nodes: Numbers of the slave nodes whose rows are wanted, sorted, ``shape=(n,)``.
-        count: Numbers of all nodes are below.
-        points: Of Gauss's rule in each direction.
+        count: Numbers of all nodes of the other side are below.
     """
-    area, whole, entries = np.zeros(nodes.size), np.zeros(nodes.size), []
+    area, whole = np.zeros(nodes.size), np.zeros(nodes.size)
+    m = sparse.csr_matrix((nodes.size, count))
     opposite = [(side, pieces_of(side)) for side in masters]
     for side in slaves:
-        pieces = pieces_of(side)
-        own = _integrate(side, pieces, *_own_points(pieces, points))
-        whole += _at_nodes(side, own[0], nodes)
-        D, part = _coupled(side, pieces, opposite, points)
-        area += _at_nodes(side, D, nodes)
-        entries += part
-    m = sparse.coo_matrix((nodes.size, count))
-    for rows, columns, values in entries:
-        at = np.searchsorted(nodes, rows)
-        at[at == nodes.size] = 0
-        mine = nodes[at] == rows if nodes.size else np.zeros(rows.shape, dtype=bool)
-        m += sparse.coo_matrix((values[mine], (at[mine], columns[mine])), m.shape)
-    covered = area > COVERED * whole
+        for start in range(0, len(side.nodes), BLOCK):
+            block = side.some(slice(start, start + BLOCK))
+            pieces, to_nodes = pieces_of(block), _to_nodes(block, nodes)
+            whole += to_nodes @ _own_integrals(block, pieces).ravel()
+            D, part = _coupled(block, pieces, opposite, count)
+            area += to_nodes @ D.ravel()
+            m = m + to_nodes @ part
+    covered = area > np.maximum(COVERED * whole, NOTHING * whole.max(initial=0.0))
     inverse = np.divide(1.0, area, out=np.zeros_like(area), where=covered)
-    return Rows(area, whole, (sparse.diags(inverse) @ m).tocsr(), covered)
+    m = (sparse.diags(inverse) @ m).tocsr()
+    m.eliminate_zeros()
+    return Rows(area, whole, m, covered)
 
 
-def _coupled(side: Side, pieces: Pieces, opposite: list, points: int) -> tuple:
-    """``D_e`` of slave facets, ``shape=(m, k)``, and entries of ``sum w psi N'``: rows, columns, values."""
-    met = []
+def _to_nodes(side: Side, nodes: np.ndarray) -> sparse.csr_matrix:
+    """Sums at nodes of values at the nodes of facets, ``shape=(n, m k)``."""
+    flat = side.nodes.ravel()
+    at = np.searchsorted(nodes, flat)
+    at[at == nodes.size] = 0
+    mine = np.flatnonzero(nodes[at] == flat) if nodes.size else np.zeros(0, dtype=int)
+    return sparse.csr_matrix((np.ones(mine.size), (at[mine], mine)), (nodes.size, flat.size))
+
+
+def _coupled(side: Side, pieces: Pieces, opposite: list, count: int) -> tuple:
+    """``D_e`` of slave facets, ``shape=(m, k)``, and ``sum_q w psi N'``, sparse, ``shape=(m k, count)``."""
+    (m, k), met = side.nodes.shape, []
+    D, M = np.zeros((m, k)), np.zeros((m, k, k))
     for other, others in opposite:
         a, b = candidates(pieces, others)
-        if a.size:
-            pair, weight, at, there = _common_points(pieces, others, a, b, points)
-            met.append((other, pieces.facet[a[pair]], others.facet[b[pair]], weight, at, there))
-    m, k = side.nodes.shape
-    D, M = np.zeros((m, k)), np.zeros((m, k, k))
-    shapes = [side.shapes(at) for *_, at, _ in met]
-    for (_, facet, _, weight, _, _), N in zip(met, shapes):
+        pair, weight, here, there = _common_points(pieces, others, a, b)
+        facet, N = pieces.facet[a[pair]], side.shapes(here)
         np.add.at(D, facet, weight[:, None] * N)
-        np.add.at(M, facet, weight[:, None, None] * N[:, :, None] * N[:, None, :])
+        np.add.at(M, facet, (weight[:, None] * N)[:, :, None] * N[:, None, :])
+        met.append((facet, weight, N, other.nodes[others.facet[b[pair]]], other.shapes(there)))
     dual = D[:, :, None] * np.linalg.pinv(M, 1e-13, hermitian=True)
-    entries = []
-    for (other, facet, there, weight, _, at), N in zip(met, shapes):
-        psi = np.einsum("qij,qj->qi", dual[facet], N)
-        terms = weight[:, None, None] * psi[:, :, None] * other.shapes(at)[:, None, :]
-        rows = np.broadcast_to(side.nodes[facet][:, :, None], terms.shape)
-        columns = np.broadcast_to(other.nodes[there][:, None, :], terms.shape)
-        entries.append((rows.ravel(), columns.ravel(), terms.ravel()))
-    return D, entries
+    coupling = sparse.csr_matrix((m * k, count))
+    for facet, weight, N, columns, there in met:
+        psi = weight[:, None] * np.einsum("qij,qj->qi", dual[facet], N)
+        rows = k * facet[:, None] + np.arange(k)
+        both = (_by_points(psi, rows, m * k), _by_points(there, columns, count))
+        coupling = coupling + both[0].T @ both[1]
+    return D, coupling
 
 
-def _integrate(side: Side, pieces: Pieces, piece, weight, at) -> tuple[np.ndarray]:
-    """Integrals of the shape functions over points of pieces, ``shape=(m, k)``."""
+def _by_points(values: np.ndarray, columns: np.ndarray, count: int) -> sparse.csr_matrix:
+    """Values, ``shape=(q, k)``, in the columns of their nodes: a row a point."""
+    starts = np.arange(0, values.size + 1, values.shape[1])
+    return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), (len(values), count))
+
+
+def _own_integrals(side: Side, pieces: Pieces) -> np.ndarray:
+    """Integrals of the shape functions over facets, ``shape=(m, k)``."""
+    every = np.arange(len(pieces.x))
+    piece, weight, at, _ = _common_points(pieces, pieces, every, every)
     D = np.zeros(side.nodes.shape)
     np.add.at(D, pieces.facet[piece], weight[:, None] * side.shapes(at))
-    return (D,)
-
-
-def _at_nodes(side: Side, values: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Sums at nodes of values at facets' nodes, ``shape=(m, k)``."""
-    found = np.zeros(nodes.size)
-    if nodes.size:
-        at = np.minimum(np.searchsorted(nodes, side.nodes), nodes.size - 1)
-        np.add.at(found, at, np.where(nodes[at] == side.nodes, values, 0.0))
-    return found
+    return D
 
 
 # -- pieces of facets --------------------------------------------------------------------------
@@ -239,32 +252,23 @@ def candidates(pieces: Pieces, others: Pieces) -> tuple[np.ndarray, np.ndarray]:
 # -- points of common parts --------------------------------------------------------------------
 
 
-def _common_points(pieces: Pieces, others: Pieces, a, b, points: int) -> tuple:
+def _common_points(pieces: Pieces, others: Pieces, a, b) -> tuple:
     """Points on common parts of pairs of pieces: pair, weight, local coordinates on both facets."""
-    axes = _axes(pieces.normal)[a]
-    origin = pieces.middle[a][:, None]
+    axes, origin = _axes(pieces.normal)[a], pieces.middle[a][:, None]
     one, other = (np.einsum("pij,pcj->pci", axes, x - origin) for x in (pieces.x[a], others.x[b]))
-    if one.shape[2] == 1:
-        pair, at, weight = _common_intervals(one[..., 0], other[..., 0], points)
-    else:
-        pair, at, weight = _common_triangles(one, other, points)
-    return (
-        pair,
-        weight,
-        _on_facet(one[pair], pieces.local[a[pair]], at),
-        _on_facet(other[pair], others.local[b[pair]], at),
-    )
+    common = _common_intervals if one.shape[2] == 1 else _common_triangles
+    points = POINTS if _affine(one) and _affine(other) else MORE
+    pair, at, weight = common(one, other, points)
+    here = _on_facet(one[pair], pieces.local[a[pair]], at)
+    return pair, weight, here, _on_facet(other[pair], others.local[b[pair]], at)
 
 
-def _own_points(pieces: Pieces, points: int) -> tuple:
-    """Points on pieces themselves: piece, weight, local coordinates."""
-    axes = _axes(pieces.normal)
-    own = np.einsum("pij,pcj->pci", axes, pieces.x - pieces.middle[:, None])
-    if own.shape[2] == 1:
-        piece, at, weight = _common_intervals(own[..., 0], own[..., 0], points)
-    else:
-        piece, at, weight = _common_triangles(own, own, points)
-    return piece, weight, _on_facet(own[piece], pieces.local[piece], at)
+def _affine(corners: np.ndarray) -> bool:
+    """Whether all pieces are intervals, triangles or parallelograms."""
+    if corners.shape[1] < 4:
+        return True
+    bent = corners[:, 0] - corners[:, 1] + corners[:, 2] - corners[:, 3]
+    return np.abs(bent).max(initial=0.0) <= STRAIGHT * np.abs(corners).max(initial=0.0)
 
 
 def _axes(normal: np.ndarray) -> np.ndarray:
@@ -278,7 +282,8 @@ def _axes(normal: np.ndarray) -> np.ndarray:
 
 
 def _common_intervals(one: np.ndarray, other: np.ndarray, points: int) -> tuple:
-    """Points and weights on the common parts of intervals, ``shape=(p, 2)`` each, and whose they are."""
+    """Points and weights on the common parts of intervals, and whose they are."""
+    one, other = one[..., 0], other[..., 0]
     low = np.maximum(one.min(axis=1), other.min(axis=1))
     length = np.minimum(one.max(axis=1), other.max(axis=1)) - low
     pair = np.flatnonzero(length > 0.0)

@@ -32,7 +32,7 @@ class MortarPlacement(Placement):
         self._facets = _gathered(of, facets, contact.comm)
         self._opposite = Opposite(of, surface.facets, contact.comm)
         numbers = _numbers(of.V.dofmap.index_map, nodes)
-        mine = [_some(side, np.isin(side.nodes, numbers).any(axis=1)) for side in self._facets]
+        mine = [side.some(np.isin(side.nodes, numbers).any(axis=1)) for side in self._facets]
         with raised_together(contact.comm):
             self.rows = _sorted_rows(mine, self._opposite.sides, numbers)
         self._towards = _mean_normals(mine, numbers)
@@ -50,6 +50,11 @@ class MortarPlacement(Placement):
         points = MortarPoints(self._dofs, frames, self._owned, self.rows, self._opposite.dofs, self._comm)  # fmt: skip
         home, frames, flat = map(frozen, (x.copy(), frames, flat))
         self.now = Placed(home, surface.rotation, frames, frames, flat, points, None)
+
+    @property
+    def opposite(self) -> np.ndarray:
+        """See ``Placement``."""
+        return self._opposite.nodes
 
     @property
     def covered(self) -> np.ndarray:
@@ -78,6 +83,7 @@ class Opposite:
 
     Attributes:
         sides: Their facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
+        nodes: Local indices of those that this rank owns.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
         x: Where they are, ``shape=(m, gdim)``.
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
@@ -92,7 +98,7 @@ class Opposite:
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
         index_map, count = of.V.dofmap.index_map, of.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
-        local = np.flatnonzero(own)
+        self.nodes = local = np.flatnonzero(own)
         dofs = of.owned[1] + of.dofs(local)
         given = comm.allgather((_numbers(index_map, local), dofs))
         at = np.searchsorted(self.numbers, np.concatenate([numbers for numbers, _ in given]))
@@ -246,7 +252,8 @@ def frames_along(normals: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     """
     if normals.shape[1] == 2:
         return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
-    given = np.eye(3)[np.abs(normals).argmin(axis=1)] if axis is None else axis
+    most_across = np.abs(normals).round(6).argmin(axis=1)  # rounding does not choose
+    given = np.eye(3)[most_across] if axis is None else axis
     along = given - (given * normals).sum(axis=1, keepdims=True) * normals
     length = np.linalg.norm(along, axis=1, keepdims=True)
     if not (length > AXIS).all():
@@ -276,10 +283,6 @@ def _gathered(of, facets: np.ndarray, comm) -> list[Side]:
 def _numbers(index_map, nodes: np.ndarray) -> np.ndarray:
     """Global numbers of local nodes."""
     return index_map.local_to_global(nodes.astype(np.int32)).astype(np.int64)
-
-
-def _some(side: Side, which: np.ndarray) -> Side:
-    return side._replace(nodes=side.nodes[which], x=side.x[which], outwards=side.outwards[which])
 
 
 def _sorted_rows(slaves: list[Side], masters: list[Side], numbers: np.ndarray) -> Rows:

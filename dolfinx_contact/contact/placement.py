@@ -133,6 +133,11 @@ class Placement:
         """Part of each node's area that has a surface opposite."""
         return np.ones(len(self.x))
 
+    @property
+    def opposite(self) -> np.ndarray:
+        """This rank's nodes on the other side, local indices."""
+        return np.zeros(0, dtype=int)
+
     def meet(self, fixed: np.ndarray) -> None:
         """Frames are the surface's, whatever supports hold."""
 

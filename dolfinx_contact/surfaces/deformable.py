@@ -38,7 +38,7 @@ class DeformableSurface(Surface):
         >>> contact = dc.Contact(V, upper, dc.DeformableSurface(V, lower), dc.Friction(mu=0.3))
     """
 
-    _settable = ()
+    _settable = ("displacement", "rotation")
     _remedy = (
         "a deformable surface moves with its body: prescribe that by boundary conditions and loads."
     )
@@ -61,6 +61,28 @@ class DeformableSurface(Surface):
             raise ValueError("facets of the deformable surface are empty on all ranks.")
         self.V, self.facets = V, frozen(found)
         self._made = True
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Zero: it moves with its body."""
+        return self._displacement
+
+    @displacement.setter
+    def displacement(self, value: ArrayLike) -> None:
+        self._stay("displacement", value)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Zero: it moves with its body."""
+        return self._rotation
+
+    @rotation.setter
+    def rotation(self, value: ArrayLike) -> None:
+        self._stay("rotation", value)
+
+    def _stay(self, name: str, value: ArrayLike) -> None:
+        if np.any(value):
+            raise ValueError(f"surface.{name} cannot be {value!r}: {self._remedy}")
 
     def described(self) -> np.ndarray:
         """How many facets, and the axis."""

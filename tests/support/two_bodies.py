@@ -12,11 +12,12 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from dolfinx.mesh import CellType, create_mesh
-from scenes import COMM, MPI, elasticity
+from patches import MU, P, even_state, turned
+from scenes import COMM, MPI
 
 from dolfinx_contact.compat import cell_points, functionspace
 
-E, NU = 1000.0, 0.3
+E, NU = 210e3, 0.3
 KINDS = {
     "triangle": CellType.triangle,
     "quadrilateral": CellType.quadrilateral,
@@ -53,56 +54,100 @@ def joined(parts, comm=COMM):
     return create_mesh(comm, cells.astype(np.int64), **given)
 
 
-def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, move=None, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM):  # fmt: skip
-    """An upper block, ``[0, 1]^(d-1) x [0, 1]``, on a lower one below it; the bottom is held, the top moves.
+def pair(cell, cells, size=(1.0, 1.0), gap=0.0, comm=COMM):
+    """A block on another one: the mesh, facets of top, bottom, upper and lower side of the interface, and which cells are above."""
+    d, fdim = len(cells[0]), len(cells[0]) - 1
+    low = np.append([(size[1] - size[0]) / 2] * fdim, gap)
+    upper = (low, low + np.append([size[0]] * fdim, 1.0))
+    lower = (np.append([0.0] * fdim, -1.0), np.append([size[1]] * fdim, 0.0))
+    domain = joined([box(cell, *upper, cells[0]), box(cell, *lower, cells[1])], comm)
+    count = domain.topology.index_map(d).size_local + domain.topology.index_map(d).num_ghosts
+    height = domain.geometry.x[cell_points(domain)[:count]].mean(axis=1)[:, fdim]
+
+    def near(z, above=None):
+        facets = mesh.locate_entities_boundary(domain, fdim, lambda x: np.isclose(x[fdim], z))
+        domain.topology.create_connectivity(fdim, d)
+        links = domain.topology.connectivity(fdim, d)
+        of = np.array([links.links(f)[0] for f in facets], dtype=int)
+        return facets if above is None else facets[(height[of] > 0.0) == above]
+
+    ends = near(1.0 + gap), near(-1.0), near(gap, True), near(0.0, False)
+    return domain, *ends, height > 0.0
+
+
+def moduli_of(domain, above, moduli):
+    """Young's modulus by cells, its Lame parameter and shear modulus."""
+    modulus = fem.Function(functionspace(domain, ("DG", 0)))
+    modulus.x.array[:] = np.where(above, *moduli)
+    return modulus * NU / ((1 + NU) * (1 - 2 * NU)), modulus / (2 * (1 + NU))
+
+
+def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM, **options):  # fmt: skip
+    """A block on another one; the bottom is held, the top moves by ``way``.
 
     Args:
         swapped: Whether the lower one's facets carry the unknowns.
-        move: Function that moves the mesh's coordinates in place.
         size: Lengths of upper and lower block along the surface.
     """
-    d = len(cells[0])
-    ends = [(np.zeros(d), np.append([s] * (d - 1), h)) for s, h in zip(size, (1.0, 1.0))]
-    lower = (np.append(ends[1][0][:-1], -1.0), np.append(ends[1][1][:-1], 0.0))
-    shift = (size[1] - size[0]) / 2
-    low, high = ends[0][0].copy(), ends[0][1].copy()
-    low[:-1] += shift
-    high[:-1] += shift
-    low[-1], high[-1] = gap, 1.0 + gap
-    domain = joined([box(cell, low, high, cells[0]), box(cell, *lower, cells[1])], comm)
-    fdim = d - 1
-
-    def near(z):
-        return mesh.locate_entities_boundary(domain, fdim, lambda x: np.isclose(x[d - 1], z))
-
-    top, bottom, middle = near(1.0 + gap), near(-1.0), np.union1d(near(0.0), near(gap))
-    domain.topology.create_connectivity(fdim, d)
-    at = mesh.compute_midpoints if hasattr(mesh, "compute_midpoints") else None
-    cells_of = domain.topology.connectivity(fdim, d)
-    owner = np.array([cells_of.links(f)[0] for f in middle], dtype=int)
-    centre = domain.geometry.x[cell_points(domain)[owner]].mean(axis=1)[:, d - 1]
-    of_upper, of_lower = middle[centre > gap / 2], middle[centre < gap / 2]
-    del at
-    modulus = fem.Function(functionspace(domain, ("DG", 0)))
-    count = domain.topology.index_map(d).size_local + domain.topology.index_map(d).num_ghosts
-    heights = domain.geometry.x[cell_points(domain)[:count]].mean(axis=1)[:, d - 1]
-    modulus.x.array[:] = np.where(heights > gap / 2, *moduli)
-    if move is not None:
-        move(domain.geometry.x)
+    domain, top, bottom, upper, lower, above = pair(cell, cells, size, gap, comm)
+    d = domain.geometry.dim
     V = functionspace(domain, ("Lagrange", degree, (d,)))
-    u = fem.Function(V)
-    way = fem.Constant(domain, np.zeros(d))
-    bcs = [fem.dirichletbc(way, fem.locate_dofs_topological(V, fdim, top), V)]
-    bcs.append(fem.dirichletbc(np.zeros(d), fem.locate_dofs_topological(V, fdim, bottom), V))
-    slave, master = (of_lower, of_upper) if swapped else (of_upper, of_lower)
+    u, way = fem.Function(V), fem.Constant(domain, np.zeros(d))
+    bcs = [fem.dirichletbc(way, fem.locate_dofs_topological(V, d - 1, top), V)]
+    bcs.append(fem.dirichletbc(np.zeros(d), fem.locate_dofs_topological(V, d - 1, bottom), V))
+    slave, master = (lower, upper) if swapped else (upper, lower)
     surface = dc.DeformableSurface(V, master, axis=axis)
     contact = dc.Contact(V, slave, surface, dc.Friction(mu, p))
-    v, eps = ufl.TestFunction(V), lambda w: ufl.sym(ufl.grad(w))
-    lame, shear = modulus * NU / ((1 + NU) * (1 - 2 * NU)), modulus / (2 * (1 + NU))
-    stress = 2 * shear * eps(u) + lame * ufl.tr(eps(u)) * ufl.Identity(d)
-    F = ufl.inner(stress, eps(v)) * ufl.dx
-    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=tol)
-    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, top=top, bottom=bottom, F=F, surface=surface)  # fmt: skip
+    lame, shear = moduli_of(domain, above, moduli)
+    F = work(u, V, lame, shear) * ufl.dx
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=tol, **options)
+    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, bcs=bcs, F=F)  # fmt: skip
 
 
-__all__ = ["blocks", "joined", "elasticity"]
+def stress(w, lame, shear):
+    strain = ufl.sym(ufl.grad(w))
+    return 2 * shear * strain + lame * ufl.tr(strain) * ufl.Identity(len(w))
+
+
+def work(u, V, lame, shear):
+    return ufl.inner(stress(u, lame, shear), ufl.grad(ufl.TestFunction(V)))
+
+
+def patch(cell, degree, slips, moduli=(E, E), tilted=True, swapped=False, cells=None, solver=None, comm=COMM):  # fmt: skip
+    """Two blocks under one even stress, meshes distorted and turned; the exact displacement, and the traction in the local frame."""
+    d = 2 if cell in ("triangle", "quadrilateral") else 3
+    cells = cells or (((3, 2), (4, 2)) if d == 2 else ((2, 2, 1), (3, 2, 1)))
+    domain, top, bottom, upper, lower, above = pair(cell, cells, comm=comm)
+    x, turn = domain.geometry.x, turned(d) if tilted else np.eye(d)
+    wave = np.sin(np.pi * x[:, : d - 1]).prod(axis=1, keepdims=True)
+    x[:, : d - 1] += 0.06 * wave * np.array([1.0, -0.7])[: d - 1]
+    x[:, :d] = x[:, :d] @ turn.T
+    _, traction, slip = even_state(d, slips)
+    V = functionspace(domain, ("Lagrange", degree, (d,)))
+    lame, shear = moduli_of(domain, above, moduli)
+    exact = fem.Function(V)
+    cells_of = V.dofmap
+    for part, modulus, moved in ((~above, moduli[1], 0.0), (above, moduli[0], 1.0)):
+        G = modulus / (2 * (1 + NU))
+        gradient = np.zeros((d, d))
+        gradient[:-1, -1] = -traction[:-1] / G
+        gradient[-1, -1] = -traction[-1] / (G * (2 + 2 * NU / (1 - 2 * NU)))
+        nodes = np.unique(np.concatenate([[], *(cells_of.cell_dofs(k) for k in np.flatnonzero(part))]).astype(int))  # fmt: skip
+        at = V.tabulate_dof_coordinates()[nodes, :d] @ turn
+        rows = (at @ gradient.T + moved * slip) @ turn.T
+        exact.x.array[(d * nodes[:, None] + np.arange(d)).ravel()] = rows.ravel()
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    held = [fem.locate_dofs_topological(V, d - 1, facets) for facets in (top, bottom)]
+    bcs = [fem.dirichletbc(exact, dofs) for dofs in held]
+    middle = np.union1d(upper, lower)
+    outer = np.setdiff1d(mesh.locate_entities_boundary(domain, d - 1, lambda x: np.full(x.shape[1], True)), middle)  # fmt: skip
+    tags = mesh.meshtags(domain, d - 1, outer.astype(np.int32), np.ones(outer.size, np.int32))
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)
+    outside = ufl.inner(ufl.dot(stress(exact, lame, shear), ufl.FacetNormal(domain)), v) * ds(1)
+    slave, master = (lower, upper) if swapped else (upper, lower)
+    surface = dc.DeformableSurface(V, master, axis=turn[:, 0] if d == 3 else None)
+    friction = dc.Friction(MU, P) if d == 3 else dc.Friction(MU[0])
+    contact = dc.Contact(V, slave, surface, friction)
+    F = work(u, V, lame, shear) * ufl.dx - outside
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=1e-10)
+    return SimpleNamespace(contact=contact, problem=problem, u=u, exact=exact, traction=traction, slip=slip, turn=turn)  # fmt: skip

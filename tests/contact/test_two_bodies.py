@@ -1,0 +1,170 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Two deformable bodies whose meshes do not match: patch tests, balance, matching meshes as one body, solvers and ranks that agree."""
+
+import numpy as np
+import pytest
+from two_bodies import COMM, E, blocks, dc, patch
+
+pytestmark = pytest.mark.ranks
+
+SOLVERS = {
+    "CondensedNewton": dc.CondensedNewton(),
+    "FixedPoint": dc.FixedPoint(),
+    "SparseNewton": dc.SparseNewton(),
+    "SNES": dc.SNES(),
+}
+PATCHES = [
+    *[(cell, degree, slips, (E, E), False) for cell in ("hexahedron", "quadrilateral", "triangle", "tetrahedron") for degree in (1, 2) for slips in (False, True)],
+    ("hexahedron", 1, True, (E, 10 * E), True), ("triangle", 2, False, (1e4 * E, E), True), ("triangle", 1, True, (E, 1e4 * E), False),
+]  # fmt: skip
+
+
+def largest(values) -> float:
+    return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
+
+
+def total(values) -> np.ndarray:
+    return COMM.allreduce(np.sum(values, axis=0))
+
+
+@pytest.mark.parametrize("cell, degree, slips, moduli, swapped", PATCHES)
+def test_an_even_stress_is_exact(cell, degree, slips, moduli, swapped):
+    """On distorted meshes, turned in space, every node has the traction times its area, and displacements are linear."""
+    scene = patch(cell, degree, slips, moduli, swapped=swapped)
+    step = scene.problem.solve()
+    assert step.error <= 1e-10
+    forces = np.einsum("ni,nij->nj", scene.contact.reaction, scene.contact.frame)
+    traction = scene.turn @ scene.traction * (-1.0 if swapped else 1.0)
+    expected = scene.contact.area[:, None] * traction
+    assert largest(forces - expected) <= 1e-9 * largest(expected)
+    exact = scene.exact.x.array
+    assert largest(scene.u.x.array - exact) <= 1e-9 * largest(exact)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    "cell, cells", [("hexahedron", ((3, 3, 2), (4, 4, 2))), ("triangle", ((4, 3), (7, 3)))]
+)
+def test_solvers_agree_and_forces_balance(cell, cells, solver):
+    """Pressed and dragged obliquely, some nodes slip: every solver finds the same, and supports carry what the contact does."""
+    flat = cell == "triangle"
+    law = dict(mu=0.3) if flat else dict(mu=(0.3, 0.15), p=(0.05, 0.2), axis=(1, 0.2, 0))
+    forces = []
+    for name in ("CondensedNewton", solver):
+        scene = blocks(cell, 1, cells, moduli=(E, 3 * E), solver=SOLVERS[name], **law)
+        for k in range(3):
+            scene.way.value[:] = [0.004 * k, -0.01] if flat else [0.004 * k, 0.002 * k, -0.01]
+            step = scene.problem.solve()
+        assert step.counts.slip > 0 and step.counts.stick > 0
+        forces.append(np.append(scene.contact.force(), total(scene.contact.dissipation)))
+        # what acts on both bodies together is in balance, node by node of each
+        left = np.zeros(scene.contact.points.size)
+        scene.contact.assemble_reaction(left)
+        assert np.abs(total(left.reshape(-1, 2 if flat else 3))).max() <= 1e-12 * np.abs(forces[-1]).max()  # fmt: skip
+    assert forces[0] == pytest.approx(forces[1], rel=1e-8, abs=1e-8 * np.abs(forces[0]).max())
+
+
+@pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
+def test_meshes_that_match_are_one_body(swapped):
+    """Perfectly rough, and nowhere open: the two halves of a column under its shear move as one, to the last digits."""
+    scene = blocks("hexahedron", 1, ((2, 2, 2), (2, 2, 2)), mu=np.inf, swapped=swapped)
+    scene.way.value[:] = (0.01, 0.0, -0.1)
+    step = scene.problem.solve()
+    assert step.counts.stick == step.counts.stick + step.counts.slip + step.counts.open
+    at, here = scene.V.tabulate_dof_coordinates(), scene.u.x.array.reshape(-1, 3)
+    both = {}
+    for x, u in zip(at, here):
+        both.setdefault(tuple(np.round(x, 9)), []).append(u)
+    twice = [np.ptp(u, axis=0) for u in both.values() if len(u) > 1]
+    assert COMM.allreduce(len(twice)) >= 9 or COMM.size > 1
+    assert largest(np.array(twice).reshape(-1, 3)) < 1e-15
+
+
+@pytest.mark.skipif(COMM.size > 1, reason="dense: one rank is enough")
+def test_compliance_is_the_sum_of_both():
+    """W of matching meshes is that of the upper body plus that of the lower one, each against a rigid plane."""
+    scene = blocks("hexahedron", 1, ((2, 2, 2), (2, 2, 2)), solver=dc.CondensedNewton())
+    contact, surface = scene.contact, scene.contact.surface
+    found = []
+    for facets, other in ((contact.facets, surface), (contact.facets, 1.0), (surface.facets, -1.0)):
+        if other is not surface:
+            other = dc.RigidPlane((0, 0, 0), (0, 0, other), axis=(1, 0, 0))
+        one = dc.Contact(scene.V, facets, other, dc.Friction(0.3))
+        problem = dc.ContactProblem(scene.F, scene.u, [one], bcs=scene.bcs, solver=scene.problem.solver)  # fmt: skip
+        scene.way.value[:] = (0.0, 0.0, -0.01 if other is surface or other.normal[2] > 0 else 0.01)
+        problem.solve()
+        order = np.lexsort(np.round(one.x, 9).T)
+        W = problem.bound().compliance().reshape(9, 3, 9, 3)[order][:, :, order]
+        found.append(W)
+    turned = np.array([1.0, -1.0, -1.0])  # the frame of the lower body's plane
+    lower = found[2] * turned[:, None, None] * turned
+    assert found[0] == pytest.approx(found[1] + lower, rel=1e-12, abs=1e-12 * found[0].max())
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_sliding_carries_mu_n(degree):
+    """Where all slides friction is mu times the normal force, with edges that hang over as well; work is that times the way."""
+    scene = blocks("quadrilateral", degree, ((4, 2), (5, 2)), mu=0.2, size=(1.0, 2.0))
+    for way in (0.0, 0.05, 0.1):
+        scene.way.value[:] = (way, -0.01)
+        step = scene.problem.solve()
+    assert step.counts.stick == 0
+    along, normal = scene.contact.force()
+    assert along == pytest.approx(-0.2 * normal, rel=1e-12)
+    slip = scene.contact.slip_increment[:, 0]
+    assert largest(slip) > 0.0
+    assert (scene.contact.area > 0).all()
+
+
+def test_a_gap_closes_and_opens():
+    """A gap between both counts: the upper body falls by it before it presses, and no force is left when it is lifted."""
+    scene = blocks("hexahedron", 1, ((2, 2, 1), (3, 3, 1)), gap=0.01)
+    scene.way.value[2] = -0.009
+    assert scene.problem.solve().counts.open == 9
+    assert scene.contact.gap == pytest.approx(0.001, rel=1e-9)
+    scene.way.value[2] = -0.02
+    assert scene.problem.solve().counts.open == 0
+    scene.way.value[2] = -0.005
+    assert scene.problem.solve().counts.open == 9
+    assert not scene.contact.force().any()
+
+
+def test_checkpoints_and_rewind(tmp_path):
+    """A run that goes on from a file has the same bits; a step taken back and made again, too."""
+    paths = [(0.0, 0.0, -0.01), (0.004, 0.0, -0.01), (0.002, 0.001, -0.012)]
+    whole, parted = (blocks("hexahedron", 1, ((2, 2, 2), (3, 3, 2)), mu=(0.3, 0.1), axis=(1, 0, 0)) for _ in range(2))  # fmt: skip
+    file = COMM.bcast(str(tmp_path / "state.npz"))
+    for k, way in enumerate(paths):
+        whole.way.value[:] = parted.way.value[:] = way
+        whole.problem.solve()
+        parted.problem.solve()
+        if k == 1:
+            parted.problem.rewind()
+            parted.problem.solve()
+            parted.problem.save(file)
+            parted.problem.reset()
+            parted.problem.load(file)
+    assert largest(whole.contact.reaction - parted.contact.reaction) <= 1e-9 * largest(whole.contact.reaction)  # fmt: skip
+    assert largest(whole.contact.slip_path - parted.contact.slip_path) <= 1e-12
+
+
+def test_what_makes_no_sense_is_refused():
+    """A deformable surface is not moved by hand; facets inside a body, or none, are no surface."""
+    scene = blocks("quadrilateral", 1, ((2, 2), (3, 2)))
+    with pytest.raises(ValueError, match="moves with its body"):
+        scene.contact.surface.displacement = (0.0, 1.0)
+    with pytest.raises(AttributeError, match="moves with its body"):
+        scene.contact.surface.free = ("n",)
+    with pytest.raises(ValueError, match="empty"):
+        dc.DeformableSurface(scene.V, [])
+    with pytest.raises(ValueError, match="slave"):
+        dc.ContactProblem(
+            scene.F,
+            scene.u,
+            [
+                dc.Contact(scene.V, scene.contact.facets, dc.DeformableSurface(scene.V, scene.contact.surface.facets), 0.1),
+                dc.Contact(scene.V, scene.contact.surface.facets, dc.DeformableSurface(scene.V, scene.contact.facets), 0.1),
+            ],
+            bcs=scene.bcs,
+        )  # fmt: skip
