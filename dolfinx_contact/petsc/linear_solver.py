@@ -15,8 +15,10 @@ DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "
 # (notes/2026-11-22-condensed-speed.md).
 SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 
-# Of full matrices all orderings are as good, and PORD, which finds no separator in them, ends the process. AMD does not.
+# Of matrices that are small, or all but full, all orderings are as good, and PORD, which may find no separator in them, ends
+# the process. AMD does not.
 FULL = SYMMETRIC | {"mat_mumps_icntl_7": 0}
+SMALL, DENSE = 100, 0.5
 
 # Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
 # from zero, so that a run continued from a checkpoint has the same bits.
@@ -86,8 +88,8 @@ def _to_factorise(A):
     )
     if not symmetric:
         return A, DIRECT
-    full = A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] == A.getSize()[0] ** 2
-    return A, FULL if full else SYMMETRIC
+    n, entries = A.getSize()[0], A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+    return A, FULL if n <= SMALL or entries > DENSE * n**2 else SYMMETRIC
 
 
 @contextmanager
