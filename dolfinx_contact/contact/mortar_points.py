@@ -49,7 +49,8 @@ class MortarPlacement(Placement):
         flat[~self.rows.covered] = self._apart  # opposite nothing: closed
         points = MortarPoints(self._dofs, frames, self._owned, self.rows, self._opposite.dofs, self._comm)  # fmt: skip
         home, frames, flat = map(frozen, (x.copy(), frames, flat))
-        self.now = Placed(home, surface.rotation, frames, frames, flat, points, None)
+        still = surface.rotation
+        self.now = Placed(home, still, frames, frames, flat, points, None, None, still)
 
     @property
     def opposite(self) -> np.ndarray:
