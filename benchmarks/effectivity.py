@@ -43,7 +43,7 @@ def plane_strain(scene, law, order: int, facets=None) -> tuple[dc.ContactProblem
     face = face if facets is None else face[facets]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
     options = dict(solver=dc.CondensedNewton(), petsc_options=DIRECT, tol=1e-9)
-    return dc.ContactProblem(F, u, [contact], bcs, **options), held
+    return dc.ContactProblem(F, u, [contact], bcs=bcs, **options), held
 
 
 def off_line(contact, component: int, exact, rings: bool = False) -> tuple[float, float]:

@@ -46,7 +46,7 @@ def solutions(W, q, friction, first, starts: int, seed: int) -> list[list]:
     for _ in range(starts):
         start = random_start(rng, first, friction.mu)
         with contextlib.suppress(dc.CondensedNotConverged):
-            r = dc.solve_condensed(W, q, friction, newton, TOL, r0=start).reaction
+            r = dc.solve_condensed(W, q, friction, solver=newton, tol=TOL, r0=start).reaction
             found[number(found, r, W, q, friction)][1] += 1
     return found
 

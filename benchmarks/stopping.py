@@ -146,7 +146,7 @@ def main(path: Path) -> None:
         computed = cache(compute)
         for asked in ASKED:
             begin = process_time()
-            found = dc.converge(computed, asked, meshes, halvings)
+            found = dc.converge(computed, asked, meshes, halvings=halvings)
             finest, parts = list(found.tried)[-1]
             record = dict(scene=name, asked=asked, reached=found.reached, estimated=found.error, true=abs(found.value / true - 1),
                           value=found.value, limit=true, mesh=finest, parts=parts, runs=len(found.tried),

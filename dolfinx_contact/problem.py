@@ -129,6 +129,7 @@ class ContactProblem(Guarded):
         F: Any,
         u: fem.Function,
         contacts: Contact | Sequence[Contact],
+        *,
         bcs: Sequence[Any] = (),
         J: Any = None,
         solver: Solver | None = None,

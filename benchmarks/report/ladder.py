@@ -59,9 +59,9 @@ def rung(kind: dict, mesh: dict, steps: int, repetition: int) -> dict:
         problem = dc.ContactProblem(scale * punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
     if kind.get("recorded"):
         facets, file = punch.facet_tags.find(1), Path(tempfile.mkdtemp()) / "history.csv"
-        contact = dc.Contact(punch.V, facets, contact.surface, contact.friction, dc.Wear(3e-8))
+        contact = dc.Contact(punch.V, facets, contact.surface, contact.friction, wear=dc.Wear(3e-8))
         problem = dc.ContactProblem(punch.F, punch.u, [contact], bcs=punch.bcs, tol=1e-8)
-        history = dc.History(problem, file, [(7.5, 0, 0), (0, 7.5, 0)])
+        history = dc.History(problem, file, points=[(7.5, 0, 0), (0, 7.5, 0)])
     if kind.get("away"):
         contact.surface.displacement = np.array([0.0, 0.0, -1e3])
 

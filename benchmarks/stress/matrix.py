@@ -95,7 +95,7 @@ def condensed_steps(scene: Scene, solver, record):
         p = np.broadcast_to(scene.body.get("p", mu), 2)
     try:
         law = dc.Friction(mu, p)
-        found = dc.solve_condensed(W, q, law, solver, scene.tol, max_seconds=30)
+        found = dc.solve_condensed(W, q, law, solver=solver, tol=scene.tol, max_seconds=30)
     except REFUSALS as said:
         return refuse(record, said)
     yield judge.condensed(W, q, mu, p, found.reaction, scene.tol), found, found.branch
@@ -145,7 +145,7 @@ def corner_steps(scene: CornerScene, solver, record):
     """As ``body_steps``, of a body whose edge belongs to two contacts.  No distance of reactions: shares are not unique."""
     built = build_corner(**scene.body)
     of = CornerJudge(built)
-    problem = dc.ContactProblem(built.F, built.u, built.contacts, built.bcs, solver=solver, tol=scene.tol)  # fmt: skip
+    problem = dc.ContactProblem(built.F, built.u, built.contacts, bcs=built.bcs, solver=solver, tol=scene.tol)  # fmt: skip
     for push in scene.tops:
         built.apply(push)
         try:

@@ -64,6 +64,7 @@ def adapt(
     mesh: Any,
     accuracy: float,
     quantity: str,
+    *,
     meshes: int = 12,
     share: float = 0.5,
     quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,

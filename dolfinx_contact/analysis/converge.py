@@ -58,6 +58,7 @@ def converge(
     compute: Callable[[Mesh, int], float],
     accuracy: float,
     meshes: Sequence[Mesh],
+    *,
     halvings: int = 0,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Converged:

@@ -84,6 +84,7 @@ def estimate(
     problem: ContactProblem,
     reference: ContactProblem,
     quantities: Mapping[str, Callable[[ContactProblem], ArrayLike]] | None = None,
+    *,
     share: float = 1.0,
 ) -> Estimate:
     """Estimate the discretisation's error of a problem's present state.  Collective.

@@ -29,6 +29,7 @@ def advance(
     problem: ContactProblem,
     programme: Callable[[float], object],
     points: Sequence[float],
+    *,
     start: float = 0.0,
     smallest: float = 1 / 64,
     history: History | None = None,

@@ -44,7 +44,7 @@ def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=Non
     """
     given, k = friction.given(), friction.exponent
     mu, p = (_coefficients(contact, name, given[name], state) for name in ("mu", "p"))
-    return Friction(mu, p, k, axes=_axes(contact, friction) if axes is None else axes)
+    return Friction(mu, p, k=k, axes=_axes(contact, friction) if axes is None else axes)
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:

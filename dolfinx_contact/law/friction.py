@@ -130,7 +130,7 @@ class Friction(Guarded):
     exponent: float | None
     _remedy = "it is immutable, make a new Friction."
 
-    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, k: float | None = None, *, axes: ArrayLike | Field | None = None, of: str = "body") -> None:  # fmt: skip
+    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, *, k: float | None = None, axes: ArrayLike | Field | None = None, of: str = "body") -> None:  # fmt: skip
         if p is not None and k is not None:
             raise ValueError(f"give p or k, not both (mu={mu!r}, p={p!r}, k={k!r})")
         if of not in OWNERS or (

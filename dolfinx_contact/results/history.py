@@ -54,6 +54,7 @@ class History:
         self,
         problem: ContactProblem,
         path: str | PathLike[str] | None = None,
+        *,
         points: ArrayLike = (),
         contact: int = 0,
         resume: int = 0,

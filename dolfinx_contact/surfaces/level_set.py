@@ -58,6 +58,7 @@ class RigidSurface(CurvedSurface):
     def __init__(
         self,
         distance: Callable[[np.ndarray], ArrayLike] | Expr,
+        *,
         point: ArrayLike = (0.0, 0.0, 0.0),
         gradient: Callable[[np.ndarray], ArrayLike] | None = None,
         axis: ArrayLike | None = None,

@@ -64,6 +64,7 @@ class RigidPlane(Surface):
         point: ArrayLike,
         normal: ArrayLike,
         axis: ArrayLike | None = None,
+        *,
         height: Callable[[np.ndarray], ArrayLike] | None = None,
     ) -> None:
         super().__init__(point)

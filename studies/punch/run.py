@@ -104,7 +104,7 @@ def compute(parameters, directory, points=(), bar=None, **mesh_options) -> str:
     else:
         _begin(punch, directory, settings)
     COMM.barrier()
-    history = dc.History(punch.problem, directory / "history.csv", positions, resume=done)
+    history = dc.History(punch.problem, directory / "history.csv", points=positions, resume=done)
     for number, displacement in enumerate(displacements[done:], start=done + 1):
         balance.open()
         punch.move_top(displacement)

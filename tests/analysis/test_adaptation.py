@@ -28,7 +28,7 @@ def punched(domain, order, scale=1.0, mu=0.0):
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, top), V)]
     face = under[np.abs(middles[:, 0]) < EDGE * scale]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(mu))
-    return dc.ContactProblem(F, u, contact, bcs)
+    return dc.ContactProblem(F, u, contact, bcs=bcs)
 
 
 def solved(domain, **options):

@@ -27,7 +27,7 @@ def pressed_box(domain, bottom, top, order, weight=0.0, mu=0.0):
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)]
     plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
     contact = dc.Contact(V, bottom, plane, dc.Friction(mu))
-    return dc.ContactProblem(F, u, contact, bcs, tol=1e-10)
+    return dc.ContactProblem(F, u, contact, bcs=bcs, tol=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -227,7 +227,7 @@ def slide(form, pieces):
         contacts.append(dc.Contact(V, face(0.0), plane, dc.Friction((0.3, 0.15))))
         tops.append((fem.Constant(domain, np.zeros(3)), a))
         bcs.append(fem.dirichletbc(tops[-1][0], fem.locate_dofs_topological(V, 2, face(1.0)), V))
-    problem = dc.ContactProblem(form(u, v, 1.0), u, contacts, bcs, tol=1e-11)
+    problem = dc.ContactProblem(form(u, v, 1.0), u, contacts, bcs=bcs, tol=1e-11)
     for t in (0.5, 1.0):
         for top, a in tops:
             top.value = (

@@ -225,7 +225,7 @@ def test_a_ball_in_a_block_of_tetrahedra(bulk):
     ball = dc.RigidSphere((0.5, 0.5, 0.9), 0.4, axis=(1, 0, 0))
     contact = dc.Contact(W, top, ball, dc.Friction(0.3))
     F = ufl.derivative(energy * dx, w, ufl.TestFunction(W))
-    problem = dc.ContactProblem(F, w, contact, [bc])
+    problem = dc.ContactProblem(F, w, contact, bcs=[bc])
     for depth in (0.03, 0.06, 0.09):
         ball.displacement = (0.0, 0.0, -depth)
         assert problem.solve().iterations <= 6
@@ -291,7 +291,7 @@ def test_sub_space_or_whole():
     facets, plane, law = scene.contact.facets, scene.contact.surface, dc.Friction(0.3)
     part = dc.Contact(scene.W.sub(0), facets, plane, law)
     np.testing.assert_array_equal(part.points.dofs, scene.contact.points.dofs)
-    with dc.ContactProblem(scene.F, scene.w, part, scene.problem.body.bcs) as problem:
+    with dc.ContactProblem(scene.F, scene.w, part, bcs=scene.problem.body.bcs) as problem:
         before = scene.press(*PUSHES[0])
         assert problem.solve().counts == before.counts
     np.testing.assert_allclose(part.reaction, scene.contact.reaction, rtol=1e-12, atol=1e-15)
@@ -299,7 +299,7 @@ def test_sub_space_or_whole():
         dc.Contact(scene.W.sub(1), facets, plane, law)
     alone = scene.W.sub(0).collapse()[0]
     with pytest.raises(ValueError, match="another space"):
-        dc.ContactProblem(scene.F, scene.w, dc.Contact(alone, facets, plane, law), [])
+        dc.ContactProblem(scene.F, scene.w, dc.Contact(alone, facets, plane, law), bcs=[])
 
 
 @pytest.mark.parametrize("simplex", [False, True])
@@ -343,11 +343,11 @@ def test_mixed_spaces_without_displacements_are_refused():
     (u, p), (v, q) = ufl.split(scene.w), ufl.split(ufl.TestFunction(scene.W))
     apart = (ufl.inner(ufl.grad(u), ufl.grad(v)) + q * p) * ufl.dx
     contact = dc.Contact(scene.W, scene.contact.facets, scene.contact.surface, dc.Friction(0.3))
-    problem = dc.ContactProblem(apart, scene.w, contact, scene.problem.body.bcs)
+    problem = dc.ContactProblem(apart, scene.w, contact, bcs=scene.problem.body.bcs)
     with pytest.raises(ValueError, match="act on displacements"):
         problem.solve()
     with pytest.raises(ValueError, match="dc.estimate does not know mixed spaces"):
         other = dc.Contact(scene.W, scene.contact.facets, scene.contact.surface, dc.Friction(0.3))
         dc.estimate(
-            scene.problem, dc.ContactProblem(scene.F, scene.w, other, scene.problem.body.bcs)
+            scene.problem, dc.ContactProblem(scene.F, scene.w, other, bcs=scene.problem.body.bcs)
         )

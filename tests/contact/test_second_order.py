@@ -48,7 +48,7 @@ def test_a_prism_of_first_order():
     u, v = fem.Function(V), ufl.TestFunction(V)
     held = fem.Constant(domain, np.array([0.0, 0.0, -1e-3]))
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, top), V)
-    dc.ContactProblem(elasticity(u, v, E, 0.0), u, contact, [bc], tol=1e-11).solve()
+    dc.ContactProblem(elasticity(u, v, E, 0.0), u, contact, bcs=[bc], tol=1e-11).solve()
     x, carried = V.tabulate_dof_coordinates(), np.zeros(len(V.tabulate_dof_coordinates()))
     for cell in cell_nodes(V):
         triangle = cell[np.isclose(x[cell, 2], 0)]
@@ -97,7 +97,7 @@ def line_contact(cells: int, crossed: bool, approach: float) -> np.ndarray:
         fem.dirichletbc(fem.Constant(domain, 0.0), fem.locate_dofs_topological(X, 1, axis), X),
     ]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
-    dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs, tol=1e-10).solve()
+    dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs=bcs, tol=1e-10).solve()
     x, force, area = along_face(contact, contact.reaction[:, 1], contact.area)
     total = 2 * force.sum()
     a = np.sqrt(
@@ -145,7 +145,9 @@ def uneven(solver=None, comm=COMM, degree=2, tol=1e-11):
     bcs.append(fem.dirichletbc(zero, dofs, X))
     plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), (1, 0, 0))
     contact = dc.Contact(V, bottom, plane, dc.Friction(MU, P))
-    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs, solver=solver, tol=tol)
+    problem = dc.ContactProblem(
+        elasticity(u, v, E, NU), u, contact, bcs=bcs, solver=solver, tol=tol
+    )
 
     def press(depth, along):
         held.value[:] = 0.2 * along, along, -depth

@@ -34,7 +34,9 @@ LAWS = {
 
 
 def problem_of(scene, solver=None, **options):
-    return dc.ContactProblem(scene.F, scene.u, scene.contacts, scene.bcs, solver=solver, **options)
+    return dc.ContactProblem(
+        scene.F, scene.u, scene.contacts, bcs=scene.bcs, solver=solver, **options
+    )
 
 
 def judged(scene, problem, way=WAY):
@@ -104,7 +106,7 @@ def cube(mus, solver=None, cells=(2, 3, 2), edges=(1.0, 2.0, 0.5)):
         held.append(value)
         plane = dc.RigidPlane(low, normals[k], np.eye(3)[(k + 1) % 3])
         contacts.append(dc.Contact(V, sides[0], plane, dc.Friction(mus[k])))
-    problem = dc.ContactProblem(F, u, contacts, bcs, solver=solver)
+    problem = dc.ContactProblem(F, u, contacts, bcs=bcs, solver=solver)
     return SimpleNamespace(V=V, u=u, F=F, bcs=bcs, held=held, contacts=contacts, problem=problem, mesh=domain)  # fmt: skip
 
 
@@ -194,7 +196,7 @@ def test_two_contacts_with_the_same_plane_carry_together_what_one_does(mu, solve
     for count in (1, 2):
         scene = scenes.block(cells=(3, 3, 2), mu=mu, p=None, solver=SOLVERS[solver])
         contacts = [dc.Contact(scene.V, scene.facets, scene.surface, dc.Friction(mu)) for _ in range(count)]  # fmt: skip
-        problem = dc.ContactProblem(scene.F, scene.u, contacts, scene.bcs, solver=SOLVERS[solver], tol=1e-10)  # fmt: skip
+        problem = dc.ContactProblem(scene.F, scene.u, contacts, bcs=scene.bcs, solver=SOLVERS[solver], tol=1e-10)  # fmt: skip
         for top in ((0, 0, -1e-3), (5e-4, 2e-4, -1e-3)):
             scene.move_top(*top)
             problem.solve()
@@ -211,7 +213,7 @@ def test_opposite_planes_hold_as_a_support_does(solver):
     scene = scenes.block(cells=(2, 2, 2), mu=0.0, p=None)
     normal = np.array([0.0, 0.0, 1.0])
     contacts = [dc.Contact(scene.V, scene.facets, dc.RigidPlane(np.zeros(3), way), dc.Friction(0.0)) for way in (normal, -normal)]  # fmt: skip
-    problem = dc.ContactProblem(scene.F, scene.u, contacts, scene.bcs, solver=SOLVERS[solver])
+    problem = dc.ContactProblem(scene.F, scene.u, contacts, bcs=scene.bcs, solver=SOLVERS[solver])
     carried = []
     for down in (1e-3, -1e-3):
         scene.move_top(0, 0, -down)
@@ -296,7 +298,7 @@ def test_contacts_that_share_no_node_have_no_nodal_problems():
     assert shared_nodes(scene.contacts[:1], step.stiffness[:1], problem.body.fixed) is None
     twice = scene.contacts[:1] * 2
     with pytest.raises(ValueError, match="same Contact twice"):
-        dc.ContactProblem(scene.F, scene.u, twice, scene.bcs)
+        dc.ContactProblem(scene.F, scene.u, twice, bcs=scene.bcs)
 
 
 @pytest.mark.parametrize("mu", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
@@ -377,7 +379,7 @@ def test_a_nonlinear_body_in_the_corner_of_a_box():
     """A body that is hardly nonlinear meets both laws and equilibrium of the linear one in every edge."""
     scene = cube([0.2, 0.0, 0.4])
     bent = scene.F + 1e-9 * ufl.inner(scene.u, scene.u) * ufl.inner(scene.u, ufl.TestFunction(scene.V)) * ufl.dx  # fmt: skip
-    problem = dc.ContactProblem(bent, scene.u, scene.contacts, scene.bcs)
+    problem = dc.ContactProblem(bent, scene.u, scene.contacts, bcs=scene.bcs)
     assert problem.body.nonlinear
     judge = CornerJudge(SimpleNamespace(V=scene.V, u=scene.u, F=scene.F, bcs=scene.bcs, contacts=scene.contacts, E=1e3, length=1.0,
                                         normals=list(np.eye(3)), mu=[0.2, 0.0, 0.4], p=[None] * 3, axes=None))  # fmt: skip

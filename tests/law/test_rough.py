@@ -30,7 +30,7 @@ def test_what_touches_a_rough_plane_is_glued(cells, solver):
     )
     stands = fem.Constant(glued.V.mesh, np.zeros(gdim))
     support = fem.dirichletbc(stands, fem.locate_dofs_topological(glued.V, gdim - 1, foot), glued.V)
-    linear = dc.ContactProblem(glued.F, glued.u, [], [*glued.bcs, support])
+    linear = dc.ContactProblem(glued.F, glued.u, [], bcs=[*glued.bcs, support])
     for k, (x, z) in enumerate(PROGRAMME):
         stands.value[0] = 1e-3 * k
         scene.surface.displacement = stands.value

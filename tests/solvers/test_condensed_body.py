@@ -144,8 +144,10 @@ def test_friction_per_node_where_ranks_have_no_contact_node(solver):
         nodes = scene.contact.x
         mu = np.column_stack((0.2 + 0.1 * nodes[:, 0], 0.3 + 0.2 * nodes[:, 1]))
         friction = dc.Friction(mu, p=(0.05, 0.20), axes=np.tile([0.6, 0.8], (len(mu), 1)))
-        contact = dc.Contact(scene.V, scene.facets, scene.surface, friction, dc.Wear(1e-4))
-        problem = dc.ContactProblem(scene.F, scene.u, [contact], scene.bcs, None, solver(), 1e-11)
+        contact = dc.Contact(scene.V, scene.facets, scene.surface, friction, wear=dc.Wear(1e-4))
+        problem = dc.ContactProblem(
+            scene.F, scene.u, [contact], bcs=scene.bcs, J=None, solver=solver(), tol=1e-11
+        )
         for top in ((0.001, 0.0, -0.01), (0.004, 0.002, -0.01)):
             scene.move_top(*top)
             problem.solve()

@@ -240,7 +240,7 @@ def test_contacts_far_apart_that_are_not_solved():
         for fallbacks, of in warned.items():
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                found = solve_condensed(W, q, 5.0, CondensedNewton(fallbacks=fallbacks))
+                found = solve_condensed(W, q, 5.0, solver=CondensedNewton(fallbacks=fallbacks))
             assert max(found.error, found.slip_error) <= TOL
             said = any("local_error" in str(warning.message) for warning in caught)
             assert said == (found.local_error > np.sqrt(TOL))

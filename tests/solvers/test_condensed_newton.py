@@ -196,7 +196,9 @@ def test_coefficients_far_apart_in_a_contact():
         A = rng.normal(size=(3 * n, 3 * n))
         W = A @ A.T / (3 * n) + 1e-3 * np.eye(3 * n)
         mu, q = 10 ** rng.uniform(-3, 3, size=(n, 2)), rng.normal(size=(n, 3))
-        r = solve_condensed(W, q, Friction(mu), CondensedNewton(max_iterations=20_000)).reaction
+        r = solve_condensed(
+            W, q, Friction(mu), solver=CondensedNewton(max_iterations=20_000)
+        ).reaction
         w = q + (W @ r.ravel()).reshape(n, 3)
         small, force = 1e-6 * np.abs(q).max(), 1e-6 * np.abs(r).max()
         assert (w[:, 2] >= -small).all() and (r[:, 2] >= 0).all()
@@ -270,7 +272,7 @@ def test_a_refusal_takes_few_times_a_solution():
             assert failure.best.iterations <= 60 * np.median(usual)
             patient = CondensedNewton(max_iterations=2 * failure.best.iterations)
             with pytest.raises(CondensedNotConverged, match="max_iterations") as again:
-                solve_condensed(scene.W, scene.q, friction(scene), patient)
+                solve_condensed(scene.W, scene.q, friction(scene), solver=patient)
             assert again.value.best.iterations > failure.best.iterations
     assert refused >= 2
 
@@ -279,7 +281,7 @@ def test_caps():
     """A cap on iterations or seconds ends the search with an exception."""
     scene = random_problem(9, contacts=12, rank=36, mu_range=(1, 5), ratio=100)
     with pytest.raises(CondensedNotConverged):
-        solve_condensed(scene.W, scene.q, friction(scene), CondensedNewton(max_iterations=1))
+        solve_condensed(scene.W, scene.q, friction(scene), solver=CondensedNewton(max_iterations=1))
     with pytest.raises(CondensedNotConverged):
         solve_condensed(scene.W, scene.q, friction(scene), max_seconds=1e-9)
 

@@ -262,10 +262,10 @@ def test_nodes_held_along_the_normal_are_left_out():
         UserWarning,
         match=r"4 of 16 contact nodes, between \(-0.5, -0.5, 0\) and \(-0.5, 0.5, 0\), are left out",
     ) as said:
-        problems = [dc.ContactProblem(*arguments, tol=1e-10)]
+        problems = [dc.ContactProblem(*arguments[:3], bcs=arguments[3], tol=1e-10)]
     assert len(said) == 1
     part, arguments = build(False)
-    problems.append(dc.ContactProblem(*arguments, tol=1e-10))
+    problems.append(dc.ContactProblem(*arguments[:3], bcs=arguments[3], tol=1e-10))
     for scene, problem in zip((whole, part), problems):
         for solver in (dc.FixedPoint(), dc.CondensedNewton()):
             problem.reset()

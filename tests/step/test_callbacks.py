@@ -42,7 +42,7 @@ def made(at, error=OSError):
         contact = dc.Contact(V, facets, surface or scene.surface, dc.Friction(0.3))
         F, J = scene.F, ufl.derivative(scene.F, scene.u, ufl.TrialFunction(V))
         functions = {} if at == "distance" else {at: call}
-        scene.problem = dc.ContactProblem(F, scene.u, contact, scene.bcs, J, **functions)
+        scene.problem = dc.ContactProblem(F, scene.u, contact, bcs=scene.bcs, J=J, **functions)
         scene.contact = contact
     if at == "mu":
         scene.contact.friction = dc.Friction(mu)

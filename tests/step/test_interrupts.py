@@ -63,7 +63,7 @@ def test_an_interrupt_ends_the_condensed_solver():
     )
     start = perf_counter()
     with interrupted(1.0):
-        dc.solve_condensed(W, q, friction, solver)
+        dc.solve_condensed(W, q, friction, solver=solver)
     assert (
         perf_counter() - start < 25.0
     )  # 0.04 s after the second, on a machine with nothing else to do

@@ -99,7 +99,7 @@ def block(
         F = F - ufl.inner(weight, v) * ufl.dx
     plane = dc.RigidPlane((0, 0), (0, 1))
     contact = dc.Contact(W, bottom, plane, dc.Friction(mu))
-    problem = dc.ContactProblem(F, w, contact, [bc for bc, _ in bcs], solver=solver, tol=tol, **options)  # fmt: skip
+    problem = dc.ContactProblem(F, w, contact, bcs=[bc for bc, _ in bcs], solver=solver, tol=tol, **options)  # fmt: skip
 
     def press(*share):
         values = bcs[0][1].x.array

@@ -101,7 +101,7 @@ def even_block(cell, slips, tilted, curved=False, distorted=True, comm=COMM):
 def solved(block, F, u, bc, **options):
     """``block`` with its problem, contact, Function and the one step that ends in its state."""
     contact = block.contact(u.function_space)
-    problem = dc.ContactProblem(F, u, contact, [bc], **options)
+    problem = dc.ContactProblem(F, u, contact, bcs=[bc], **options)
     made = dict(V=u.function_space, u=u, contact=contact, problem=problem)
     return SimpleNamespace(**vars(block) | made, step=problem.solve())
 

@@ -63,7 +63,7 @@ def between_planes(F, u, sides, bcs, mu, tol):
         normal[1] = -side
         plane = dc.RigidPlane(-normal, normal, axis if gdim == 3 else None)
         contacts.append(dc.Contact(V, mine, plane, dc.Friction((mu, mu))))
-    problem = dc.ContactProblem(F, u, contacts, bcs, tol=tol)
+    problem = dc.ContactProblem(F, u, contacts, bcs=bcs, tol=tol)
 
     def press(depth):
         for contact in contacts:

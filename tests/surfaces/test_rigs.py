@@ -186,7 +186,7 @@ def test_a_platen_finds_a_foot_that_is_flat_to_rounding(weight):
     """One node of it is drawn a last digit below the plane: the others are touched all the same, and carry the weight."""
     rig = build_rig(weight=weight, free=("n", "r1", "r2"))
     asked = rig.apply(Load())
-    step = dc.ContactProblem(rig.F, rig.u, [rig.contact], rig.bcs).solve()
+    step = dc.ContactProblem(rig.F, rig.u, [rig.contact], bcs=rig.bcs).solve()
     assert rig.contact.force()[2] == pytest.approx(asked.force[2], rel=1e-9)
     assert rig.contact.moment()[:2] == pytest.approx([0, 0], abs=1e-9 * asked.force[2])
     assert step.counts.open == 0

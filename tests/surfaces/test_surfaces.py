@@ -87,9 +87,9 @@ def by_distance(ball, gradient=True):
 
     found = dc.RigidSurface(
         lambda y: (np.linalg.norm(arms(y), axis=0) - ball.radius) / 2,
-        ball.point,
-        slopes if gradient else None,
-        ball.axis,
+        point=ball.point,
+        gradient=slopes if gradient else None,
+        axis=ball.axis,
     )
     vars(found).update(radius=ball.radius, inside=False)
     return found
@@ -106,7 +106,9 @@ def by_expression(ball):
     """A ball given in UFL by half its distance, with a radius that may be changed."""
     domain, x = coordinates(ball.point.size)
     arm, radius = x - ufl.as_vector(ball.point), fem.Constant(domain, ball.radius)
-    found = dc.RigidSurface((ufl.sqrt(ufl.dot(arm, arm)) - radius) / 2, ball.point, axis=ball.axis)
+    found = dc.RigidSurface(
+        (ufl.sqrt(ufl.dot(arm, arm)) - radius) / 2, point=ball.point, axis=ball.axis
+    )
     vars(found).update(radius=ball.radius, inside=False, size=radius)
     return found
 
@@ -222,7 +224,7 @@ def test_a_sphere_that_turns_about_its_centre_leaves_last_reactions(k):
 def test_half_a_block_carries_half_the_force(solver):
     """A plane of symmetry holds a tangential direction of contact nodes, at every step anew."""
     rows = [
-        block(dc.RigidSphere((0, 0, -3.0), 3.0, (1, 0, 0)), (0.3, 0.15), cells=cells, half=half, solver=solver)
+        block(dc.RigidSphere((0, 0, -3.0), 3.0, axis=(1, 0, 0)), (0.3, 0.15), cells=cells, half=half, solver=solver)
         for half, cells in ((False, [4, 4, 2]), (True, [4, 2, 2]))
     ]  # fmt: skip
     for slide in (0.0, 0.02, 0.1, 0.05):
@@ -299,7 +301,8 @@ def test_a_large_sphere_is_a_plane(d, solver):
     mu, p = (0.3, None) if d == 2 else ((0.3, 0.15), (0.05, 0.2))
     flat = dc.RigidPlane(np.zeros(d), np.append(np.zeros(d - 1), 1.0), axis)
     rows = [
-        block(surface, mu, p, solver=solver) for surface in (flat, dc.RigidSphere(foot, 1e5, axis))
+        block(surface, mu, p, solver=solver)
+        for surface in (flat, dc.RigidSphere(foot, 1e5, axis=axis))
     ]
     for slide, depth in ((0.0, 0.02), (0.003, 0.02), (0.02, 0.02), (0.01, 0.015)):
         for scene in rows:
@@ -377,7 +380,7 @@ def test_grooves_as_directions_in_space():
     """Directions of friction given in space are projected on the tangent planes, as the axis of a sphere is."""
     along, found = np.array([0.6, 0.8, 0.1]), []
     for axis, axes in ((along, None), ((1, 0, 0), lambda x: np.outer(along, np.ones(x.shape[1])))):
-        scene = block(dc.RigidSphere((0, 0, -3.0), 3.0, axis), cells=[3, 3, 2])
+        scene = block(dc.RigidSphere((0, 0, -3.0), 3.0, axis=axis), cells=[3, 3, 2])
         scene.contact.friction = dc.Friction((0.4, 0.1), axes=axes)
         for slide in (0.0, 0.1):
             scene.step(slide, 0, -0.06)
@@ -433,12 +436,12 @@ def test_steps_back_and_files(kind, tmp_path):
 
     def make():
         if kind == "sphere":
-            return dc.RigidSphere((0, 0, -3.0), 3.0, (1, 0, 0))
+            return dc.RigidSphere((0, 0, -3.0), 3.0, axis=(1, 0, 0))
         return dc.RigidPlane(
             (0, 0, 0),
             (0, 0, 1),
             (1, 0, 0),
-            (lambda y: 1e-3 * y[0] ** 2) if kind[0] == "w" else None,
+            height=(lambda y: 1e-3 * y[0] ** 2) if kind[0] == "w" else None,
         )
 
     def stop(*_):
@@ -549,9 +552,11 @@ def test_a_gradient_that_is_none_of_the_distance_is_refused(d, wrong):
 
     point = np.zeros(d)
     with pytest.raises(ValueError, match=r"gradient of RigidSurface is \[.*\] at \[.*differences of distance are \[.*, (3.0|2.99)"):  # fmt: skip
-        block(dc.RigidSurface(distance, point, lambda y: wrong(gradient(y))))
-    block(dc.RigidSurface(distance, point, gradient))
-    rough = dc.RigidSurface(lambda y: distance(y).astype(np.float32), point, gradient)
+        block(dc.RigidSurface(distance, point=point, gradient=lambda y: wrong(gradient(y))))
+    block(dc.RigidSurface(distance, point=point, gradient=gradient))
+    rough = dc.RigidSurface(
+        lambda y: distance(y).astype(np.float32), point=point, gradient=gradient
+    )
     block(rough)
 
 
@@ -563,7 +568,7 @@ def test_a_gradient_may_be_that_of_either_side_of_an_edge():
             side = np.where(np.abs(y[0]) < 1e-9, slope / 0.5, np.sign(y[0]))
             return np.array([0.5 * side, np.ones_like(side)])
 
-        roof = dc.RigidSurface(lambda y: y[1] + 0.5 * np.abs(y[0]), (0, 0), gradient)
+        roof = dc.RigidSurface(lambda y: y[1] + 0.5 * np.abs(y[0]), point=(0, 0), gradient=gradient)
         if fits:
             block(roof)
         else:

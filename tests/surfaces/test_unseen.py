@@ -72,7 +72,7 @@ def on_waves(cells, crests, part=0.25):
     bcs = [fem.dirichletbc(np.zeros(2), fem.locate_dofs_topological(V, 1, top), V)]
     bcs += [clamp(V, 0, lambda x, s=s: np.isclose(x[0], s)) for s in (-0.5, 0.5)]
     contact = dc.Contact(V, foot, plane, dc.Friction(0.0))
-    problem = dc.ContactProblem(elasticity(u, v, E, 0.0), u, contact, bcs)
+    problem = dc.ContactProblem(elasticity(u, v, E, 0.0), u, contact, bcs=bcs)
     plane.free, plane.force = ("n",), (0, part * np.pi * E * height / length)
     return SimpleNamespace(problem=problem, contact=contact)
 
@@ -118,7 +118,7 @@ def ring(order, curved, interference, cells=(2, 12), uneven=0.0):
     u, v = fem.Function(V), ufl.TestFunction(V)
     shaft = dc.RigidSphere((0, 0), INNER + interference)
     contact = dc.Contact(V, inside, shaft, dc.Friction(0.0))
-    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs=bcs)
     A, B = np.linalg.solve([[1.0, 1.0], [INNER, 1 / INNER]], [0.0, interference])
     G = E / (2 * (1 + NU))
     pressure = -2 * G * (A / (1 - 2 * NU) - B / INNER**2)
@@ -163,7 +163,7 @@ def test_a_blunt_edge_is_not_round(d):
     for normal in (np.eye(d)[-1], np.array([np.sin(np.deg2rad(10)), *np.zeros(d - 2), np.cos(np.deg2rad(10))])):  # fmt: skip
         plane = dc.RigidPlane(0.5 * np.eye(d)[0], normal)
         contact = dc.Contact(V, foot, plane, 0.0)
-        problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+        problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs=bcs)
         problem.solve()
         assert np.linalg.norm(contact.force()) > 0.0
 
@@ -256,7 +256,7 @@ def test_a_beam_bent_by_many_times_its_thickness_is_not_strained_much():
     u, v = fem.Function(V), ufl.TestFunction(V)
     bcs = [fem.dirichletbc(np.zeros(2), fem.locate_dofs_topological(V, 1, end), V)]
     contact = dc.Contact(V, foot, plane, 0.0)
-    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs)
+    problem = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs=bcs)
     plane.displacement = (0, 0.1)
     problem.solve()
     assert problem.body.largest(np.abs(u.x.array)) > 4 * 0.02

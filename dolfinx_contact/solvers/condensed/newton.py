@@ -143,6 +143,7 @@ def solve_condensed(
     W: Any,
     q: ArrayLike,
     friction: Friction | float | ArrayLike,
+    *,
     solver: CondensedNewton | None = None,
     tol: float = 1e-8,
     r0: ArrayLike | None = None,
