@@ -64,14 +64,12 @@ def converge(
 ) -> Converged:
     """Refine meshes and halve increments until the estimated error of a number is small enough.  Collective.
 
-    On every mesh but the last in use the increments are halved first, where it costs least.  The estimates:
+    On every mesh but the last in use the increments are halved first, where it costs least.  The estimates, which are no bounds:
 
     - increments: twice the change that halving them makes on the mesh before, which is their error if it falls with the first order;
     - mesh: the change from the mesh before, over ``s - 1``, where ``s`` is the factor by which changes shrank last, but 2 at
       least and 4 at most.  With cells of half the size ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226
       (1927) 299).  With two meshes s = 2.  From mesh to mesh the estimate falls to an eighth at most, since two values may agree by chance.
-
-    Estimates, no bounds.
 
     Args:
         compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that takes the programme with every
