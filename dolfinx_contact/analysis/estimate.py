@@ -117,8 +117,7 @@ def estimate(
         >>> U = fem.Function(W)
         >>> finer_F = ufl.replace(F, {u: U, v: ufl.TestFunction(W)})
         >>> finer_bc = fem.dirichletbc(held, fem.locate_dofs_topological(W, 2, head), W)
-        >>> finer_contact = dc.Contact(W, foot, plane, friction)
-        >>> finer = dc.ContactProblem(finer_F, U, [finer_contact], bcs=[finer_bc])
+        >>> finer = dc.ContactProblem(finer_F, U, dc.Contact(W, foot, plane, friction), bcs=[finer_bc])
         >>> step = finer.solve()  # and all other steps of the programme
         >>> off = dc.estimate(problem, finer)["normal_force"].relative
     """
