@@ -304,7 +304,8 @@ class ContactProblem(Guarded):
         """
         body, here = self.body, self._states.last if at is None else at
         assembled = body.refresh(self._states.last)
-        if any(contact.surface.free and contact.surface.curved for contact in self.contacts):
+        driven = [contact for contact in self.contacts if contact.surface.free]
+        if any(contact.surface.curved for contact in driven):
             from dolfinx_contact.surfaces.driven import approach
 
             approach(body, self.contacts, here)
@@ -318,13 +319,14 @@ class ContactProblem(Guarded):
         b, external = body.load()
         last, before = self._states.last, self._states.before
         starts = [body.taken(self.u.x.array), 2 * last - before] if at is None else [at]
-        if holding is None and any(contact.surface.free for contact in self.contacts):
+        if holding is None and driven:
             from dolfinx_contact.surfaces.held import held_surfaces
 
             holding = held_surfaces(body, self.contacts, last, b)
-        if self._present_freedom() != self._freedom:
+        freedom = self._present_freedom()
+        if freedom != self._freedom:
             self._unbind()
-            self._freedom = self._present_freedom()
+            self._freedom = freedom
         kind = NonlinearStep if body.nonlinear else LoadStep
         given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
         return kind(body, self.contacts, *given)

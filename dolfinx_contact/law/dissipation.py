@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, split
 
 
 def work_of_friction(
@@ -47,15 +47,15 @@ def work_of_friction(
     """
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
-    way, e1 = _split(friction.along_axes(slip_increment))
-    _, s1 = _split(Q**2 * mu * e1)  # M^-1 P^2 e1
+    way, e1 = split(friction.along_axes(slip_increment))
+    _, s1 = split(Q**2 * mu * e1)  # M^-1 P^2 e1
     per_way = mu * e1 * s1
 
     if law_before in (None, friction):
         s0, e0 = _of_force(mu, Q, friction.along_axes(before[:, :-1]))
     else:
         e0 = friction.along_axes(-law_before.against_slip(before[:, :-1]))
-        _, s0 = _split(Q**2 * mu * e0)
+        _, s0 = split(Q**2 * mu * e0)
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
     per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
@@ -67,12 +67,6 @@ def _of_force(mu, Q, force) -> tuple[np.ndarray, np.ndarray]:
     slippery = mu == 0
     M, P = (np.where(slippery, 1.0, a) for a in (mu, Q * mu))
     M, P = (a / a.min(axis=-1, keepdims=True) for a in (M, P))  # directions only: no overflow
-    _, s = _split(np.where(slippery, 0.0, -force) / M)
-    _, e = _split(s * M / P**2)
+    _, s = split(np.where(slippery, 0.0, -force) / M)
+    _, e = split(s * M / P**2)
     return s, e
-
-
-def _split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero ones stay zero."""
-    length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
-    return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)

@@ -233,15 +233,11 @@ class Friction(Guarded):
             The same shape, dimensionless; zero where ``r_t`` or ``mu`` is.
         """
         p = self.p[..., : r_t.shape[1]]
-        largest = np.abs(r_t).max(axis=1, keepdims=True, initial=0.0)
-        unit = np.divide(r_t, largest, out=np.zeros_like(r_t), where=largest > 0)
-        unit = self.along_axes(unit)
         smallest = p.min(axis=-1, keepdims=True)
         softness = np.divide(smallest, p, out=np.zeros_like(p), where=p > 0) ** 2
-        along = softness * unit
-        along = self._from_axes(along)
-        length = np.linalg.norm(along, axis=1, keepdims=True)
-        return np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+        _, unit = split(r_t)
+        _, against = split(softness * self.along_axes(unit))
+        return self._from_axes(against)
 
     def drag(self, slip: np.ndarray) -> np.ndarray:
         """Friction ``P^2 s / |M^-1 P^2 s|`` of unit normal reaction that slip ``s`` meets: ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
@@ -274,12 +270,9 @@ class Friction(Guarded):
 
     def _resisted(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unit vector and length of ``M^-1 P^2 slip``, the latter up to a factor, along the principal directions."""
-        largest = np.abs(slip).max(axis=1, keepdims=True, initial=0.0)
-        unit = np.divide(slip, largest, out=np.zeros_like(slip), where=largest > 0)
-        resisted = self._softness(slip.shape[1]) * self.along_axes(unit)
-        length = np.linalg.norm(resisted, axis=1, keepdims=True)
-        unit = np.divide(resisted, length, out=np.zeros_like(resisted), where=length > 0)
-        return unit, largest * length
+        length, unit = split(slip)
+        factor, resisted = split(self._softness(slip.shape[1]) * self.along_axes(unit))
+        return resisted, length * factor
 
     def _softness(self, T: int) -> np.ndarray:
         """Diagonal of ``M^-1 P^2``, largest entry 1, ``shape=(T,)`` or ``(n, T)``; zero without friction."""
@@ -364,3 +357,9 @@ def as_friction(friction: Any) -> Any:
 def is_field(value) -> bool:
     """Whether a value is a callable of positions or a DOLFINx Function."""
     return callable(value) or hasattr(value, "function_space")
+
+
+def split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero ones stay zero."""
+    length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
+    return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)

@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.contact.state import Status
+from dolfinx_contact.contact.state import State, Status
 
 EPSILON = np.finfo(float).eps / 2  # of one operation
 
@@ -91,24 +91,25 @@ def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...
     Returns:
         ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
     """
-    projected, _ = contact.law.bipotential_map(
-        contact.reaction, contact.gap, _felt(contact), stiffness.normal
-    )
-    penetration = stiffness.normal * np.maximum(-contact.gap, 0.0)
-    slip = np.einsum("nij,nj->ni", stiffness.tangential, contact.slip_residual)
-    return contact.reaction - projected, penetration, slip
+    state, law = contact.present, contact.law
+    felt = _felt(state, contact.friction)
+    projected, _ = law.bipotential_map(state.reaction, state.gap, felt, stiffness.normal)
+    penetration = stiffness.normal * np.maximum(-state.gap, 0.0)
+    defect = law.slip_defect(state.reaction, state.slip_increment, state.status)
+    slip = np.einsum("nij,nj->ni", stiffness.tangential, defect)
+    return state.reaction - projected, penetration, slip
 
 
-def _felt(contact) -> np.ndarray:
+def _felt(state: State, friction) -> np.ndarray:
     """Slips as the law's residual has them, ``shape=(n, gdim - 1)``: of nodes that stick over mu, where it exceeds 1.
 
     The residual has ``kappa mu |Delta u_t|``.  Where the law asks for no slip, what there is counts by the force that it makes,
     not mu times.
     """
-    slip, mu = contact.slip_increment, contact.friction.mu.max(axis=-1, initial=0.0)
+    slip, mu = state.slip_increment, friction.mu.max(axis=-1, initial=0.0)
     if not (mu > 1.0).any():
         return slip
-    sticks = contact.status == int(Status.STICK)
+    sticks = state.status == int(Status.STICK)
     return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
 
 

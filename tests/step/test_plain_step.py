@@ -13,6 +13,7 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts programs
 SPECIAL = {
     "surfaces.drive", "surfaces.driven", "surfaces.held", "surfaces.balance", "surfaces.sliding", "surfaces.round",
     "contact.shared", "contact.nodal", "bodies.unknowns", "bodies.internal_variables", "step.loose", "step.statics",
+    "solvers.condensed.surfaces",
 }  # fmt: skip
 
 # Two steps of a block; with an argument its plane is driven by force. Prints what was imported and what was run.

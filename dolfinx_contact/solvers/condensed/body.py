@@ -23,7 +23,6 @@ from dolfinx_contact.solvers.condensed.compliance import (
 )
 from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
-from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
 from dolfinx_contact.solvers.newton.contact_tangent import next_change
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
@@ -78,8 +77,9 @@ class CondensedBody:
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
         normal = self.gather(np.concatenate([of.normal for of in stiffness]))
-        self._surfaces = CondensedSurfaces(body, contacts, self._turns, normal)
-        self._tied = anchored.size + self._surfaces.tied
+        self._surfaces = self._condensed_surfaces(normal)
+        driven = 0 if self._surfaces is None else self._surfaces.tied
+        self._tied = anchored.size + driven
         check_memory(self.comm, bytes_needed(self.nodes, self.dim, body.K.getSize()[0]))
         W, (prescribed, blocks) = self.compliance(), self._prescribed()
         a = anchored.gather(body.anchors.stiffness if body.anchors else np.zeros(0))
@@ -95,14 +95,32 @@ class CondensedBody:
                 for rows, block in zip(prescribed, blocks):
                     W[np.ix_(rows, rows)] += RIGID * usual * block
                 tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
-                W = self._surfaces.border(W, size)
+                if self._surfaces is not None:
+                    W = self._surfaces.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
                 self.operator.prepare()  # pays after some ten iterations
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
         self._scales = self._gathered_stiffness(stiffness) | {
-            "tied_stiffness": np.append(a, np.ones(self._surfaces.tied))
+            "tied_stiffness": np.append(a, np.ones(driven))
         }
+
+    def _condensed_surfaces(self, normal: np.ndarray):
+        """Surfaces that force drives, None where there are none.  Collective."""
+        if not any(contact.surface.motions for contact in self._contacts):
+            return None
+        from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
+
+        return CondensedSurfaces(self._body, self._contacts, self._turns, normal)
+
+    def _move_surfaces(self, step, force: np.ndarray) -> None:
+        """Let surfaces that force drives be where forces of all rows have them."""
+        if self._surfaces is not None:
+            self._surfaces.move(step, force)
+
+    def _driving(self, step) -> np.ndarray:
+        """Forces that drive the surfaces of the tied rows at present."""
+        return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step)
 
     def destroy(self) -> None:
         """Nothing to free: the body owns the factorisation."""
@@ -137,7 +155,8 @@ class CondensedBody:
     def _begin(self, step) -> np.ndarray:
         """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
-        self._surfaces.begin(step, free)
+        if self._surfaces is not None:
+            self._surfaces.begin(step, free)
         if self._guided:
             for contact in self._contacts:
                 contact.move(free)
@@ -173,7 +192,7 @@ class CondensedBody:
                 iterations += result.iterations
                 force = placed + np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
-                self._surfaces.move(step, force)
+                self._move_surfaces(step, force)
                 if self._shared:
                     self._tell_shares(result.reaction)
                 error = step.measure(x).largest
@@ -195,12 +214,12 @@ class CondensedBody:
             left = step.b + self._nodal(force) - self._held_by.multiply(x)
             left[self._body.fixed] = 0.0
             base, known, starts = x + held(left), force, [force]
-            self._surfaces.move(step, force)
+            self._move_surfaces(step, force)
             anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
-            moved = (result.displacement.ravel(), anchored, self._surfaces.driving(step))
+            moved = (result.displacement.ravel(), anchored, self._driving(step))
             rounding = rounding + self._motion(step, base) - np.concatenate(moved)
         x, force, result, change = best
-        self._surfaces.move(step, force)
+        self._move_surfaces(step, force)
         forward = max(change, step.measure(x).largest)
         if fallbacks or forward <= step.tol:  # else another search follows, from the same steps
             self.past.append((rows, force, self._tied))
@@ -281,7 +300,7 @@ class CondensedBody:
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
         held = anchored.of(displacement)
-        return np.concatenate((nodes.gather(local), held, self._surfaces.driving(step)))
+        return np.concatenate((nodes.gather(local), held, self._driving(step)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Displacement of owned dofs with more forces of all rows than ``base`` has."""
@@ -319,10 +338,14 @@ class CondensedBody:
         last = past[-1]
         before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
         starts = [last[1], 2 * last[1] - before]
-        if self._surfaces.tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
+        tied = 0 if self._surfaces is None else self._surfaces.tied
+        if tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
             starts.append(q[-1] / last[0][-1] * last[1])
-        scale = np.abs(q[: q.size - self._surfaces.tied]).max()
-        distances = self._surfaces.distances([other for other, _ in past], q)
+        scale, others = np.abs(q[: q.size - tied]).max(), np.array([other for other, _ in past])
+        if tied:
+            distances = self._surfaces.distances(others, q)
+        else:
+            distances = np.abs(others - q).max(axis=1)
         similar = int(np.argmin(distances))
         if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
             starts.append(past[similar][1])

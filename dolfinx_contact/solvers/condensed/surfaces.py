@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfinx_contact.surfaces.surface import driven_surfaces
+from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 
 class CondensedSurfaces:
@@ -26,10 +26,7 @@ class CondensedSurfaces:
     """
 
     def __init__(self, body, contacts, turns: np.ndarray, stiffness: np.ndarray):
-        surfaces = driven_surfaces(body, contacts)
-        self.tied, self._surfaces = 0, surfaces
-        if surfaces is None:
-            return
+        surfaces = DrivenSurfaces(body, contacts)
         self._stiff = surfaces.springs > stiffness.max()
         self._stiffest, self._springs = float(stiffness.max()), surfaces.springs
         both = [_past_held(contact, axes) for contact, axes in zip(contacts, surfaces.axes)]
@@ -45,8 +42,6 @@ class CondensedSurfaces:
             W: Compliance, length per force.
             nodal: How many of its rows are of nodes.
         """
-        if self._surfaces is None:
-            return W
         stiff, loose, size = self._stiff, ~self._stiff, len(W)
         W[:nodal, :nodal] += self._axes[:, stiff] / self._springs[stiff] @ self._pulled[:, stiff].T
         bordered = np.zeros((size + self.tied,) * 2)
@@ -62,33 +57,29 @@ class CondensedSurfaces:
         Args:
             free: Displacement of owned degrees of freedom without reactions.
         """
-        if step.surfaces is not None:
-            step.surfaces.move_to(np.zeros(step.surfaces.count))
-            step.surfaces.move_to(step.surfaces.at_rest(self._stiffest))
-            step.surfaces.touch(free)
-            self._at_first = step.surfaces.moved
+        step.surfaces.move_to(np.zeros(step.surfaces.count))
+        step.surfaces.move_to(step.surfaces.at_rest(self._stiffest))
+        step.surfaces.touch(free)
+        self._at_first = step.surfaces.moved
 
     def move(self, step, force: np.ndarray) -> None:
         """Move the planes where forces of all rows have them, the tied rows' last."""
-        if step.surfaces is not None:
-            moved, stiff = np.zeros(step.surfaces.count), self._stiff
-            moved[~stiff] = force[len(force) - self.tied :]
-            reactions = force[: len(self._axes)]
-            moved[stiff] = -(reactions @ self._pulled[:, stiff]) / self._springs[stiff]
-            step.surfaces.move_to(self._at_first + moved)
+        moved, stiff = np.zeros(step.surfaces.count), self._stiff
+        moved[~stiff] = force[len(force) - self.tied :]
+        reactions = force[: len(self._axes)]
+        moved[stiff] = -(reactions @ self._pulled[:, stiff]) / self._springs[stiff]
+        step.surfaces.move_to(self._at_first + moved)
 
-    def distances(self, others: list[np.ndarray], q: np.ndarray) -> np.ndarray:
+    def distances(self, others: np.ndarray, q: np.ndarray) -> np.ndarray:
         """How far steps are from that of ``q``, length units; forces that drive planes count by their part of the largest."""
-        apart = np.abs(np.array(others) - q)
-        if self.tied:
-            lengths, forces = q[: -self.tied], q[-self.tied :]
-            largest = np.abs(forces).max() or 1.0
-            apart[:, -self.tied :] *= np.abs(lengths).max() / largest
+        apart, lengths, forces = np.abs(others - q), q[: -self.tied], q[-self.tied :]
+        largest = np.abs(forces).max() or 1.0
+        apart[:, -self.tied :] *= np.abs(lengths).max() / largest
         return apart.max(axis=1)
 
     def driving(self, step) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
-        return np.zeros(0) if step.surfaces is None else step.surfaces.driving()[~self._stiff]
+        return step.surfaces.driving()[~self._stiff]
 
 
 def _turned(turns: np.ndarray, axes) -> np.ndarray:
