@@ -156,6 +156,11 @@ class Contact(Guarded):
     def _digest(self) -> bytes:
         return hashlib.blake2b(np.ascontiguousarray(self.V.mesh.geometry.x)).digest()
 
+    @property
+    def plane(self) -> Surface:
+        """``surface``, as scripts call it whose surface is a plane."""
+        return self.surface
+
     # -- laws ----------------------------------------------------------------------------------
 
     @property

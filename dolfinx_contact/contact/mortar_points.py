@@ -17,9 +17,12 @@ from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
 from dolfinx_contact.contact.mortar import Rows, Side, rows_of
 from dolfinx_contact.contact.placement import Placed, Placement
+from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
+
+STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
 AXIS = 1e-8  # part of an axis along the surface, of a direction that is none
 
@@ -64,6 +67,12 @@ class MortarPlacement(Placement):
         part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
         return np.where(rows.covered, part, 0.0)
 
+    def strayed(self, state: State) -> tuple[float, float]:
+        """See ``Placement``: from the opposite point of the undeformed state, and half of the smallest facet."""
+        slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
+        slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
+        return float(slid), STRAYED * self._opposite.smallest
+
     def follows(self, wanders: bool) -> bool:
         """Never: sliding is small."""
         return False
@@ -85,6 +94,7 @@ class Opposite:
     Attributes:
         sides: Their facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
+        smallest: The shortest edge of a facet.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
         x: Where they are, ``shape=(m, gdim)``.
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
@@ -96,6 +106,10 @@ class Opposite:
         self.x = np.zeros((self.numbers.size, of.dim))
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
+        ends = [side.x[:, side.corners] for side in sides]
+        self.smallest = min(
+            np.linalg.norm(x[:, 1] - x[:, 0], axis=1).min(initial=np.inf) for x in ends
+        )
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
         index_map, count = of.V.dofmap.index_map, of.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
@@ -214,7 +228,8 @@ class MortarPoints(ContactPoints):
             (self.count * k, self.dofs.size),
         )
         own = np.linalg.norm(turns @ self.frames * free[self.dofs][:, None, :], axis=2)
-        own = np.where(own < FREE, 0.0, 1.0).ravel()  # held: then what opposite nodes do is carried
+        out = (own < FREE) | self.closed[:, None]  # held: then what opposite nodes do is carried
+        own = np.where(out, 0.0, 1.0).ravel()
         return (sparse.diags(own) @ turned @ B).tocsr()
 
     def stiffness(self, K) -> NodalStiffness:

@@ -138,6 +138,10 @@ class Placement:
         """This rank's nodes on the other side, local indices."""
         return np.zeros(0, dtype=int)
 
+    def strayed(self, state: State) -> tuple[float, float]:
+        """How far a node has slid beyond what its frame was taken for, and how far it may: lengths.  None on rigid surfaces."""
+        return 0.0, np.inf
+
     def meet(self, fixed: np.ndarray) -> None:
         """Frames are the surface's, whatever supports hold."""
 

@@ -80,6 +80,7 @@ class Unseen:
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._leaps = self._apart = True  # to be looked at
+        self._near = [contact for contact in contacts if contact.surface.deformable]
 
     def check(
         self,
@@ -103,6 +104,7 @@ class Unseen:
         if self._facets:
             self._check_facets(u, dict(zip(contacts, stiffness)))
         self._check_wear(contacts, stiffness)
+        self._near = [contact for contact in self._near if not _check_strayed(contact)]
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
@@ -165,6 +167,20 @@ class Unseen:
             near = _distances(contact, x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
+
+
+def _check_strayed(contact) -> bool:
+    """Warn of a node that has slid too far along a deformable surface; whether one has.  Collective."""
+    slid, most = max(contact.comm.allgather(contact.placement.strayed(contact.present)))
+    if slid <= most:
+        return False
+    warnings.warn(
+        f"a node has slid by {slid:.3g} along a deformable surface, further than half of the shortest edge of a facet, {most:.3g}: "
+        "who presses on whom is that of the undeformed state, and forces go to where the other body was. Take larger facets "
+        "there, or a rigid surface for the body that moves.",
+        stacklevel=5,
+    )
+    return True
 
 
 def _check_apart(body, contacts) -> bool:

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Two deformable bodies whose meshes do not match: patch tests, balance, matching meshes as one body, solvers and ranks that agree."""
 
+import warnings
+
 import numpy as np
 import pytest
 from two_bodies import COMM, E, blocks, dc, patch
@@ -115,6 +117,19 @@ def test_sliding_carries_mu_n(degree):
     slip = scene.contact.slip_increment[:, 0]
     assert largest(slip) > 0.0
     assert (scene.contact.area > 0).all()
+
+
+def test_sliding_too_far_is_told():
+    """Sliding is small: by more than half a facet of the other side is warned of, once."""
+    scene = blocks("quadrilateral", 1, ((4, 2), (5, 2)), mu=0.0, size=(1.0, 2.0))
+    scene.way.value[:] = (0.15, -0.01)
+    scene.problem.solve()
+    for way, told in ((0.25, 1), (0.3, 0)):
+        scene.way.value[0] = way
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            scene.problem.solve()
+        assert len(said) == told and all("slid by" in str(one.message) for one in said)
 
 
 def test_a_gap_closes_and_opens():
