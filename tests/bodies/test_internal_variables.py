@@ -183,6 +183,17 @@ def test_a_failed_step_leaves_the_state():
     assert not law.hardening.x.array.any()
 
 
+def test_a_step_taken_back_after_a_reset():
+    """Reset, one step, rewind: internal variables are those of the undeformed body again."""
+    scene = plastic_block(tol=1e-10)
+    for between in (scene.problem.reset, scene.problem.rewind):
+        move(scene, -0.01 * HEIGHT)
+        scene.problem.solve()
+        assert scene.law.hardening.x.array.any()
+        between()
+        assert not scene.law.hardening.x.array.any()
+
+
 def test_a_checkpoint_has_the_state(tmp_path):
     """A run goes on from a file with the plastic strains it had."""
     path = MPI.COMM_WORLD.bcast(tmp_path, root=0) / "plastic.npz"
