@@ -25,7 +25,7 @@
 #
 # ## Code
 #
-# `state` names the Functions that `after_step` moves on after a step that converged.
+# `InternalVariables` names the Functions that are state, and `after_step`, which moves them on after a step that converged.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -119,7 +119,7 @@ def indent(scene, depths, **options):
     plane = dc.RigidPlane((0, 0), (0, -1))
     contact = dc.Contact(scene.V, scene.top, plane, dc.Friction(0.0))
     problem = dc.ContactProblem(
-        scene.F, scene.u, contact, bcs=scene.bcs, state=scene.law.state, after_step=scene.law.after_step, tol=1e-9, **options
+        scene.F, scene.u, contact, bcs=scene.bcs, internal=dc.InternalVariables(scene.law.state, after_step=scene.law.after_step), tol=1e-9, **options
     )  # fmt: skip
     for depth in depths:
         plane.displacement = (0.0, -depth)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.analysis.estimate import Estimate as Estimate
     from dolfinx_contact.analysis.estimate import estimate as estimate
     from dolfinx_contact.analysis.increments import advance as advance
+    from dolfinx_contact.bodies.internal_variables import InternalVariables as InternalVariables
     from dolfinx_contact.contact.contact import Contact as Contact
     from dolfinx_contact.contact.state import Status as Status
     from dolfinx_contact.law.bipotential import bipotential_gap as bipotential_gap
@@ -64,6 +65,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
 
 _NAMES = {  # by their module
     "support.checks": ["RoundingWarning"],
+    "bodies.internal_variables": ["InternalVariables"],
     "contact.contact": ["Contact"],
     "surfaces.round": ["RigidCylinder", "RigidSphere"],
     "contact.state": ["Status"],

@@ -213,20 +213,26 @@ def set_bc_values(array, bcs) -> None:
             fem.set_bc(array, [bc])
 
 
-def compiled(form: Any, entity_maps: Any = None) -> Any:
+def compiled(form: Any, form_compiler_options: dict | None = None, jit_options: dict | None = None, entity_maps: Any = None) -> Any:  # fmt: skip
     """A compiled form, ``fem.form``, whose Functions may live on several meshes since DOLFINx 0.9.
 
     Args:
         form: UFL form.
+        form_compiler_options: Of FFCx; ``form_compiler_params`` before 0.6.
+        jit_options: Of the compilation of its code; ``jit_params`` before 0.6.
         entity_maps: As ``fem.form`` takes it: a dictionary of arrays by mesh before 0.10, a list of ``EntityMap`` since.
     """
+    known = signature(fem.form).parameters
+    now = "options" if "jit_options" in known else "params"
+    # Copies: 0.5 writes into them, into its own defaults, too.
+    options = {f"form_compiler_{now}": dict(form_compiler_options or {}), f"jit_{now}": dict(jit_options or {})}  # fmt: skip
     if entity_maps is None:
-        return fem.form(form)
-    if "entity_maps" not in signature(fem.form).parameters:
+        return fem.form(form, **options)
+    if "entity_maps" not in known:
         raise ValueError(
             f"entity_maps need DOLFINx 0.9 or newer, this is {version}: here all Functions in F live on the mesh of u."
         )
-    return fem.form(form, entity_maps=entity_maps)
+    return fem.form(form, **options, entity_maps=entity_maps)
 
 
 def assemble_into(x: Any, form: Any) -> None:
@@ -244,6 +250,13 @@ def add_to_owners(x: Any) -> None:
 def petsc_vec(u: fem.Function) -> PETSc.Vec:
     """The PETSc vector of a Function: ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before."""
     return u.x.petsc_vec if hasattr(u.x, "petsc_vec") else u.vector
+
+
+def tagged(tags: Any, mesh: Any) -> bool:
+    """Whether tags, a ``MeshTags``, are of this mesh: they know the mesh before 0.7, its topology since."""
+    tags = _cpp(tags)
+    topology = tags.topology if hasattr(tags, "topology") else tags.mesh.topology
+    return topology is _cpp(mesh).topology
 
 
 def is_condition(bc) -> bool:

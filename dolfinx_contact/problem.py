@@ -26,6 +26,7 @@ from dolfinx_contact.problem_input import (
     check_weights,
     checked_conditions,
     checked_contacts,
+    checked_internal,
     checked_options,
     checked_solver,
     checked_tolerance,
@@ -33,7 +34,6 @@ from dolfinx_contact.problem_input import (
     follow,
     hold,
     take_contacts,
-    variables_of,
 )
 from dolfinx_contact.problem_states import ProblemStates
 from dolfinx_contact.results.record import (
@@ -57,6 +57,7 @@ from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.internal_variables import InternalVariables
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -84,10 +85,9 @@ class ContactProblem(Guarded):
         tol: Largest error, slip error and forward error of a converged step, see docs/errors.md.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, of large bodies multigrid.
         petsc_options_prefix: Their prefix.
-        state: Internal variables, Functions: a step that fails leaves them as they were; saved in checkpoints.
-        before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
-            ``state``, and changes no ``state``.  ``J`` has to be given.
-        after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
+        internal: ``InternalVariables`` of the material, None if it has none.
+        form_compiler_options: Of FFCx, as ``fem.form`` takes them.
+        jit_options: Of the compilation of what FFCx writes, as ``fem.form`` takes them.
         entity_maps: How meshes lie in each other, where ``F`` has Functions on other ones than ``u``, as ``fem.form`` takes
             it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
@@ -136,10 +136,10 @@ class ContactProblem(Guarded):
         tol: float = 1e-8,
         petsc_options: dict[str, Any] | None = None,
         petsc_options_prefix: str | None = None,
-        state: Sequence[fem.Function] = (),
-        before_residual: Callable[[fem.Function], object] | None = None,
-        after_step: Callable[[fem.Function], object] | None = None,
+        internal: InternalVariables | None = None,
         undetermined: str = "refused",
+        form_compiler_options: dict[str, Any] | None = None,
+        jit_options: dict[str, Any] | None = None,
         entity_maps: Any = None,
         geometry_tol: float = 1e-3,
     ) -> None:
@@ -151,13 +151,21 @@ class ContactProblem(Guarded):
             bcs = checked_conditions(bcs, u.function_space)
             self.solver, self.tol = solver, tol
             self.undetermined, self.geometry_tol = undetermined, geometry_tol
-            petsc_options = checked_options(petsc_options)
-            self._variables = variables_of(state, after_step)
+            petsc_options = checked_options("petsc_options", petsc_options)
+            form_options = dict(
+                form_compiler_options=checked_options(
+                    "form_compiler_options", form_compiler_options
+                ),
+                jit_options=checked_options("jit_options", jit_options),
+                entity_maps=entity_maps,
+            )
+            self._variables = checked_internal(internal)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol)  # fmt: skip
         self.u, self.monitor = u, None
         of = self.contacts[0].displacements if self.contacts else None
-        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before_residual, of, entity_maps)  # fmt: skip
+        before = None if internal is None else internal.before_residual
+        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, of, form_options)  # fmt: skip
         hold(self.contacts, self.body)
         check_surfaces(self.contacts, self.body)
         check_weights(F, self.contacts)

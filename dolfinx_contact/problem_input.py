@@ -24,6 +24,12 @@ LARGE = 10.0  # a displacement of so many times the size of a body is one in oth
 # What to do where a motion of a body that contact alone holds is undetermined.
 UNDETERMINED = ("refused", "nearest")
 
+EXAMPLES = {
+    "petsc_options": '{"pc_type": "lu"}',
+    "form_compiler_options": '{"scalar_type": "double"}',
+    "jit_options": '{"cffi_extra_compile_args": ["-O3"]}',
+}
+
 NUMBERS = count(
     1
 )  # of problems as they are made, and of times at which surfaces are driven: each larger than the last
@@ -132,21 +138,24 @@ def checked_undetermined(choice) -> str:
     return choice
 
 
-def variables_of(state, after_step):
-    """``InternalVariables``, None where there are none."""
-    if after_step is None and isinstance(state, (list, tuple)) and not state:
+def checked_internal(internal):
+    """``InternalVariables`` with a history of this problem's own, None where there are none."""
+    if internal is None:
         return None
     from dolfinx_contact.bodies.internal_variables import InternalVariables
 
-    return InternalVariables(state, after_step)
-
-
-def checked_options(options) -> dict | None:
-    """PETSc options, a dictionary."""
-    if options is not None and not isinstance(options, dict):
+    if not isinstance(internal, InternalVariables):
         raise ValueError(
-            f'petsc_options must be a dictionary such as {{"pc_type": "lu"}}, got {options!r}.'
+            f"internal must be dc.InternalVariables(state, ...) or None, got {internal!r}."
         )
+    return internal.begun()
+
+
+def checked_options(name: str, options) -> dict | None:
+    """Options of PETSc or of compilation, a dictionary."""
+    if options is not None and not isinstance(options, dict):
+        example = EXAMPLES[name]
+        raise ValueError(f"{name} must be a dictionary such as {example}, got {options!r}.")
     return options
 
 

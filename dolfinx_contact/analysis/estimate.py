@@ -154,7 +154,7 @@ def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[floa
     e.x.array[:] = body.u.x.array - e.x.array
     test, trial = body.tangent.arguments()
     q = ufl.TestFunction(square.function_space)
-    form = compat.compiled(ufl.replace(body.tangent, {test: e * q, trial: e}), body.entity_maps)
+    form = compat.compiled(ufl.replace(body.tangent, {test: e * q, trial: e}), **body.form_options)
     own = square.function_space.dofmap.index_map.size_local
     compat.assemble_into(square.x, form)
     of_difference = square.x.array.copy()

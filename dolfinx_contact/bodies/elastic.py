@@ -36,20 +36,22 @@ class ElasticBody(OverRanks):
             conjugate gradients with multigrid, see ``linear_solver.py``.
         prefix: Their prefix.
         of: Its ``Displacements``, where they are known.
-        entity_maps: Of forms with Functions on other meshes, see ``compat.compiled``.
+        form_options: Of the forms' compilation, see ``compat.compiled``.
     """
 
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose = None  # ``LooseMotions``, where rigid motions cost nothing
     scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
-    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, of=None, entity_maps=None):
+    def __init__(
+        self, F, u, bcs, derivative, options=None, prefix=None, of=None, form_options=None
+    ):
         self.u, self.V, self.bcs = u, u.function_space, list(bcs)
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
-        self.tangent, self.entity_maps = derivative, entity_maps
-        self._residual_form = compat.compiled(F, entity_maps)
-        self._stiffness_form = compat.compiled(derivative, entity_maps)
+        self.tangent, self.form_options = derivative, form_options or {}
+        self._residual_form = compat.compiled(F, **self.form_options)
+        self._stiffness_form = compat.compiled(derivative, **self.form_options)
         coefficients = [c for c in derivative.coefficients() if c is not u]
         self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())

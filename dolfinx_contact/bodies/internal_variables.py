@@ -10,37 +10,61 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
+from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.support.numbering import original_cells
 
 
-class InternalVariables:
-    """Functions that are state: plastic strains, hardening, viscous stresses.
+class InternalVariables(Guarded):
+    """Functions that are state, such as plastic strains, hardening, viscous stresses, and what the user does with them.
 
     Args:
-        functions: The user's Functions.
-        after_step: None, or the user's function of ``u``, called once after every converged step.
+        state: The user's Functions.  A step that fails leaves them as they were; saved in checkpoints.
+        before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
+            ``state``, and changes no ``state``.  ``ContactProblem`` then has to be given ``J``.
+        after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
 
     Raises:
         ValueError: something that is no Function, or cannot be called.
+
+    Example:
+        >>> creep = fem.Function(V)
+        >>> def flow(u): creep.x.array[:] += 0.1 * (u.x.array - creep.x.array)
+        >>> internal = dc.InternalVariables([creep], after_step=flow)
+        >>> creeping = dc.ContactProblem(F, u, dc.Contact(V, foot, plane, friction), bcs=[bc], internal=internal)
     """
 
-    def __init__(self, functions: Sequence[fem.Function], after_step: Callable | None):
-        functions = [functions] if isinstance(functions, fem.Function) else functions
-        if not isinstance(functions, (list, tuple)):
-            raise ValueError(f"state must be a list of DOLFINx Functions, got {functions!r}.")
-        for function in functions:
+    _remedy = "make new InternalVariables, and a ContactProblem with them."
+
+    def __init__(
+        self,
+        state: Sequence[fem.Function] | fem.Function = (),
+        *,
+        before_residual: Callable[[fem.Function], object] | None = None,
+        after_step: Callable[[fem.Function], object] | None = None,
+    ) -> None:
+        state = [state] if isinstance(state, fem.Function) else state
+        if not isinstance(state, (list, tuple)):
+            raise ValueError(f"state must be a list of DOLFINx Functions, got {state!r}.")
+        for function in state:
             if not isinstance(function, fem.Function):
                 raise ValueError(
                     f"state must hold DOLFINx Functions, got {type(function).__name__}."
                 )
-        if after_step is not None and not callable(after_step):
-            raise ValueError(f"after_step must be a function of u, got {after_step!r}.")
-        self._functions, self._after = list(functions), after_step
-        self._first = self.last = self._values()
+        for name, call in (("before_residual", before_residual), ("after_step", after_step)):
+            if not (call is None or callable(call)):
+                raise ValueError(f"{name} must be a function of u, got {call!r}.")
+        self.state, self.before_residual, self.after_step = list(state), before_residual, after_step
+        self._first = self._last = self._values()
+        self._made = True
+
+    def begun(self) -> InternalVariables:
+        """The same with a history of its own, which begins with the present values."""
+        before, after = self.before_residual, self.after_step
+        return InternalVariables(self.state, before_residual=before, after_step=after)
 
     def _values(self) -> list[np.ndarray]:
-        return [function.x.array.copy() for function in self._functions]
+        return [function.x.array.copy() for function in self.state]
 
     def reset(self) -> None:
         """Back to what they were when the problem was made."""
@@ -48,35 +72,35 @@ class InternalVariables:
 
     def go_back(self, values: list[np.ndarray]) -> None:
         """Back to what ``history`` returned."""
-        self.last = values
+        self._last = values
         self.restore()
 
     def restore(self) -> None:
         """Back to the last converged state."""
-        for function, values in zip(self._functions, self.last):
+        for function, values in zip(self.state, self._last):
             function.x.array[:] = values
 
     def move_on(self, u: fem.Function) -> None:
         """Let the user move them on with the converged displacement.  Collective."""
-        if self._after is not None:
+        if self.after_step is not None:
             with raised_together(u.function_space.mesh.comm):
-                self._after(u)
+                self.after_step(u)
 
     def history(self) -> list[np.ndarray]:
         """All that a step leaves to the next one, for ``go_back``."""
-        return self.last
+        return self._last
 
     def advance(self) -> None:
         """What they are is the last converged state."""
-        self.last = self._values()
+        self._last = self._values()
 
     # -- checkpoints ---------------------------------------------------------------------------
 
     def cells(self) -> dict[str, np.ndarray]:
         """Original indices of this rank's cells, by the name of rows; nothing without functions.  Collective."""
-        if not self._functions:
+        if not self.state:
             return {}
-        meshes = [function.function_space.mesh for function in self._functions]
+        meshes = [function.function_space.mesh for function in self.state]
         with raised_together(meshes[0].comm):
             if any(mesh.ufl_domain() != meshes[0].ufl_domain() for mesh in meshes):
                 raise ValueError("a checkpoint holds state on one mesh: put all of it there.")
@@ -85,14 +109,14 @@ class InternalVariables:
     def save(self) -> dict[str, np.ndarray]:
         """Cells, and the values of each function, a row a cell."""
         rows = self.cells()
-        for k, function in enumerate(self._functions):
+        for k, function in enumerate(self.state):
             dofs = compat.cell_dofs(function.function_space)
             rows[f"state_{k}"] = function.x.array[dofs[: len(rows["state_nodes"])]]
         return rows
 
     def load(self, rows: dict[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, for the cells that this rank owns.  Collective."""
-        for k, function in enumerate(self._functions):
+        for k, function in enumerate(self.state):
             values, dofs = rows[f"state_{k}"], compat.cell_dofs(function.function_space)
             function.x.array[dofs[: len(values)]] = values
             function.x.scatter_forward()

@@ -16,7 +16,7 @@ from dolfinx_contact.support.collective import raised_together
 
 
 def body_of(
-    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None, entity_maps=None
+    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None, form_options=None
 ) -> ElasticBody:
     """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
 
@@ -29,20 +29,18 @@ def body_of(
         prefix: Their prefix.
         before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
         of: Its ``Displacements``, where they are known.
-        entity_maps: Of forms with Functions on other meshes, see ``compat.compiled``.
+        form_options: Of the forms' compilation, see ``compat.compiled``.
 
     Raises:
         ValueError: ``F`` is no residual form in ``u``.
     """
     with raised_together(u.function_space.mesh.comm):
         moving = before_residual is not None
-        if moving and not callable(before_residual):
-            raise ValueError(f"before_residual must be a function of u, got {before_residual!r}.")
         derivative, linear = derivative_of(F, u, J, moving)
-        check_meshes(F, u, entity_maps)
+        check_meshes(F, u, (form_options or {}).get("entity_maps"))
     if linear:
-        return ElasticBody(F, u, bcs, derivative, options, prefix, of, entity_maps)
-    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, entity_maps)
+        return ElasticBody(F, u, bcs, derivative, options, prefix, of, form_options)
+    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, form_options)
 
 
 class NonlinearBody(ElasticBody):
@@ -54,8 +52,8 @@ class NonlinearBody(ElasticBody):
 
     nonlinear = True
 
-    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None, entity_maps=None):  # fmt: skip
-        super().__init__(F, u, bcs, derivative, options, prefix, of, entity_maps)
+    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None, form_options=None):  # fmt: skip
+        super().__init__(F, u, bcs, derivative, options, prefix, of, form_options)
         self._before = before
         self._given = [*self._parameters, *self._load_parameters]
         self._place = None  # where K stands

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import weakref
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -25,6 +25,7 @@ from dolfinx_contact.contact.input import (
     check_space,
     check_wear,
     checked_facets,
+    given_facets,
 )
 from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.laws import Laws, rows
@@ -40,6 +41,9 @@ from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
+if TYPE_CHECKING:
+    from dolfinx.mesh import MeshTags  # before 0.6 it has another name
+
 
 class Contact(Guarded):
     """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
@@ -51,7 +55,8 @@ class Contact(Guarded):
     Args:
         V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2; or a mixed
             space, whose first such sub-space they are, or that sub-space itself.
-        facets: Local indices of boundary facets, integers; a rank may have none.
+        facets: Local indices of boundary facets, integers; a rank may have none.  Or ``(facet_tags, tag)``, those with a tag, an
+            integer, or with one of several.
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
         friction: The friction law, or a number, its isotropic coefficient, the same on all ranks; or on all of them one with coefficients
             per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
@@ -83,14 +88,14 @@ class Contact(Guarded):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike, surface: Surface, friction: Friction | float, *, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
+    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike | tuple[MeshTags, int | Sequence[int]], surface: Surface, friction: Friction | float, *, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh, friction = V.mesh, as_friction(friction)
         gdim, fdim = mesh.geometry.dim, mesh.topology.dim - 1
         for dims in ((fdim, fdim + 1), (fdim, 0)):
             mesh.topology.create_connectivity(*dims)
-        boundary = exterior_facet_indices(mesh.topology)
+        boundary, facets = exterior_facet_indices(mesh.topology), given_facets(facets, mesh)
         with raised_together(mesh.comm):
             check_space(V)
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)

@@ -12,6 +12,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.displacements import displacement_part
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.law.wear import Wear
+from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
 # Coefficients of friction between these are hardly meant.
@@ -37,12 +38,37 @@ def check_space(V) -> None:
         raise ValueError(f"V must be continuous Lagrange, got {V.ufl_element()}.")
 
 
+def given_facets(facets, mesh) -> np.ndarray:
+    """Facets as an array, also where ``(facet_tags, tag)`` says which.  Collective."""
+    fdim, found, tags = mesh.topology.dim - 1, None, None
+    with raised_together(mesh.comm):
+        if isinstance(facets, (tuple, list)) and len(facets) == 2 and hasattr(facets[0], "indices"):
+            found, tags = facets[0], np.atleast_1d(facets[1])
+            if found.dim != fdim or not compat.tagged(found, mesh):
+                raise ValueError(
+                    f"facet_tags must tag the facets of the mesh of V, of dimension {fdim}: got tags of dimension {found.dim}"
+                    f"{'' if compat.tagged(found, mesh) else ' of another mesh'}."
+                )
+            if tags.ndim != 1 or not np.issubdtype(tags.dtype, np.integer) or not tags.size:
+                raise ValueError(f"tag must be an integer or several, got {facets[1]!r}.")
+    if mesh.comm.allreduce(found is None):
+        return facets
+    known = sorted(set().union(*mesh.comm.allgather(set(found.values.tolist()))))
+    missing = sorted(set(tags.tolist()) - set(known))
+    with raised_together(mesh.comm):
+        if missing:
+            raise ValueError(
+                f"facet_tags have no facets with the tag {missing}: there are {known}."
+            )
+    return found.indices[np.isin(found.values, tags)]
+
+
 def checked_facets(facets, index_map, boundary) -> np.ndarray:
     array = np.asarray(facets)
     if hasattr(facets, "indices") or (array.ndim == 0 and np.issubdtype(array.dtype, np.integer)):
         given = "facet tags" if hasattr(facets, "indices") else f"the number {facets}"
         raise ValueError(
-            f"facets must be an array of facets, got {given}: pass facet_tags.find(tag), the facets that have a tag."
+            f"facets must be an array of facets, got {given}: pass facet_tags.find(tag), the facets that have a tag, or (facet_tags, tag)."
         )
     if array.size == 0:
         return np.zeros(0, dtype=np.int32)

@@ -11,7 +11,7 @@ from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import ArrayLike
 
 from dolfinx_contact import compat
-from dolfinx_contact.contact.input import checked_facets
+from dolfinx_contact.contact.input import checked_facets, given_facets
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, unit
@@ -26,7 +26,7 @@ class DeformableSurface(Surface):
 
     Args:
         V: The space of displacements, that of the contact.
-        facets: Local indices of boundary facets of the other side; a rank may have none.
+        facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
         axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node;
             needed unless friction is isotropic or bodies two-dimensional.
 
@@ -34,8 +34,8 @@ class DeformableSurface(Surface):
         ValueError: on all ranks, for facets that are not on the boundary.
 
     Example:
-        >>> upper, lower = (facet_tags.find(tag) for tag in (3, 4))
-        >>> contact = dc.Contact(V, upper, dc.DeformableSurface(V, lower), dc.Friction(mu=0.3))
+        >>> below = dc.DeformableSurface(V, (facet_tags, 4))
+        >>> contact = dc.Contact(V, (facet_tags, 3), below, dc.Friction(mu=0.3))
     """
 
     _settable = ("displacement", "rotation")
@@ -44,7 +44,7 @@ class DeformableSurface(Surface):
     )
     curved = deformable = True
 
-    def __init__(self, V: Any, facets: ArrayLike, axis: ArrayLike | None = None) -> None:
+    def __init__(self, V: Any, facets: Any, *, axis: ArrayLike | None = None) -> None:
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
@@ -52,7 +52,7 @@ class DeformableSurface(Surface):
         fdim = mesh.topology.dim - 1
         for dims in ((fdim, fdim + 1), (fdim, 0)):
             mesh.topology.create_connectivity(*dims)
-        boundary = exterior_facet_indices(mesh.topology)
+        boundary, facets = exterior_facet_indices(mesh.topology), given_facets(facets, mesh)
         with raised_together(mesh.comm):
             found = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             if axis is not None:

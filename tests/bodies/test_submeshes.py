@@ -176,7 +176,8 @@ def test_state_on_a_submesh(tmp_path):
     def after(u):
         count.x.array[:] += 1.0
 
-    options = dict(state=[count], before_residual=before, after_step=after, J=J)
+    internal = dc.InternalVariables([count], before_residual=before, after_step=after)
+    options = dict(internal=internal, J=J)
     problem = dc.ContactProblem(
         scene.F, scene.u, scene.contact, bcs=scene.bcs, tol=1e-10, entity_maps=scene.maps, **options
     )

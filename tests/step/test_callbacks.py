@@ -41,8 +41,10 @@ def made(at, error=OSError):
         V, facets = scene.V, scene.contact.facets
         contact = dc.Contact(V, facets, surface or scene.surface, dc.Friction(0.3))
         F, J = scene.F, ufl.derivative(scene.F, scene.u, ufl.TrialFunction(V))
-        functions = {} if at == "distance" else {at: call}
-        scene.problem = dc.ContactProblem(F, scene.u, contact, bcs=scene.bcs, J=J, **functions)
+        internal = None if at == "distance" else dc.InternalVariables(**{at: call})
+        scene.problem = dc.ContactProblem(
+            F, scene.u, contact, bcs=scene.bcs, J=J, internal=internal
+        )
         scene.contact = contact
     if at == "mu":
         scene.contact.friction = dc.Friction(mu)

@@ -39,6 +39,12 @@ def rebuilt(scene, **changes):
         ({"solver": dc.FixedPoint}, r"solver FixedPoint is a class: write solver=FixedPoint\(\)"),
         ({"tol": True}, "tol must be a finite number .*got True"),
         ({"tol": math.inf}, "tol must be a finite number .*got inf"),
+        (
+            {"internal": [3]},
+            r"internal must be dc.InternalVariables\(state, ...\) or None, got \[3\]",
+        ),
+        ({"jit_options": "-O3"}, "jit_options must be a dictionary .*got '-O3'"),
+        ({"form_compiler_options": 1}, "form_compiler_options must be a dictionary .*got 1"),
         ({"petsc_options": "lu"}, "petsc_options must be a dictionary .*got 'lu'"),
     ],
 )

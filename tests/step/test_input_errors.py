@@ -128,6 +128,46 @@ def test_contact_refuses_facets(scene, case, message):
         dc.Contact(scene.V, bad_facets(scene, case), plane(), FRICTION)
 
 
+def tagged(domain):
+    """Tags of the lower facets of a block, 3 for negative and 8 for positive x, as on some ranks only."""
+    parts = [
+        mesh.locate_entities_boundary(domain, 2, lambda x, s=s: np.isclose(x[2], 0) & (s * x[0] > -1e-9))
+        for s in (-1, 1)
+    ]  # fmt: skip
+    facets = np.concatenate(parts).astype(np.int32)
+    order, tags = np.argsort(facets), np.repeat(np.int32([3, 8]), [len(part) for part in parts])
+    return mesh.meshtags(domain, 2, facets[order], tags[order])
+
+
+def test_facets_are_named_by_their_tags(scene):
+    """By one tag or several a contact has the facets that have them, the same as by their indices."""
+    facet_tags, law = tagged(scene.mesh), (plane(), FRICTION)
+    for tag, wanted in [(3, [3]), (np.int32(8), [8]), ([8, 3], [3, 8]), ((3, 3), [3])]:
+        contact = dc.Contact(scene.V, (facet_tags, tag), *law)
+        facets = facet_tags.indices[np.isin(facet_tags.values, wanted)]
+        other = dc.Contact(scene.V, facets, *law)
+        assert np.array_equal(contact.nodes, other.nodes)
+    both = [COMM.allreduce(dc.Contact(scene.V, (facet_tags, tag), *law).nodes.size) for tag in (3, (3, 8))]  # fmt: skip
+    assert 0 < both[0] < both[1] == COMM.allreduce(scene.contact.nodes.size)
+
+
+def test_tags_that_name_no_facets_are_refused(scene):
+    """A tag that no facet has, on any rank, one that is none, and tags of other entities or of another mesh."""
+    facet_tags, other = tagged(scene.mesh), tagged(scenes.block().mesh)
+    cells = mesh.meshtags(scene.mesh, 3, np.int32([0]), np.int32([3]))
+    for facets, message in [
+        ((facet_tags, 5), r"no facets with the tag \[5\]: there are \[3, 8\]"),
+        ((facet_tags, (3, 4, 7)), r"no facets with the tag \[4, 7\]"),
+        ((facet_tags, 3.0), "tag must be an integer or several, got 3.0"),
+        ((facet_tags, ()), "tag must be an integer or several"),
+        ((facet_tags, None), "tag must be an integer or several, got None"),
+        ((cells, 3), "of dimension 2: got tags of dimension 3"),
+        ((other, 3), "of another mesh"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            dc.Contact(scene.V, facets, plane(), FRICTION)
+
+
 def test_one_rank_is_enough_to_refuse(scene):
     """A mistake on the last rank alone is raised on every rank."""
     last = COMM.rank == COMM.size - 1

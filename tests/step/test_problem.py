@@ -1,5 +1,7 @@
 """Contact problems against what mechanics says of them: closed forms, symmetries, units, limits."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scenes
@@ -10,6 +12,7 @@ import dolfinx_contact as dc
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
 
 pytestmark = pytest.mark.ranks
+COMM = MPI.COMM_WORLD
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
 CASES = {
     "A": {"mu": 0.2, "p": None},
@@ -248,6 +251,27 @@ def test_wrong_derivative_is_never_taken_for_convergence():
     scene.move_top(0, 0, -0.01)
     with pytest.raises(dc.NotConverged):
         problem.solve()
+
+
+def test_options_of_compilation_reach_the_compilers(tmp_path):
+    """Forms are compiled where ``jit_options`` say, as ``form_compiler_options`` say, and stay what they are."""
+    folder = Path(COMM.bcast(str(tmp_path)))
+    reactions = []
+    for name, given in (("a", {}), ("b", {"epsilon": 1e-10})):
+        jit, kept = {"cache_dir": str(folder / name)}, dict(given)
+        scene = scenes.block(cells=(2, 2, 2))
+        problem = dc.ContactProblem(scene.F, scene.u, scene.contact, bcs=scene.bcs, form_compiler_options=given, jit_options=jit)  # fmt: skip
+        assert given == kept and list(jit) == ["cache_dir"]
+        scene.move_top(0.002, 0, -0.01)
+        problem.solve()
+        reactions.append(scenes.gathered(scene.contact)[1])
+    np.testing.assert_allclose(*reactions, atol=1e-9 * np.abs(reactions[0]).max())
+    COMM.barrier()
+    forms = [{file.stem for file in (folder / name).glob("libffcx_forms_*.c")} for name in "ab"]
+    assert (
+        min(map(len, forms)) >= 2
+    )  # residual and tangent; ranks may number what is in them differently
+    assert not forms[0] & forms[1]
 
 
 def test_linear_solver_is_the_users_choice():

@@ -80,6 +80,7 @@ def block(
         top: Whether the height of the top is given.
         loads: More of the residual form, ``loads(scene, v)``.
         late: Dictionary of options that ``form`` fills.
+        options: Of the problem and, by their names, of ``InternalVariables``.
     """
     d = len(cells)
     high = np.array([1.0] * (d - 1) + [HEIGHT]) * length
@@ -115,6 +116,8 @@ def block(
     friction = dc.Friction(mu=(mu, mu))
     scene.contact = dc.Contact(V, scene.bottom, scene.surface, friction)
     options |= dict(bcs=bcs, solver=solver, tol=tol, **(late or {}))
+    named = {k: options.pop(k) for k in ("state", "before_residual", "after_step") if k in options}
+    options["internal"] = dc.InternalVariables(**named) if named else None
     scene.problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], **options)
     return scene
 
