@@ -19,6 +19,7 @@ __all__: list[str] = [
     "CondensedSolution",
     "Law2D",
     "Law3D",
+    "clip",
     "instruction_sets",
     "make_law",
 ]
@@ -361,6 +362,14 @@ class CondensedOperator:
     def nodes(self) -> int: ...
     @property
     def tied(self) -> int: ...
+
+def clip(
+    polygons: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int32]]:
+    """
+    The common parts of pairs of convex polygons, corners in order, shape (n, k, 2) with k at most 4: (corners of shape (n, k + m, 2), how many of them count of shape (n,)), zero where there is no area.
+    """
 
 def instruction_sets() -> list[str]:
     """

@@ -34,8 +34,7 @@ class DeformableSurface(Surface):
         ValueError: on all ranks, for facets that are not on the boundary.
 
     Example:
-        >>> below = dc.DeformableSurface(V, (facet_tags, 4))
-        >>> contact = dc.Contact(V, (facet_tags, 3), below, dc.Friction(mu=0.3))
+        >>> below = dc.DeformableSurface(V, foot)  # then: dc.Contact(V, facets_above, below, friction)
     """
 
     _settable = ("displacement", "rotation")
