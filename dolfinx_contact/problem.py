@@ -279,7 +279,7 @@ class ContactProblem(Guarded):
         self._check_input()
         step, found = self._search()
         missed, said = 0.0, ""
-        if any(contact.changes for contact in self.contacts):
+        if any(contact.changes for contact in self.contacts) or self._may_land():
             step, found, missed, said = self._at_its_end(step, found)
         step.rest()
         done = record(self.body, self.contacts, step.errors, found, perf_counter() - start, missed)
@@ -294,6 +294,10 @@ class ContactProblem(Guarded):
                 self.body.values(found.x),
                 [contact.reaction for contact in self.contacts],
             )
+        if any(contact.has_history for contact in self.contacts):
+            from dolfinx_contact.step.touching import opening
+
+            opening(self.body, self.contacts, step, self.geometry_tol)
         self.body.put(found.x)
         if self._variables is not None:
             self._variables.move_on(self.u)
@@ -339,6 +343,11 @@ class ContactProblem(Guarded):
         given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
         return kind(body, self.contacts, *given)
 
+    def _may_land(self) -> bool:
+        """Whether nodes that are open may land with friction.  Collective."""
+        may = any(contact.may_land(self._states.last) for contact in self.contacts)
+        return self.body.comm.allreduce(may, op=MPI.LOR)
+
     def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""
         if self._bound_to != self.solver:
@@ -365,30 +374,50 @@ class ContactProblem(Guarded):
         return step, found
 
     def _at_its_end(self, step, found) -> tuple[LoadStep, SolverResult, float, str]:
-        """The step repeated with the geometry of its end, what that still misses, and why it is refused, in words.  Collective."""
-        from dolfinx_contact.step.geometry import REPEATED, geometry_error, too_long, undivided
+        """The step repeated with the geometry of its end and slip from touching on, what is missed, and why it is refused.  Collective."""
+        from dolfinx_contact.step.geometry import REPEATED, undivided
+        from dolfinx_contact.step.touching import landing
 
         said, missed, known = "", 0.0, self._keep_one_start(None)
         for repeated in range(REPEATED + 1):
             if not step.errors.within(step.tol):
                 break
-            both = [two for two in zip(self.contacts, step.stiffness) if two[0].changes]
-            contacts, stiffness = map(list, zip(*both))
-            said = "" if repeated else too_long(self.body, contacts, found.x)
-            missed = geometry_error(self.body, contacts, stiffness, found.x, step.scale)
-            if said or missed <= self.geometry_tol:
+            missed, said = self._geometry(step, found, repeated)
+            if said:
+                break
+            late = landing(self.body, self.contacts, step, found.x, self.geometry_tol)
+            if max(missed, late) <= self.geometry_tol:
                 break
             if repeated == REPEATED:
-                said = undivided(missed, self.geometry_tol)
+                said = undivided(max(missed, late), self.geometry_tol)
                 break
-            for surface in {id(c.surface): c.surface for c in self.contacts}.values():
-                surface.end_step()
-            for contact in self.contacts:
-                contact.restore()
-            step, again = self._with_friction(self.load_step(step.holding, found.x))
+            step, again = self._repeated(step, found)
             known = self._keep_one_start(known)
             found = again._replace(iterations=found.iterations + again.iterations)
         return step, found, missed, said
+
+    def _geometry(self, step, found, repeated: int) -> tuple[float, str]:
+        """The error of the geometry, and whether the way of the step is too long, in words.  Collective."""
+        from dolfinx_contact.step.geometry import geometry_error, too_long
+
+        both = [two for two in zip(self.contacts, step.stiffness) if two[0].changes]
+        if not both:
+            return 0.0, ""
+        contacts, stiffness = map(list, zip(*both))
+        said = "" if repeated else too_long(self.body, contacts, found.x)
+        return geometry_error(self.body, contacts, stiffness, found.x, step.scale), said
+
+    def _repeated(self, step, found) -> tuple[LoadStep, SolverResult]:
+        """The step with the geometry of its end.  Collective."""
+        for surface in {id(c.surface): c.surface for c in self.contacts}.values():
+            surface.end_step()
+        placed = [contact.placement.now for contact in self.contacts]
+        for contact in self.contacts:
+            contact.restore()
+        step = self.load_step(step.holding, found.x)
+        for contact, before in zip(self.contacts, placed):
+            contact.placement.count_as(before)
+        return self._with_friction(step)
 
     def _with_friction(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
         """What is found with friction that belongs to the state found.  Collective.

@@ -4,7 +4,7 @@
 
 Each contact is judged by its own reactions, gaps and slips, computed here from points and normals; equilibrium with the sum
 of all, by the form.  How the sum at a node is split is not unique, and no distance of the reactions from a tight solution is
-given.  Of the package's objects it reads ``nodes``, ``frame`` and ``reaction`` of contacts, ``displacement`` of planes, and ``u``.
+given.  Of the package's objects it reads ``nodes``, ``frame``, ``reaction`` and ``slip_before_touching`` of contacts, ``displacement`` of planes, and ``u``.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class CornerJudge:
             r = np.column_stack((force @ tangents.T, force @ normal))
             gap = (self.x[nodes] + u[nodes] - point - moved) @ normal
             way = u[nodes] - self.before[nodes] - moved + self.moved[k]
-            slip = way @ tangents.T
+            slip = (way - contact.slip_before_touching @ contact.frame[:-1]) @ tangents.T
             self.moved[k] = moved
             mu = np.broadcast_to(scene.mu[k], d - 1).astype(float)
             p = mu if scene.p[k] is None else np.broadcast_to(scene.p[k], d - 1).astype(float)

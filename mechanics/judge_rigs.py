@@ -5,7 +5,7 @@
 Gaps, normals and lever arms are computed here from points, radii and quaternions; equilibrium of the surface is a sum of nodal
 forces.  Both are those of the start of a step: it has to be solved with an infinite ``geometry_tol``.  For the motion that was
 found the body is judged as over a surface that moves so.  Of the package's objects it
-reads ``nodes``, ``frame`` and ``reaction`` of the contact, ``displacement`` and ``rotation`` of the surface, and ``u``.
+reads ``nodes``, ``frame``, ``reaction`` and ``slip_before_touching`` of the contact, ``displacement`` and ``rotation`` of the surface, and ``u``.
 """
 
 from __future__ import annotations
@@ -122,6 +122,8 @@ class RigJudge:
         )
         last = self.before.copy()
         last[self.nodes] += ended - self.moved + swung
+        slipped = np.einsum("ni,nij->nj", scene.contact.slip_before_touching, np.broadcast_to(scene.contact.frame, (len(arms), 3, 3))[:, :-1])  # fmt: skip
+        last[self.nodes] += slipped[self.order]
         reach = np.full(
             len(arms), np.abs(self.x).max() + np.abs(scene.point).max() + np.abs(ended).max()
         )

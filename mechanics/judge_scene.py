@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The judge (judge.py) on a DOLFINx scene: dense stiffness and loads from ``F``, nodes from facets, by DOLFINx alone.
 
-Of the package's objects it reads ``nodes``, ``frame`` and ``reaction`` of the contact, and ``u``.
+Of the package's objects it reads ``nodes``, ``frame``, ``reaction`` and ``slip_before_touching`` of the contact, and ``u``.
 """
 
 from __future__ import annotations
@@ -76,6 +76,10 @@ class SceneJudge:
         if scene.contact is not None:
             order = [int(np.flatnonzero(scene.contact.nodes == i)[0]) for i in self.nodes]
             reaction = np.array(scene.contact.reaction)[order]
+            slipped = np.array(scene.contact.slip_before_touching)[order]
+            self.before.reshape(-1, len(self.body.frame))[self.nodes] += (
+                slipped @ self.body.frame[:-1]
+            )
         held = scene.held.x.array[self.fixed]
         found = self.body.verdict(
             u, reaction, self.forces(), self.before, held, tol, self.unique, self.farthest

@@ -356,6 +356,37 @@ class Contact(Guarded):
         values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
         self.take(**self._placement.moved(values, self.last, self.wear_depth))
 
+    def may_land(self, u: np.ndarray) -> bool:
+        """Whether nodes of this rank are open at the last displacement, and there is friction if they land."""
+        if self.friction.frictionless:
+            return False
+        opens = (self.last.reaction[:, -1] == 0.0) & (self.last.gap > self.gap_rounding(u))
+        return bool((opens & ~self.points.closed).any())
+
+    def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
+        slips = self._placement.before_touching(u, self.last, self.wear_depth)
+        return np.where(at[:, None], slips, 0.0)
+
+    @property
+    def counts_from(self) -> np.ndarray:
+        """In the step at hand, slip of nodes that land before they touch, ``shape=(n, gdim - 1)``, local frame, length."""
+        before = self._placement.now.before
+        return np.zeros_like(self.slip_increment) if before is None else before
+
+    def count_from(self, before: np.ndarray) -> None:
+        """Let slip count from where nodes have slipped by so much, ``shape=(n, gdim - 1)``, local frame."""
+        self._placement.count_from(before)
+
+    @property
+    def slip_before_touching(self) -> np.ndarray:
+        """What nodes that landed in the last step had gone along the surface before, ``shape=(n, gdim - 1)``, local frame, length.
+
+        It counts as no slip, where that matters to friction.
+        """
+        before = self._placement.landed_after
+        return np.zeros_like(self.slip_increment) if before is None else before
+
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
         return self._placement.gap_rounding(u)

@@ -44,6 +44,7 @@ class Placed(NamedTuple):
         np.ndarray | None
     )  # by what the way along the surface is more than its chord, (n, gdim - 1)
     ended: np.ndarray  # rotation of the surface at the end of the step
+    before: np.ndarray | None = None  # slip before nodes touch, (n, gdim - 1)
 
 
 class Placement:
@@ -60,10 +61,12 @@ class Placement:
     Attributes:
         now: ``Placed``, of the present step.
         settled: That of the last step that converged.
+        landed_after: In that step, slip before nodes touched, ``shape=(n, gdim - 1)``; None is none.
     """
 
     now: Placed
     settled: Placed
+    landed_after: np.ndarray | None = None
 
     def __init__(
         self, surface: Surface, x: np.ndarray, dofs: np.ndarray, owned: tuple, extent: float, comm
@@ -155,7 +158,30 @@ class Placement:
         if rotation is None:
             turned = surface.rotation
             rotation = turned if surface.spin is None else composed(surface.spin, turned)
-        self.now = self.now._replace(ended=rotation, way=None)
+        self.landed_after = self.now.before
+        self.now = self.now._replace(ended=rotation, way=None, before=None)
+
+    def before_touching(self, u: np.ndarray, last: State, worn: np.ndarray) -> np.ndarray:
+        """Slips up to where gaps close on the straight way to a displacement, ``shape=(n, gdim - 1)``, local frame.
+
+        Args:
+            u: Displacement of owned degrees of freedom.
+            last, worn: As ``moved`` has them.
+        """
+        moved = self.moved(u, last, worn)
+        slip = moved["slip_increment"] + (0.0 if self.now.before is None else self.now.before)
+        start, gap = np.maximum(last.gap, 0.0), np.minimum(moved["gap"], 0.0)
+        return np.divide(start, start - gap, np.ones_like(gap), where=gap < 0.0)[:, None] * slip
+
+    def count_from(self, before: np.ndarray) -> None:
+        """Let slip count from where nodes have slipped by so much, ``shape=(n, gdim - 1)``, local frame."""
+        self.now = self.now._replace(before=frozen(before))
+
+    def count_as(self, other: Placed) -> None:
+        """Let slip count from where it does with other frames of the same step."""
+        if other.before is not None:
+            tangential = np.column_stack((other.before, np.zeros(len(self.x))))
+            self.count_from(times(self.now.own, turned_back(other.own, tangential))[:, :-1])
 
     def restore(self, placed: Placed | None = None) -> None:
         """Return to the frames of the last step that converged, or to others that were kept."""
@@ -267,6 +293,8 @@ class Placement:
         slip = displacement - last.displacement
         if self.now.way is not None:
             slip[:, :-1] += self.now.way
+        if self.now.before is not None:
+            slip[:, :-1] -= self.now.before
         known = points.known(slip, (motion, moved, last.displacement))
         slip = slip[:, :-1]
         points.without_held(slip)
