@@ -45,6 +45,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.results.record import Counts as Counts
     from dolfinx_contact.results.record import NotConverged as NotConverged
     from dolfinx_contact.results.record import Step as Step
+    from dolfinx_contact.results.writer import Writer as Writer
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton as CondensedNewton
     from dolfinx_contact.solvers.condensed.newton import solve_condensed as solve_condensed
     from dolfinx_contact.solvers.condensed.result import (
@@ -84,6 +85,7 @@ _NAMES = {  # by their module
     "problem": ["ContactProblem"],
     "results.history": ["History"],
     "results.record": ["Counts", "NotConverged", "Step"],
+    "results.writer": ["Writer"],
     "solvers.condensed.newton": ["CondensedNewton", "solve_condensed"],
     "solvers.condensed.result": ["CondensedNotConverged", "CondensedResult"],
     "solvers.fixed_point.fixed_point": ["FixedPoint"],

@@ -164,7 +164,7 @@ class Unseen:
             ):  # nodes that stand out of a hollow body, and touch nothing, are no harm
                 sag = np.maximum(sag, 0.0)
             sag = np.abs(sag).max(axis=1)
-            near = _distances(contact, x).min(axis=1) <= sag
+            near = distances(contact, x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
 
@@ -223,7 +223,7 @@ def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
     missed = Missed()
     for facets in of:
         x = _positions(contact, facets, u)
-        gaps = _distances(contact, x)
+        gaps = distances(contact, x)
         opened = gaps if worn is None else gaps + worn[facets.nodes]
         near = opened.min(axis=1) < facets.size
         if near.any():
@@ -241,7 +241,7 @@ def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
         at = np.clip(centre + half * rule, 0.0, 1.0)
         shapes = facets.shapes(at)
         points = shapes @ x
-        there = _distances(contact, points)
+        there = distances(contact, points)
         bulge = np.einsum("mqk,mk->mq", shapes, gaps) - there
         bulge[np.isinf(there)] = 0.0
         above = np.einsum("mqk,mk->mq", shapes, opened)
@@ -296,7 +296,7 @@ def _positions(contact, facets: Facets, u: np.ndarray) -> np.ndarray:
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
 
 
-def _distances(contact, x: np.ndarray) -> np.ndarray:
+def distances(contact, x: np.ndarray) -> np.ndarray:
     """Of positions, ``shape=(..., gdim)``, from the surface where it stands; infinite where it has none."""
     surface = contact.surface
     try:

@@ -1,0 +1,195 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Time series for ParaView, PyVista and meshio: VTK's XML format, the same from all releases of DOLFINx.
+
+VTK's own writer shares a process badly with DOLFINx where both bring the same libraries, and DOLFINx's differ from
+release to release; the format itself is a page long [https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html].
+"""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from base64 import b64encode
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dolfinx_contact.results.meshes import BodyMesh, Mesh, SurfaceMesh
+from dolfinx_contact.support.collective import by_first_rank, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+KINDS = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+COLLECTION, PIECE = "Collection", "UnstructuredGrid"
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Contact surfaces as one mesh; ``contact`` is the index of the contact of each node."""
+    starts = np.cumsum([0, *(len(mesh.x) for mesh in meshes)])
+    kinds = sorted({kind for mesh in meshes for kind in mesh.cells})
+    cells = {
+        kind: np.concatenate(
+            [start + mesh.cells[kind] for start, mesh in zip(starts, meshes) if kind in mesh.cells]
+        )
+        for kind in kinds
+    }
+    names = meshes[0].at_nodes
+    values = {name: np.concatenate([mesh.at_nodes[name] for mesh in meshes]) for name in names}
+    values["contact"] = np.repeat(np.arange(len(meshes)), np.diff(starts))
+    return Mesh(np.concatenate([mesh.x for mesh in meshes]), cells, values, {})
+
+
+def write_vtu(path: Path, mesh: Mesh) -> None:
+    """Write a mesh to a file of VTK's XML format."""
+    file = _file(PIECE)
+    cells = mesh.cells.values()
+    counts = [np.full(len(of), of.shape[1]) for of in cells]
+    kinds = [np.full(len(of), kind, dtype=np.uint8) for kind, of in mesh.cells.items()]
+    numbers = {"NumberOfPoints": len(mesh.x), "NumberOfCells": sum(map(len, kinds))}
+    piece = ET.SubElement(file[0], "Piece", {name: str(n) for name, n in numbers.items()})
+    topology = {
+        "connectivity": np.concatenate([of.ravel() for of in cells]),
+        "offsets": np.cumsum(np.concatenate(counts)),
+        "types": np.concatenate(kinds),
+    }
+    parts = {
+        "Points": {"points": mesh.x}, "Cells": topology, "PointData": mesh.at_nodes, "CellData": mesh.at_cells,
+    }  # fmt: skip
+    for part, arrays in parts.items():
+        element = ET.SubElement(piece, part)
+        for name, array in arrays.items():
+            element.append(_data(name, array))
+    _replace(path, file)
+
+
+def _file(kind: str) -> ET.Element:
+    """The root of a file with the element that has its contents."""
+    order = {"version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    file = ET.Element("VTKFile", {"type": kind, **order})
+    ET.SubElement(file, kind)
+    return file
+
+
+def _data(name: str, array: np.ndarray) -> ET.Element:
+    """An array in base64, its number of bytes before it."""
+    kind = array.dtype.kind
+    data = array.astype({"f": "<f8", "i": "<i8", "u": "u1"}[kind]).tobytes()
+    about = {"type": KINDS[kind], "Name": name, "format": "binary"}
+    if array.ndim > 1:
+        about["NumberOfComponents"] = str(array.shape[1])
+    element = ET.Element("DataArray", about)
+    element.text = b64encode(np.array([len(data)], dtype="<u8").tobytes() + data).decode()
+    return element
+
+
+def _replace(path: Path, file: ET.Element) -> None:
+    """Write a file in one go: a run that is killed leaves the one before."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(path.name + ".part")
+    ET.ElementTree(file).write(fresh, xml_declaration=True, encoding="utf-8")
+    os.replace(fresh, path)
+
+
+class Writer:
+    """Writes the body and its contact surfaces after a step, as a time series.  Any number of ranks.
+
+    ``block.pvd`` is the body: ``displacement`` and the fields.  ``block_contact.pvd`` is the contact surface alone, those of all
+    contacts, told apart by ``contact``: ``pressure``, ``shear_traction``, ``slip`` in the last step, ``status`` (0 open, 1 stick, 2
+    slip), ``gap``, ``wear_depth``, ``dissipation``, ``displacement`` and ``reaction``; vectors are in global components.  Nodal
+    forces in ``reaction`` add up to ``contact.force()``.  The meshes are in ``block_data``, a file a step.  Rank 0 gathers and writes all.
+
+    Args:
+        problem: The ContactProblem.
+        path: The collection, ``*.pvd``.
+        fields: What else is written of the body, by name: Functions of Lagrange spaces by their values at nodes, other UFL expressions,
+            such as stress, by those in the middle of each cell.  Scalars, vectors and tensors.
+        resume: Keep this many steps of an existing series, those before a checkpoint.
+
+    Raises:
+        ValueError: on all ranks, for another ending than ``.pvd``, a name that is taken, or fewer steps in the file than ``resume``.
+
+    Example:
+        >>> writer = dc.Writer(problem, "block.pvd")
+        >>> writer.write(time=1.0)
+        >>> writer.times
+        [1.0]
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        path: str | PathLike[str],
+        fields: Mapping[str, Any] | None = None,
+        resume: int = 0,
+    ) -> None:
+        self._problem, self._comm = problem, problem.body.comm
+        self._fields = dict(fields or {})
+        with raised_together(self._comm):
+            self._path = Path(path)
+            if self._path.suffix != ".pvd":
+                raise ValueError(f"path must end in .pvd, got {str(path)!r}.")
+            if "displacement" in self._fields:
+                raise ValueError("fields: displacement is written anyway, take another name.")
+            if not isinstance(resume, (int, np.integer)) or resume < 0:
+                raise ValueError(f"resume must be a number of steps, 0 or more, got {resume!r}.")
+        self.times: list[float] = []
+        if resume:
+            self.times = by_first_rank(self._comm, lambda _: self._times_of_file(resume))
+        self._body = BodyMesh(problem.contacts[0].displacements)
+        self._surfaces = [SurfaceMesh(contact) for contact in problem.contacts]
+
+    def write(self, time: float) -> None:
+        """Write the present state of the problem; ``time`` is finite.  Collective.
+
+        Raises:
+            OSError: on all ranks, if a file cannot be written.
+        """
+        with raised_together(self._comm):
+            if not np.isfinite(time):
+                raise ValueError(f"time must be finite, got {time!r}.")
+        u = self._problem.u
+        body = self._body(u, self._fields)
+        surfaces = [surface(u) for surface in self._surfaces]
+        times = [*self.times, float(time)]
+        by_first_rank(self._comm, lambda _: self._write(times, body, surfaces))
+        self.times = times
+
+    def _parts(self) -> dict[str, Path]:
+        """The collections, and what their files begin with."""
+        stem = self._path.stem
+        return {"body": self._path, "contact": self._path.with_name(f"{stem}_contact.pvd")}
+
+    def _name(self, part: str, k: int) -> str:
+        """A file relative to the collections."""
+        return f"{self._path.stem}_data/{part}{k:06d}.vtu"
+
+    def _write(self, times: list[float], body: Mesh, surfaces: list[Mesh]) -> None:
+        meshes = {"body": body} | ({"contact": joined(surfaces)} if surfaces else {})
+        for part, mesh in meshes.items():
+            path = self._parts()[part]
+            write_vtu(path.parent / self._name(part, len(times) - 1), mesh)
+            file = _file(COLLECTION)
+            for k, time in enumerate(times):
+                entry = {"timestep": repr(time), "part": "0", "file": self._name(part, k)}
+                ET.SubElement(file[0], "DataSet", entry)
+            _replace(path, file)
+
+    def _times_of_file(self, count: int) -> list[float]:
+        """Times of the first steps of an existing series."""
+        try:
+            sets = ET.parse(self._path).getroot().findall(f"{COLLECTION}/DataSet")
+            times = [float(entry.attrib["timestep"]) for entry in sets]
+        except (OSError, ET.ParseError, KeyError, ValueError) as error:
+            raise ValueError(
+                f"cannot resume: {self._path} is no series of this writer: {error}."
+            ) from None
+        if len(times) < count:
+            raise ValueError(
+                f"cannot resume after {count} steps: {self._path} has {len(times)} of them."
+            )
+        return times[:count]
