@@ -105,8 +105,9 @@ class LoadStep:
         return self._but(tol=tol)
 
     def with_laws_of(self, x: np.ndarray) -> LoadStep:
-        """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet."""
-        return self._but(_starts=[x], _judged=None)
+        """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet.  Collective."""
+        shared = _shared_nodes(self.contacts, self.stiffness, self.body.fixed)
+        return self._but(_starts=[x], _judged=None, _shared=shared)
 
     def _but(self, **parts) -> LoadStep:
         other = copy(self)

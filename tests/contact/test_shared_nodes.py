@@ -66,6 +66,24 @@ def test_both_laws_hold_along_an_edge(law, solver):
     judged(scene, problem_of(scene, SOLVERS[solver]), WAY if law == "smooth" else WAY[:3])
 
 
+def test_friction_that_follows_the_pressure_in_an_edge():
+    """Coefficients that follow the pressure end where fixed ones of the values found give the same reactions."""
+    scene, fixed = (build_corner(70, (3, 3, 2), mu=0.3) for _ in range(2))
+    for contact in scene.contacts:
+        contact.friction = dc.Friction(lambda x, pressure: 0.1 + 0.3 / (1 + pressure / 2000.0))
+    scene.apply(WAY[1])
+    problem_of(scene, tol=1e-10).solve()
+    for contact, found in zip(fixed.contacts, scene.contacts):
+        contact.friction = found.friction
+    fixed.apply(WAY[1])
+    problem_of(fixed, tol=1e-10).solve()
+    lowest = min(contact.friction.mu.min(initial=1.0) for contact in scene.contacts)
+    assert COMM.allreduce(lowest, op=MPI.MIN) < 0.38  # of 0.4 without pressure
+    largest = max(np.abs(contact.force()).max() for contact in fixed.contacts)
+    for contact, found in zip(fixed.contacts, scene.contacts):
+        assert np.abs(contact.reaction - found.reaction).max(initial=0.0) < 1e-8 * largest
+
+
 def test_answers_do_not_depend_on_units():
     """The same scene in units of length and force that are 1e-5 and 1e7 times as large."""
     found = []
