@@ -96,7 +96,7 @@ def adapt(
         ...     U, ends = fem.Function(V), [mesh.locate_entities_boundary(cube, 2, lambda x: x[2] == z) for z in (0, 1)]
         ...     top = fem.dirichletbc(np.array([0, 0, -1e-3]), fem.locate_dofs_topological(V, 2, ends[1]), V)
         ...     form = ufl.inner(ufl.grad(U), ufl.grad(ufl.TestFunction(V))) * ufl.dx
-        ...     made = dc.ContactProblem(form, U, [dc.Contact(V, ends[0], plane, friction)], [top])
+        ...     made = dc.ContactProblem(form, U, [dc.Contact(V, ends[0], plane, friction)], bcs=[top])
         ...     return made.solve() and made
         >>> cube = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2)
         >>> found = dc.adapt(lambda of: (press(of, 1), press(of, 2)), cube, 0.05, "normal_force")
