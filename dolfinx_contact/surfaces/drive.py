@@ -184,11 +184,6 @@ class Drive:
         self._held, self._past_held = names, past
 
     @property
-    def past_held(self) -> float:
-        """The sign of a plane's motion past nodes that cannot hold it; zero if there is none."""
-        return self._past_held
-
-    @property
     def motions(self) -> list[Motion]:
         """The free motions that no contact nodes hold, rotations first."""
         if not self._free:

@@ -5,12 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, vector
+
+if TYPE_CHECKING:
+    from dolfinx_contact.surfaces.drive import Drive, Motion
 
 # Part of a length across another vector below which both are parallel.
 PARALLEL = 1e-12
@@ -29,13 +33,13 @@ def unit(name: str, value, size: int) -> np.ndarray:
 class _OfDrive:
     """An attribute of the surface's ``Drive``, which is made when it is first asked for."""
 
-    def __set_name__(self, owner, name: str) -> None:
+    def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, surface, owner=None):
+    def __get__(self, surface: Any, owner: type | None = None) -> Any:
         return self if surface is None else getattr(surface.driven_by_force(), self._name)
 
-    def __set__(self, surface, value) -> None:
+    def __set__(self, surface: Any, value: Any) -> None:
         setattr(surface.driven_by_force(), self._name, value)
 
 
@@ -70,7 +74,7 @@ class Surface(Guarded):
         self._rotation = frozen(np.zeros(3 if size == 3 else 1))
         self._turn: np.ndarray | None = None
         self._spin: np.ndarray | None = None
-        self._driver = None
+        self._driver: Drive | None = None
 
     def __copy__(self) -> Surface:
         other = object.__new__(type(self))
@@ -82,11 +86,11 @@ class Surface(Guarded):
     # -- driven by force -----------------------------------------------------------------------
 
     @property
-    def driver(self):
+    def driver(self) -> Drive | None:
         """The ``Drive``; None as long as nobody has asked for free motions or forces."""
         return self._driver
 
-    def driven_by_force(self):
+    def driven_by_force(self) -> Drive:
         """The ``Drive``, made if there is none."""
         if self._driver is None:
             from dolfinx_contact.surfaces.drive import Drive
@@ -104,7 +108,7 @@ class Surface(Guarded):
         self.driven_by_force().free = names
 
     @property
-    def motions(self) -> list:
+    def motions(self) -> list[Motion]:
         """The free motions that no contact nodes hold, rotations first."""
         return [] if self._driver is None else self._driver.motions
 

@@ -3,6 +3,7 @@
 """What a user sets is honoured, or refused at once with what to do; what was computed cannot be changed by accident."""
 
 import warnings
+from copy import copy
 
 import numpy as np
 import pytest
@@ -281,3 +282,16 @@ def test_nodes_held_along_the_normal_are_left_out():
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # in every step: said once
         problems[0].solve()
+
+
+def test_a_copied_surface_is_driven_by_itself():
+    """Forces and free motions of a copy are its own, and those of the first one stay."""
+    first = dc.RigidPlane((0, 0, 0), (0, 0, 1))
+    first.free, first.force = ("n",), (0.0, 0.0, 5.0)
+    other = copy(first)
+    other.free, other.force, other.rotation = ("n", "t1"), (1.0, 0.0, 7.0), (0.0, 0.1, 0.0)
+    assert first.free == ("n",) and first.force.tolist() == [0.0, 0.0, 5.0]
+    assert [motion.name for motion in other.motions] == ["t1", "n"]
+    axes = [motion.axis for motion in other.motions]
+    np.testing.assert_array_equal(axes, other.frame[[0, 2]])
+    assert np.abs(other.frame - first.frame).max() > 0.09
