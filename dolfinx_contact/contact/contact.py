@@ -358,10 +358,10 @@ class Contact(Guarded):
 
     def may_land(self, u: np.ndarray) -> bool:
         """Whether nodes of this rank are open at the last displacement, and there is friction if they land."""
-        if self.friction.frictionless:
+        opens = (self.last.reaction[:, -1] == 0.0) & ~self.points.closed
+        if self.friction.frictionless or not opens.any():
             return False
-        opens = (self.last.reaction[:, -1] == 0.0) & (self.last.gap > self.gap_rounding(u))
-        return bool((opens & ~self.points.closed).any())
+        return bool((self.last.gap[opens] > self.gap_rounding(u)).any())
 
     def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
