@@ -69,7 +69,7 @@ class ProblemStates:
     def places(self) -> list[tuple]:
         """Displacement and rotation of each contact's surface."""
         surfaces = [contact.surface for contact in self._contacts]
-        return [(surface.displacement, surface.rotation) for surface in surfaces]
+        return [surface.stands[:2] for surface in surfaces]
 
     def _put_surfaces(self, places: list[tuple]) -> None:
         for contact, (displacement, rotation) in zip(self._contacts, places):
