@@ -45,10 +45,13 @@ from time import perf_counter, process_time
 from tqdm import tqdm
 
 import dolfinx_contact as dc
+
+# isort: split
+import ufl
+
 from studies.punch import CASES, Parameters, Punch, programme
 from studies.punch.accuracy import NotAccurate, accurate
 from studies.punch.contact_map import draw, gather
-from studies.punch.fields import FieldWriter
 from studies.punch.model import add_options
 
 SOLVERS = {
@@ -148,15 +151,18 @@ def main(argv=None) -> None:
 def compute(parameters, solver, shown, output) -> tuple:
     """Numbers, punch, discs to draw, and the reason if a step failed: one run on the mesh that the parameters name."""
     punch, records, maps, failure = Punch(parameters, solver=solver), [], [], None
-    with FieldWriter(punch, output) as fields:
-        try:
-            for index, record in enumerate(run(punch)):
-                records.append(record)
-                fields.write(index + 1)
-                if index in shown:
-                    maps.append((f"{shown[index]}, {record['displacement']:g} mm", gather(punch)))
-        except dc.NotConverged as error:  # what was computed before is kept
-            failure = f"Step {len(records) + 1}: {error}"
+    sigma = punch.stress(punch.u)
+    von_Mises = ufl.sqrt(1.5 * ufl.inner(ufl.dev(sigma), ufl.dev(sigma)))
+    fields = {"stress": sigma, "von_Mises": von_Mises}
+    writer = dc.Writer(punch.problem, output / "punch.pvd", fields=fields)
+    try:
+        for index, record in enumerate(run(punch)):
+            records.append(record)
+            writer.write(index + 1)
+            if index in shown:
+                maps.append((f"{shown[index]}, {record['displacement']:g} mm", gather(punch)))
+    except dc.NotConverged as error:  # what was computed before is kept
+        failure = f"Step {len(records) + 1}: {error}"
     return {"dissipation": punch.dissipation(), "steps": records}, punch, maps, failure
 
 

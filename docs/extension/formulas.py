@@ -1,16 +1,28 @@
 """Formulas as MathML, which browsers draw themselves: no script, nothing is fetched."""
 
+import re
+
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 
+# One argument of a command: a group, another command, or a character.
+ARGUMENT = r"\s*(\{(?:[^{}]|\{[^{}]*\})*\}|\\[A-Za-z]+|[^\s\\{}])"
+
+
+def grouped(formula: str) -> str:
+    r"""Braces that TeX does without and docutils needs: ``\frac12`` would be 12 over what follows, ``\dot u_t`` a t under u."""
+    formula = re.sub(r"\\frac" + 2 * ARGUMENT, r"\\frac{\1}{\2}", formula)
+    accents = r"\\(dot|ddot|bar|hat|tilde|vec)(?![A-Za-z])"
+    return re.sub(accents + ARGUMENT + r"\s*(?=_)", r"\\\1{\2}{}", formula)
+
 
 def _inline(translator, node) -> None:
-    translator.body.append(tex2mathml(node.astext()))
+    translator.body.append(tex2mathml(grouped(node.astext())))
     raise nodes.SkipNode
 
 
 def _block(translator, node) -> None:
-    formula = tex2mathml(node.astext(), as_block=True)
+    formula = tex2mathml(grouped(node.astext()), as_block=True)
     translator.body.append(f'<div class="formula">{formula}</div>\n')
     raise nodes.SkipNode
 

@@ -124,6 +124,7 @@ class Writer:
         self,
         problem: ContactProblem,
         path: str | PathLike[str],
+        *,
         fields: Mapping[str, Any] | None = None,
         resume: int = 0,
     ) -> None:

@@ -278,6 +278,20 @@ def test_numbers_keep_their_units():
     assert {text: together(text).replace("\xa0", "~") for text in kept} == kept
 
 
+def test_formulas_are_grouped_as_tex_does():
+    """A fraction of two digits is one, with what follows beside it; the index of a dotted letter is not under it."""
+    pytest.importorskip("docutils")
+    from docs.extension.formulas import grouped, tex2mathml
+
+    drawn = {
+        text: "".join(tex2mathml(grouped(text)).split())
+        for text in (r"\frac12 (p + q)", r"\dot u_t")
+    }
+    assert "<mfrac><mn>1</mn><mn>2</mn></mfrac><mo" in drawn[r"\frac12 (p + q)"]
+    assert "munder" not in drawn[r"\dot u_t"] and "<mi>t</mi></msub>" in drawn[r"\dot u_t"]
+    assert grouped(r"\frac{a_{1}}{2} x") == r"\frac{{a_{1}}}{{2}} x"
+
+
 def test_cells_of_demos():
     """Every demo begins with a heading, which is its title in the gallery, and has code."""
     for file in (ROOT / "demos").glob("demo_*.py"):

@@ -65,7 +65,7 @@ def test_an_even_state_is_read_back(cell, degree, read, folder):
     alone its pressure, friction stress and slip, at vertices of second-order tetrahedra, too."""
     found = pressed(cell, degree, True, True, distorted=False)
     contact, d = found.contact, found.mesh.geometry.dim
-    dc.Writer(found.problem, folder / "a.pvd", {"gradient": ufl.grad(found.u)}).write(0.0)
+    dc.Writer(found.problem, folder / "a.pvd", fields={"gradient": ufl.grad(found.u)}).write(0.0)
     force, nodes = contact.force(), found.V.dofmap.index_map.size_global
     cells = found.mesh.topology.index_map(d).size_global
     places = np.concatenate(COMM.allgather(contact.x))
@@ -197,7 +197,9 @@ def test_fields_of_users(read, folder):
     x = ufl.SpatialCoordinate(found.mesh)
     linear = fem.Function(functionspace(found.mesh, ("Lagrange", 1)))
     linear.interpolate(lambda x: 3 * x[0] - x[1])
-    dc.Writer(found.problem, folder / "a.pvd", {"T": linear, "x": x, "height": x[1] ** 2}).write(0)
+    dc.Writer(
+        found.problem, folder / "a.pvd", fields={"T": linear, "x": x, "height": x[1] ** 2}
+    ).write(0)
 
     def check():
         points, count, at_points, at_cells = read(folder / "a_data" / "body000000.vtu")
