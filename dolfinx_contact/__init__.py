@@ -42,6 +42,8 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.petsc.linear_solver import LinearSolverError as LinearSolverError
     from dolfinx_contact.problem import ContactProblem as ContactProblem
     from dolfinx_contact.results.history import History as History
+    from dolfinx_contact.results.plot import plot as plot
+    from dolfinx_contact.results.profile import profile as profile
     from dolfinx_contact.results.record import Counts as Counts
     from dolfinx_contact.results.record import NotConverged as NotConverged
     from dolfinx_contact.results.record import Step as Step
@@ -84,6 +86,8 @@ _NAMES = {  # by their module
     "petsc.linear_solver": ["LinearSolverError"],
     "problem": ["ContactProblem"],
     "results.history": ["History"],
+    "results.plot": ["plot"],
+    "results.profile": ["profile"],
     "results.record": ["Counts", "NotConverged", "Step"],
     "results.writer": ["Writer"],
     "solvers.condensed.newton": ["CondensedNewton", "solve_condensed"],

@@ -202,6 +202,7 @@ class SurfaceMesh:
             "wear_depth": contact.wear_depth,
             "dissipation": contact.dissipation,
             "reaction": padded(np.einsum("ni,nij->nj", reaction, frames)),
+            "normal": padded(frames[:, -1]),
             "contact_node": np.ones(contact.nodes.size, dtype=np.int32),
         }
         values = {

@@ -1,0 +1,80 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Draw what ``plot.py`` has gathered:  python draw.py SEEN.npz PICTURE.png TITLE
+
+A program of its own, with NumPy and PyVista alone.
+"""
+
+import sys
+
+import numpy as np
+import pyvista
+
+STATUS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a")}
+
+# Size of a node in pixels: this over the root of their number, within limits.
+PIXELS, SMALLEST, LARGEST = 150.0, 4.0, 12.0
+
+
+def body(seen) -> pyvista.UnstructuredGrid:
+    """The body, displaced."""
+    kinds = {name: int(name[5:]) for name in seen if name.startswith("cells")}
+    rows = [np.insert(seen[name], 0, seen[name].shape[1], axis=1).ravel() for name in kinds]
+    types = [np.full(len(seen[name]), kind, dtype=np.uint8) for name, kind in kinds.items()]
+    return pyvista.UnstructuredGrid(np.concatenate(rows), np.concatenate(types), seen["x"])
+
+
+def surface(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
+    """Where the distance is zero."""
+    low, high, counts = box
+    spacing = (high - low) / np.maximum(counts - 1, 1)
+    spacing[spacing == 0.0] = 1.0
+    grid = pyvista.ImageData(dimensions=counts.astype(int), spacing=spacing, origin=low)
+    grid.point_data["distance"] = distance
+    return grid.contour([0.0], scalars="distance")
+
+
+def draw(seen, picture: str, title: str) -> None:
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 750))
+    grid = body(seen)
+    bar = {"title": title, "vertical": True, "fmt": "%.3g", "position_y": 0.3, "color": "black"}
+    looks = {"color": "#d8d8d8"}
+    if "colour" in seen:
+        looks = {"scalars": seen["colour"], "lighting": False, "scalar_bar_args": bar}
+    plotter.add_mesh(grid, show_edges=True, edge_opacity=0.25, **looks)
+    size = float(np.clip(PIXELS / np.sqrt(len(seen["nodes"])), SMALLEST, LARGEST))
+    for status, (name, colour) in STATUS.items():
+        nodes = seen["nodes"][seen["status"] == status]
+        if len(nodes):
+            balls = {"point_size": size, "render_points_as_spheres": True, "lighting": False}
+            plotter.add_mesh(
+                pyvista.PolyData(nodes), color=colour, label=f"{name}, {len(nodes)}", **balls
+            )
+    for name in seen:
+        if name.startswith("box"):
+            found = surface(seen[name], seen[f"distance{name[3:]}"])
+            if found.n_points:
+                plotter.add_mesh(found, color="#9aa5b1", opacity=0.35, line_width=3)
+    plotter.add_legend(bcolor=None, size=(0.15, 0.1), face="circle", loc="upper left")
+    look(plotter, grid, seen["view"])
+    plotter.screenshot(picture)
+
+
+def look(plotter, grid, up: np.ndarray) -> None:
+    """The view: in the plane from before it, in space from below the contact and aside."""
+    if not up.size:
+        plotter.view_xy()
+        return
+    up = up / np.linalg.norm(up)
+    aside = np.eye(3)[np.abs(up).argmin()]
+    aside = np.cross(up, np.cross(aside, up))
+    from_there = -0.5 * up + aside / np.linalg.norm(aside) - 0.6 * np.cross(up, aside)
+    centre = np.array(grid.center)
+    plotter.camera_position = [centre + grid.length * from_there, centre, up]
+    plotter.reset_camera()
+    plotter.camera.zoom(1.3)
+
+
+if __name__ == "__main__":
+    with np.load(sys.argv[1]) as file:
+        draw(dict(file), *sys.argv[2:])

@@ -1,0 +1,116 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Contact results along a line, a circle or any other row of points on the contact surface."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dolfinx_contact.results.meshes import Mesh, SurfaceMesh
+from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.collective import by_first_rank, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.problem import ContactProblem
+
+# Lines and triangles between the nodes of a facet, by VTK's type.
+PIECES = {
+    3: [(0, 1)],
+    21: [(0, 2), (2, 1)],
+    5: [(0, 1, 2)],
+    22: [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+    9: [(0, 1, 2), (0, 2, 3)],
+    28: [(0, 4, 8), (0, 8, 7), (4, 1, 5), (4, 5, 8), (8, 5, 2), (8, 2, 6), (7, 8, 6), (7, 6, 3)],
+}
+
+# Nodal forces and works are no densities: between nodes they mean nothing.
+SHOWN = ("pressure", "shear_traction", "gap", "slip", "wear_depth", "displacement")
+
+
+def profile(
+    problem: ContactProblem,
+    points: ArrayLike,
+    path: str | PathLike[str] | None = None,
+    *,
+    contact: int = 0,
+) -> dict[str, np.ndarray]:
+    """Contact results at points of the contact surface, linear between nodes, in a table and a CSV file.  Collective.
+
+    Args:
+        problem: The ContactProblem.
+        points: Positions on the undeformed contact surface in their order, ``shape=(k, gdim)``, global frame; the nearest point of the
+            surface counts.
+        path: CSV file; None writes none.
+        contact: Index of the contact.
+
+    Returns:
+        Columns by name, ``shape=(k,)``, the same on all ranks: ``s``, the length along the points; ``x``, ``y``, ``z``; ``pressure``;
+        ``shear_traction_x``, ...; ``gap``; ``slip_x``, ...; ``wear_depth``; ``displacement_x``, ...; ``status`` of the nearest node.
+
+    Raises:
+        ValueError: on all ranks, for points of another shape, or farther from the surface than a facet is large.
+        OSError: on all ranks, if the file cannot be written.
+
+    Example:
+        >>> line = np.linspace([0, 0.5, 0], [1, 0.5, 0], 50)
+        >>> dc.profile(problem, line)["pressure"].shape
+        (50,)
+    """
+    comm = problem.body.comm
+    with raised_together(comm):
+        if contact not in range(len(problem.contacts)):
+            raise ValueError(f"contact {contact!r}: the problem has {len(problem.contacts)}.")
+        at, gdim = finite("points", points), problem.contacts[contact].points.dim
+        if at.ndim != 2 or at.shape[1] != gdim or not len(at):
+            raise ValueError(f"points must have shape (k, {gdim}), got {at.shape}.")
+    mesh = SurfaceMesh(problem.contacts[contact])(problem.u)
+    at = np.pad(at, ((0, 0), (0, 3 - gdim)))
+    return by_first_rank(comm, lambda _: _written(_table(mesh, at), path))
+
+
+def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns."""
+    of = [
+        mesh.cells[kind][:, PIECES[kind]].reshape(-1, len(PIECES[kind][0])) for kind in mesh.cells
+    ]
+    pieces = np.concatenate(of)
+    found = [_nearest(mesh.x[pieces], point) for point in at]
+    nodes = pieces[[piece for piece, _ in found]]
+    weights = np.array([weights for _, weights in found])
+    steps = np.linalg.norm(np.diff(at, axis=0), axis=1)
+    table = {"s": np.concatenate(([0.0], np.cumsum(steps)))} | dict(zip("xyz", at.T))
+    for name in SHOWN:
+        values = np.einsum("kj,kj...->k...", weights, mesh.at_nodes[name][nodes])
+        table |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": column for axis, column in zip("xyz", values.T)}  # fmt: skip
+    nearest = np.take_along_axis(nodes, weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return table | {"status": mesh.at_nodes["status"][nearest]}
+
+
+def _nearest(corners: np.ndarray, point: np.ndarray) -> tuple[int, np.ndarray]:
+    """The nearest of some lines or triangles, ``shape=(m, 2 or 3, 3)``, and the weights of its corners."""
+    sides = corners[:, 1:] - corners[:, :1]
+    square = sides @ sides.transpose(0, 2, 1)
+    along = np.einsum("mij,mj->mi", sides, point - corners[:, 0])
+    inner = np.linalg.solve(square, along[..., None])[..., 0]
+    weights = np.maximum(np.column_stack((1.0 - inner.sum(axis=1), inner)), 0.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    away = np.linalg.norm(np.einsum("mj,mjk->mk", weights, corners) - point, axis=1)
+    k = int(away.argmin())
+    if away[k] > np.linalg.norm(sides[k], axis=1).max():
+        raise ValueError(
+            f"points: {point.tolist()} is {away[k]:.3g} away from the contact surface, farther than a facet is large."
+        )
+    return k, weights[k]
+
+
+def _written(table: dict[str, np.ndarray], path) -> dict[str, np.ndarray]:
+    if path is not None:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        rows, header = np.column_stack(list(table.values())), ",".join(table)
+        np.savetxt(path, rows, fmt="%.12g", delimiter=",", header=header, comments="")
+    return table
