@@ -191,7 +191,7 @@ class Friction(Guarded):
     def __reduce__(self) -> tuple:
         if self.field:
             mu, p, axes = self._given.values()
-            return partial(Friction, axes=axes, of=self.of), (mu, p, self.exponent)
+            return partial(Friction, k=self.exponent, axes=axes, of=self.of), (mu, p)
         return partial(Friction, axes=self.axes), (self.mu, np.where(self.mu > 0, self.p, 1.0))
 
     def __repr__(self) -> str:

@@ -54,16 +54,16 @@ class EnergyBalance:
     def open(self) -> None:
         """Remember the state before a step.  Collective."""
         contact, u = self.punch.contact, self.punch.u.x.array.copy()
-        nodal = contact.reaction.copy(), contact.gap.copy(), contact.dissipation.copy()
+        nodal = contact.reaction, contact.gap, contact.dissipation, contact.displacement[:, :2]
         totals = self._energy(u), contact.force()[2], -float(self.punch.approach.value)
         self.state = u, *nodal, *totals
 
     def close(self) -> dict[str, float]:
         """The terms of the step that was solved since ``open``.  Collective."""
-        u0, r0, gap0, work0, W0, force0, depth0 = self.state
+        u0, r0, gap0, work0, at0, W0, force0, depth0 = self.state
         self.open()
-        u1, r1, gap1, work1, W1, force1, depth1 = self.state
-        moved, slip = depth1 - depth0, self.punch.contact.slip_increment
+        u1, r1, gap1, work1, at1, W1, force1, depth1 = self.state
+        moved, slip = depth1 - depth0, at1 - at0  # of the whole way, as the platen's work
         frictions = -r1[:, :2] * slip, -0.5 * (r0 + r1)[:, :2] * slip, work1 - work0
         nodal = (*frictions, r1[:, 2] * gap0, r0[:, 2] * gap1)
         sums = self.punch.comm.allreduce(np.array([values.sum() for values in nodal]))

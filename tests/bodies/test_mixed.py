@@ -225,7 +225,8 @@ def test_a_ball_in_a_block_of_tetrahedra(bulk):
     ball = dc.RigidSphere((0.5, 0.5, 0.9), 0.4, axis=(1, 0, 0))
     contact = dc.Contact(W, top, ball, dc.Friction(0.3))
     F = ufl.derivative(energy * dx, w, ufl.TestFunction(W))
-    problem = dc.ContactProblem(F, w, contact, bcs=[bc])
+    # one solution a step, whose iterations are counted: none is repeated with the geometry of its end
+    problem = dc.ContactProblem(F, w, contact, bcs=[bc], geometry_tol=np.inf)
     for depth in (0.03, 0.06, 0.09):
         ball.displacement = (0.0, 0.0, -depth)
         assert problem.solve().iterations <= 6

@@ -132,6 +132,7 @@ def test_a_round_face_agrees_with_slow_gauss_seidel(law):
         face=lambda y: -(y[0] ** 2 + y[1] ** 2) / (2 * radius),
     )
     scene.held.value = np.array([0.0024, 0.0012, -0.02])
+    scene.problem.geometry_tol = np.inf  # the sweeps count slip from the start of the step
     matrix = dolfinx.fem.petsc.assemble_matrix(
         fem.form(ufl.derivative(scene.F, scene.u, ufl.TrialFunction(scene.V)))
     )
