@@ -345,8 +345,8 @@ class ContactProblem(Guarded):
 
     def _may_land(self) -> bool:
         """Whether nodes that are open may land with friction.  Collective."""
-        may = any(contact.may_land(self._states.last) for contact in self.contacts)
-        return self.body.comm.allreduce(may, op=MPI.LOR)
+        may = [contact.may_land(self._states.last) for contact in self.contacts]
+        return self.body.comm.allreduce(any(may), op=MPI.LOR)
 
     def bound(self) -> BoundSolver:
         """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""

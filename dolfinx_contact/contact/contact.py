@@ -357,11 +357,15 @@ class Contact(Guarded):
         self.take(**self._placement.moved(values, self.last, self.wear_depth))
 
     def may_land(self, u: np.ndarray) -> bool:
-        """Whether nodes of this rank are open at the last displacement, and there is friction if they land."""
+        """Whether nodes of this rank are open at the last displacement, and there is friction if they land.
+
+        Collective where points are not ``local``.
+        """
         opens = (self.last.reaction[:, -1] == 0.0) & ~self.points.closed
-        if self.friction.frictionless or not opens.any():
+        if self.points.local and not opens.any():
             return False
-        return bool((self.last.gap[opens] > self.gap_rounding(u)).any())
+        landing = self.last.gap[opens] > self.gap_rounding(u)
+        return bool(landing.any()) and not self.friction.frictionless
 
     def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""

@@ -65,7 +65,7 @@ def test_random_problems_of_every_rank():
     A solution exists in all of them; the worst have more contacts than degrees of freedom, mu above 5
     and a slip rule at right angles to friction.
     """
-    patient = CondensedNewton(max_iterations=20_000)  # seven of them need more than is usual
+    patient = CondensedNewton(max_iterations=20_000)
     branches = Counter(check(random_problem(seed), solver=patient).branch for seed in range(150))
     assert branches["newton, 3 rho_t"] > 10 and branches["interior_point"] > 10
 

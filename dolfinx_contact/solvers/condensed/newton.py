@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 
 UNLIMITED = 200_000  # iterations; methods have limits of their own
 
-# By default a refusal takes some 10 to 60 times as long as a usual solution: iterations at least, which piles of rigid bodies need,
-# and iterations times the unknowns squared.
-LEAST, WORK = 600, 3e5
+# Iterations by default for arrays: random problems with strong friction and crossed slip rules need up to some 6,000.
+USUAL = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +180,7 @@ def solve_condensed(
 
     Raises:
         ValueError: input that makes no sense.
-        CondensedNotConverged: nothing reached ``tol``, with the best state.  ``CondensedNewton(max_iterations=20_000)`` searches longer.
+        CondensedNotConverged: nothing reached ``tol``, with the best state.  ``CondensedNewton(max_iterations=200_000)`` searches longer.
 
     Example:
         >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
@@ -195,7 +194,7 @@ def solve_condensed(
         W, q = _turned_matrix(W, turns), _turned(q, turns)
     operator = condensed_operator(W, q.shape[1])
     try:
-        found = _usual(solver, q.size).solve_condensed(operator, friction, q, tol, starts)
+        found = _usual(solver).solve_condensed(operator, friction, q, tol, starts)
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
@@ -213,10 +212,9 @@ def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
     return solver, tol
 
 
-def _usual(solver: CondensedNewton, unknowns: int) -> CondensedNewton:
+def _usual(solver: CondensedNewton) -> CondensedNewton:
     """The solver with the usual limit of iterations, if it has none."""
-    most = solver.max_iterations or max(LEAST, int(WORK / unknowns**2))
-    return replace(solver, max_iterations=most)
+    return replace(solver, max_iterations=solver.max_iterations or USUAL)
 
 
 def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:

@@ -86,7 +86,7 @@ class CondensedNotConverged(RuntimeError):
             f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
             f"{best.iterations} iterations and {best.seconds:.3g} s. Tried (iterations): {methods}. "
             "Smaller load steps, or a start r0 near the solution, help most often, then more iterations, "
-            "CondensedNewton(max_iterations=20_000); a body of too few degrees of freedom may have no solution at all."
+            "CondensedNewton(max_iterations=200_000); a body of too few degrees of freedom may have no solution at all."
         )
 
     def __reduce__(self) -> tuple:
