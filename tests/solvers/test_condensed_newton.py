@@ -258,18 +258,18 @@ def test_infeasible_raises():
     assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "proximal_point"}
 
 
-def test_a_refusal_takes_few_times_a_solution():
-    """Friction of 1e7, of which most are refused: at most 60 times the iterations of a usual solution, unless more are asked for."""
-    scenes = [random_problem(seed, contacts=30, mu_range=(0.1, 0.6), ratio=2) for seed in range(5)]
-    usual = [check(scene).iterations for scene in scenes]
+def test_a_limit_of_iterations_ends_a_refusal():
+    """Friction of 1e7, of which most are refused: no more iterations than asked for, but for the last method's, and more if more are."""
     refused = 0
     for seed in range(4):
         scene = random_problem(seed, contacts=30, mu_range=(1e7, 1e8))
         try:
-            solve_condensed(scene.W, scene.q, friction(scene))
+            solve_condensed(
+                scene.W, scene.q, friction(scene), solver=CondensedNewton(max_iterations=600)
+            )
         except CondensedNotConverged as failure:
             refused += 1
-            assert failure.best.iterations <= 60 * np.median(usual)
+            assert failure.best.iterations <= 2 * 600
             patient = CondensedNewton(max_iterations=2 * failure.best.iterations)
             with pytest.raises(CondensedNotConverged, match="max_iterations") as again:
                 solve_condensed(scene.W, scene.q, friction(scene), solver=patient)
