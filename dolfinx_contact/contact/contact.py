@@ -532,8 +532,7 @@ class Contact(Guarded):
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
         law, law_before = self.friction, self.law_before
         slip = self.slip_kept + self.slip_increment
-        rough = np.broadcast_to(law.mu, (len(slip), 2)).any(axis=1)
-        sticks = (rough & (self.status == int(Status.STICK)))[:, None]
+        sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
         begun = self._laws.begun
         if begun is None:

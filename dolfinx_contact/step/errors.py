@@ -123,10 +123,12 @@ def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
         stiffness: Of its nodes.
         unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
     """
+    slips = contact.status == int(Status.SLIP)
+    if not slips.any():
+        return slips
     slip = contact.slip_kept + contact.slip_increment  # else what is slow would never slip
     made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, slip), axis=1)
-    rough = (np.broadcast_to(contact.friction.mu, (made.size, 2)) > 0.0).any(axis=1)
-    return rough & (contact.status == int(Status.SLIP)) & (made <= unknown)
+    return slips & (made <= unknown) & (contact.friction.mu > 0.0).any(axis=-1)
 
 
 def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
