@@ -93,7 +93,7 @@ class ContactProblem(Guarded):
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
             "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, by volume: with the least integral of |du|^2.
         geometry_tol: Largest ``step.geometry_error``: of forces that distances, normals and arms at the end of a step may differ by
-            from those with which it was solved, on surfaces that are curved, turn or are wavy, see docs/surfaces.md.
+            from those with which it was solved, on surfaces that are curved, turn, are wavy or deformable, see docs/surfaces.md.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
@@ -321,7 +321,7 @@ class ContactProblem(Guarded):
             from dolfinx_contact.surfaces.driven import approach
 
             approach(body, self.contacts, here)
-        turned = follow(self.contacts, body, here, self._points)
+        turned = follow(self.contacts, body, here, self._states.last, self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
             if turned or not body.nonlinear:  # else its stiffness is new in every iteration

@@ -214,18 +214,19 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
     return held, closed, guided, np.isin(contact.points.dofs, fixed)
 
 
-def follow(contacts, body, u: np.ndarray, known: list) -> bool:
+def follow(contacts, body, u: np.ndarray, start: np.ndarray, known: list) -> bool:
     """Let frames and gaps of contacts follow their nodes and surfaces; whether frames changed.  Collective.
 
     Args:
         contacts: The contacts.
         body: The body.
-        u: Last converged displacement, owned degrees of freedom.
+        u: Displacement for which they are taken, owned degrees of freedom.
+        start: The last converged one.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
     for contact in contacts:
         if contact.follows:
-            contact.follow(u)
+            contact.follow(u, start)
     changed = [c for c, points in zip(contacts, known) if c.points is not points]
     known[:] = [contact.points for contact in contacts]
     if changed:

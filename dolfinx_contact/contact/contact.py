@@ -336,9 +336,9 @@ class Contact(Guarded):
         """Frames, gaps and motions relative to the surface."""
         return self._placement
 
-    def follow(self, u: np.ndarray) -> None:
+    def follow(self, u: np.ndarray, start: np.ndarray | None = None) -> None:
         """Take frames and gaps for the next step, where the surface is at present; see ``Placement.follow``."""
-        self._placement.follow(u, self._wanders, self._settled)
+        self._placement.follow(u, u if start is None else start, self._wanders, self._settled)
         self._history.last = self._placement.carried(self._settled)
         self._history.restore()
         self._forget_supported()
@@ -601,7 +601,7 @@ class Contact(Guarded):
         surface = self.surface
         surface.rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
         if self.follows:
-            self._placement.back_to(np.array(saved["home"]) if surface.varies else None)
+            self._placement.back_to(saved["home"] if surface.varies else saved.get("at"))
         self._history.load(saved)
         surface.displacement = saved["plane"]
         self._history.settled_by = self._laws.load(self, saved)
@@ -737,7 +737,7 @@ class Contact(Guarded):
         """
         if self._area is None:
             self._area = frozen(fields.facing_areas(self, self._weight))
-        return self._area
+        return frozen(self._area * self.covered) if self.surface.deformable else self._area
 
     @property
     def opposite(self) -> np.ndarray:

@@ -70,7 +70,7 @@ def facing_areas(contact, weight) -> np.ndarray:
 
     On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that an even pressure p makes the
     reactions ``p A_i``.  On a curved surface, whose normals will be others when the body has moved, facets count by their own area
-    where they face it, :math:`n_f \cdot n < 0`.
+    where they face it, :math:`n_f \cdot n < 0`; on a deformable one they are whole.
 
     Args:
         contact: The contact.
@@ -78,8 +78,7 @@ def facing_areas(contact, weight) -> np.ndarray:
     """
     V, surface = contact.displacements.V, contact.surface
     if surface.deformable:
-        whole = areas(V, contact.facets, weight=weight)[V.mesh.geometry.dim * contact.nodes]
-        return whole * contact.covered
+        return areas(V, contact.facets, weight=weight)[V.mesh.geometry.dim * contact.nodes]
     dim = V.mesh.geometry.dim
     towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
     at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)

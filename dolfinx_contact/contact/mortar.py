@@ -70,6 +70,12 @@ class Side(NamedTuple):
         rows = {name: getattr(self, name)[which] for name in ("nodes", "x", "outwards")}
         return self._replace(**rows)
 
+    def moved(self, x: np.ndarray) -> Side:
+        """The facets with nodes elsewhere, ``shape=(m, k, gdim)``; the body stays on its side of them."""
+        before, now = (_normals(at[:, _cyclic(self.corners)]) for at in (self.x, x))
+        side = np.sign((before * self.outwards).sum(axis=1, keepdims=True))
+        return self._replace(x=x, outwards=side * now)
+
     def shapes(self, local: np.ndarray) -> np.ndarray:
         """Shape functions at points of the reference facet, ``shape=(..., k)``."""
         inverse = np.linalg.inv(monomials(self.local, len(self.corners), self.degree))

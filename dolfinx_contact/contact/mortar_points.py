@@ -9,14 +9,17 @@ PETSc matrix: the opposite nodes may belong to other ranks.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
 from dolfinx_contact.contact.mortar import Rows, Side, rows_of
-from dolfinx_contact.contact.placement import Placed, Placement
+from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
@@ -28,71 +31,142 @@ AXIS = 1e-8  # part of an axis along the surface, of a direction that is none
 
 
 class MortarPlacement(Placement):
-    """Frames, gaps and motions of the slave nodes of a contact relative to the opposite mesh, in the undeformed state."""
+    """Frames, gaps and motions of the slave nodes of a contact relative to the opposite mesh.
+
+    In a step they are linear in the displacement, with the coefficients of one state: the undeformed one if sliding is small;
+    else the last one for which ``geometry_error`` was too large, see ``step/geometry.py``.
+    """
 
     def __init__(self, contact, facets: np.ndarray, owned: tuple, extent: float):
-        of, surface, nodes = contact.displacements, contact.surface, contact.nodes
-        self._facets = _gathered(of, facets, contact.comm)
-        self._opposite = Opposite(of, surface.facets, contact.comm)
+        of, nodes, comm = contact.displacements, contact.nodes, contact.comm
+        self._slave, self._master = (
+            Skin(of, some, comm) for some in (facets, contact.surface.facets)
+        )
         numbers = _numbers(of.V.dofmap.index_map, nodes)
-        mine = [side.some(np.isin(side.nodes, numbers).any(axis=1)) for side in self._facets]
-        with raised_together(contact.comm):
-            self.rows = _sorted_rows(mine, self._opposite.sides, numbers)
-        self._towards = _mean_normals(mine, numbers)
-        gdim = of.dim
-        super().__init__(surface, contact.x[:, :gdim], of.dofs(nodes), owned, extent, contact.comm)
+        self._mine = np.searchsorted(self._slave.numbers, numbers)
+        self._near = [np.isin(side.nodes, self._mine).any(axis=1) for side in self._slave.sides]
+        self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
+        self._projected: tuple = (None, None)  # a displacement, and what was placed for it
+        self._start = np.zeros(owned[0])
+        super().__init__(
+            contact.surface, contact.x[:, : of.dim], of.dofs(nodes), owned, extent, comm
+        )
 
     def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
-        """See ``Placement``: once, where the undeformed bodies stand.  Collective."""
-        x, surface = self.x, self.surface
+        """See ``Placement``: where the undeformed bodies stand.  Collective."""
+        self.now = self.placed(np.zeros(self._owned[0]))
+
+    def placed(self, u: np.ndarray) -> Placed:
+        """Frames, gaps and rows of the state with a displacement of owned degrees of freedom.  Collective."""
+        if self._projected[0] is u:
+            return self._projected[1]
+        compat.free_garbage(self._comm)  # rows of earlier steps
+        slaves, _ = self._slave.moved(u)
+        masters, there = self._master.moved(u)
+        mine = [side.some(near) for side, near in zip(slaves, self._near)]
         with raised_together(self._comm):
-            frames = frames_along(self._towards, surface.axis)
-        opposite = self.rows.m @ self._opposite.x
-        flat = ((x - opposite) * frames[:, -1]).sum(axis=1)
-        flat[~self.rows.covered] = self._apart  # opposite nothing: closed
-        points = MortarPoints(self._dofs, frames, self._owned, self.rows, self._opposite.dofs, self._comm)  # fmt: skip
-        home, frames, flat = map(frozen, (x.copy(), frames, flat))
-        still = surface.rotation
-        self.now = Placed(home, still, frames, frames, flat, points, None, None, still)
+            rows = _sorted_rows(mine, masters, self._mine)
+            normals = _without(self._supported, _mean_normals(mine, self._mine))
+            frames = frames_along(normals, self.surface.axis)
+        flat = ((self.x - rows.m @ self._master.x) * frames[:, -1]).sum(axis=1)
+        flat[~rows.covered] = self._apart  # opposite nothing: closed
+        points = MortarPoints(self._dofs, frames, self._owned, rows, self._master.dofs, self._comm)
+        still = self.surface.rotation
+        frames, flat, at = frozen(frames), frozen(flat), frozen(u.view())
+        found = Placed(self.x, still, frames, frames, flat, points, None, None, still, at=at)
+        self._projected = u, found
+        return found
+
+    def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
+        """See ``Placement``; rows stay as they are at the start of a step, and are renewed within it."""
+        self._start = start
+        self.now = self.settled if u is start else self.placed(u)
+
+    def carried(self, last: State) -> State:
+        """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
+        before, now = self.settled, self.now
+        if now.points is before.points:
+            return last
+        moved = frozen(now.points.motion(self._start))
+        turned = frozen(carried(last.reaction, before.frame, now.frame))
+        # What comes in from the side does not land.
+        gap = frozen(np.where(before.points.alone, 0.0, last.gap))
+        return last._replace(displacement=moved, reaction=turned, gap=gap)
+
+    def moved(self, u: np.ndarray, last: State, worn: np.ndarray) -> dict:
+        """See ``Placement``; what is opposite nothing does not slip."""
+        moved = super().moved(u, last, worn)
+        moved["slip_increment"][self.now.points.alone] = 0.0
+        return moved
+
+    def back_to(self, at: np.ndarray | None) -> None:
+        """See ``Placement``: rows of a displacement that was saved."""
+        self.now = self.placed(np.zeros(self._owned[0]) if at is None else at)
+
+    def ended(self, state: State, u: np.ndarray) -> Ended:
+        """What a state would be with the rows of its own displacement ``u``, owned degrees of freedom.  Collective."""
+        now, there = self.now, self.placed(u)
+        slip, used = (of.points.motion(u - self._start) for of in (there, now))
+        slip[:, -1] = used[:, -1] = 0.0
+        missed = times(now.frame, turned_back(there.frame, slip)) - used
+        reaction = carried(state.reaction, now.frame, there.frame)
+        reaction[there.points.alone] = 0.0
+        forces = np.zeros(self._owned[0])
+        there.points.add_forces(reaction, forces)
+        now.points.add_forces(-state.reaction, forces)
+        gap = there.flat + there.points.motion(u)[:, -1]
+        return Ended(gap, missed[:, :-1], forces)
+
+    @property
+    def changes(self) -> bool:
+        """See ``Placement``."""
+        return self.surface.sliding == "large"
 
     @property
     def opposite(self) -> np.ndarray:
         """See ``Placement``."""
-        return self._opposite.nodes
+        return self._master.nodes
 
     @property
     def covered(self) -> np.ndarray:
         """See ``Placement``."""
-        rows, none = self.rows, np.zeros(len(self.x))
-        part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
-        return np.where(rows.covered, part, 0.0)
+        return self.now.points.share
 
     def strayed(self, state: State) -> tuple[float, float]:
         """See ``Placement``: from the opposite point of the undeformed state, and half of the smallest facet."""
+        if self.changes:
+            return 0.0, np.inf
         slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
         slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
-        return float(slid), STRAYED * self._opposite.smallest
+        return float(slid), STRAYED * self._master.smallest
 
     def follows(self, wanders: bool) -> bool:
-        """Never: sliding is small."""
-        return False
+        """See ``Placement``."""
+        return self.changes
 
     def meet(self, fixed: np.ndarray) -> None:
         """Take frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
         held = np.isin(self._dofs, fixed)
-        left = np.where(held, 0.0, self._towards)
-        length = np.linalg.norm(left, axis=1, keepdims=True)
-        some = length > FREE  # else the support holds the node along its normal
-        self._towards = np.where(some, left / np.where(some, length, 1.0), self._towards)
-        self._place(self.x, self.x, None)
+        if not self._comm.allreduce(bool((held != self._supported).any())):
+            return
+        self._supported, self._projected = held, (None, None)
+        self.now = self.placed(self.now.at)
         self.settle()
 
 
-class Opposite:
-    """The nodes of the other side, known to all ranks.
+class Ended(NamedTuple):
+    """What a state would be with the rows of its own displacement."""
+
+    gap: np.ndarray  # without wear, (n,)
+    slip: np.ndarray  # less the one that was used, in its frame, (n, gdim - 1)
+    forces: np.ndarray  # of the reactions on owned degrees of freedom, less those that were used
+
+
+class Skin:
+    """Facets of one side and their nodes, known to all ranks.
 
     Attributes:
-        sides: Their facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
+        sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
         smallest: The shortest edge of a facet.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
@@ -101,24 +175,37 @@ class Opposite:
     """
 
     def __init__(self, of, facets: np.ndarray, comm):
-        sides = _gathered(of, facets, comm)
-        self.numbers = np.unique(np.concatenate([side.nodes.ravel() for side in sides]))
+        sides, self._comm = _gathered(of, facets, comm), comm
+        self.numbers = np.unique(
+            np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
+        )
         self.x = np.zeros((self.numbers.size, of.dim))
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
         ends = [side.x[:, side.corners] for side in sides]
         self.smallest = min(
-            np.linalg.norm(x[:, 1] - x[:, 0], axis=1).min(initial=np.inf) for x in ends
+            [np.linalg.norm(x[:, 1] - x[:, 0], axis=1).min(initial=np.inf) for x in ends],
+            default=np.inf,
         )
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
         index_map, count = of.V.dofmap.index_map, of.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
-        self.nodes = local = np.flatnonzero(own)
-        dofs = of.owned[1] + of.dofs(local)
-        given = comm.allgather((_numbers(index_map, local), dofs))
-        at = np.searchsorted(self.numbers, np.concatenate([numbers for numbers, _ in given]))
-        self.dofs = np.zeros((self.numbers.size, of.dim), dtype=np.int64)
-        self.dofs[at] = np.concatenate([dofs for _, dofs in given])
+        self.nodes = np.flatnonzero(own)
+        self._own = of.dofs(self.nodes)
+        given = comm.allgather(_numbers(index_map, self.nodes))
+        self._at = np.searchsorted(self.numbers, np.concatenate(given))
+        self.dofs = self._everywhere(of.owned[1] + self._own)
+
+    def _everywhere(self, rows: np.ndarray) -> np.ndarray:
+        """Rows of this rank's nodes and of all others'.  Collective."""
+        found = np.zeros((self.numbers.size, rows.shape[1]), dtype=rows.dtype)
+        found[self._at] = np.concatenate(self._comm.allgather(rows))
+        return found
+
+    def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
+        """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
+        there = self.x + self._everywhere(u[self._own])
+        return [side.moved(there[side.nodes]) for side in self.sides], there
 
 
 class MortarPoints(ContactPoints):
@@ -129,6 +216,10 @@ class MortarPoints(ContactPoints):
         rows: Coefficients of the opposite nodes.
         opposite: Degrees of freedom of all opposite nodes in global numbers, ``shape=(m, gdim)``.
         comm: MPI communicator.  Everything that asks for motion or forces is collective.
+
+    Attributes:
+        alone: Nodes opposite nothing, or next to nothing, ``shape=(n,)``.
+        share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
     """
 
     local = False
@@ -136,7 +227,11 @@ class MortarPoints(ContactPoints):
     def __init__(self, dofs, frames, owned, rows: Rows, opposite: np.ndarray, comm):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
-        self._m, self._covered, self._opposite, self._comm = rows.m, rows.covered, opposite, comm
+        self._m, self._opposite, self._comm = rows.m, opposite, comm
+        self.alone = ~rows.covered
+        none = np.zeros(self.count)
+        part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
+        self.share = frozen(np.where(rows.covered, part, 0.0))
         turned = block_diagonal(frames)
         mine = (self.first + dofs).ravel()
         self._S = self._petsc(turned.indptr, mine[turned.indices], turned.data)
@@ -158,7 +253,7 @@ class MortarPoints(ContactPoints):
 
     def hold(self, held, closed, guided=None, fixed=None) -> None:
         """See ``ContactPoints``; nodes opposite nothing never touch, either."""
-        super().hold(held, closed | ~self._covered, guided, fixed)
+        super().hold(held, closed | self.alone, guided, fixed)
 
     def motion(self, u: np.ndarray) -> np.ndarray:
         """See ``ContactPoints``."""
@@ -299,6 +394,14 @@ def _gathered(of, facets: np.ndarray, comm) -> list[Side]:
 def _numbers(index_map, nodes: np.ndarray) -> np.ndarray:
     """Global numbers of local nodes."""
     return index_map.local_to_global(nodes.astype(np.int32)).astype(np.int64)
+
+
+def _without(held: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Unit normals without the components that supports hold, unless these are all of them."""
+    left = np.where(held, 0.0, normals)
+    length = np.linalg.norm(left, axis=1, keepdims=True)
+    some = length > FREE  # else the support holds the node along its normal
+    return np.where(some, left / np.where(some, length, 1.0), normals)
 
 
 def _sorted_rows(slaves: list[Side], masters: list[Side], numbers: np.ndarray) -> Rows:

@@ -45,6 +45,7 @@ class Placed(NamedTuple):
     )  # by what the way along the surface is more than its chord, (n, gdim - 1)
     ended: np.ndarray  # rotation of the surface at the end of the step
     before: np.ndarray | None = None  # slip before nodes touch, (n, gdim - 1)
+    at: np.ndarray | None = None  # displacement of a deformable surface, owned degrees of freedom
 
 
 class Placement:
@@ -86,13 +87,14 @@ class Placement:
         """
         self._place(self.surface.relative(self.x) if wanders else self.x, self.x, self.now)
 
-    def follow(self, u: np.ndarray, wanders: bool, last: State) -> None:
+    def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
         """Take frames and gaps for the next step, where the surface is at present.  Collective.
 
         Directions held by supports are not known for the new frames.
 
         Args:
             u: Displacement of owned degrees of freedom with which nodes stand there.
+            start: That at the start of the step.
             wanders: As in ``stand``.
             last: The last converged state, in the frames of its step.
         """

@@ -25,7 +25,7 @@ from dolfinx_contact.support.numbering import original_cells, original_nodes
 VERSION = 1
 
 # Ends of the names of arrays that not every history has, and of those that files without a version may lack.
-LATELY = ("law_of_last_step", "home", "rotation_of_plane")
+LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed")
 NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
 
 ANEW = "Take another one, or write it anew with problem.save."
@@ -80,6 +80,9 @@ def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
         saved = [contact.save() for contact in contacts]
     for k, of_contact in enumerate(saved):
         mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
+        if contacts[k].surface.deformable:
+            at = contacts[k].placement.now.at
+            mine[f"{k}_placed"] = body.displacements.rows(at)
     return mine
 
 
@@ -139,6 +142,9 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
         {n.removeprefix(prefix): a for n, a in mine.items() if n.startswith(prefix)}
         for prefix in (f"contact{k}_" for k in range(len(contacts)))
     ]
+    for k, saved in enumerate(own):
+        if f"{k}_placed" in mine:
+            saved["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
     with raised_together(comm):
         for contact, saved in zip(contacts, own):
             contact.check_saved(saved)
@@ -287,7 +293,9 @@ def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
     part = {}
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
-        names = ["u", "before", "load", "free", "rough"] if prefix == "" else file
+        of_body = {"u", "before", "load", "free", "rough"}
+        of_body |= {name for name in file if name.endswith("_placed")}
+        names = of_body if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]
     # Of the coefficients for which the free state holds a rank knows its own share alone.

@@ -46,7 +46,7 @@ class Step:
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
         penetration: Largest penetration, >= 0, length.
         geometry_error: Forces by which distances, normals and arms at the end of the step differ from those with which it was solved, over
-            the forces that act; 0 on planes that are flat and do not turn, see docs/surfaces.md.
+            the forces that act; 0 on planes that are flat and do not turn, see docs/surfaces.md, and if sliding is small.
         iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
             started (the last step's, or its continuation), already was the solution.
         seconds: Wall time of the step.

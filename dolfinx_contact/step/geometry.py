@@ -4,7 +4,8 @@
 
 A step is solved with a tangent plane, arms and a way along the surface for each node.  They are exact at one position.
 What is missed at the end counts as force: a length times the stiffness of its node, an angle times the reaction, an arm
-times the reaction over the largest arm.
+times the reaction over the largest arm.  On deformable surfaces, whose rows are exact for one displacement, it is the forces on both
+bodies that those of the end would make.
 """
 
 from __future__ import annotations
@@ -36,8 +37,11 @@ def geometry_error(
     """
     squares = np.zeros(3)
     for contact, of in zip(contacts, stiffness):
-        with raised_together(body.comm):  # the user's functions
-            missed = _missed(contact, of, u)
+        if contact.surface.deformable:
+            missed = _missed_by_rows(contact, of, u, body.fixed)
+        else:
+            with raised_together(body.comm):  # the user's functions
+                missed = _missed(contact, of, u)
         squares += [np.square(force).sum() for force in missed]
     parts = [*np.sqrt(body.total(squares)), *_moments(body, contacts, u)]
     left = float(max(parts))
@@ -46,27 +50,52 @@ def geometry_error(
 
 def _missed(contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
     """Of gaps, normals and ways, as forces on each node, ``shape=(n,)``."""
-    placement, r, gap = contact.placement, contact.reaction, contact.gap
+    placement, r = contact.placement, contact.reaction
     surface, there = placement.ended_at(u)
     y = surface.relative(there)
     own, distance = surface.frames(y), surface.distance(y)
     size = np.linalg.norm(r, axis=1)
-    presses = r[:, -1] > 0.0
-    exact = distance + contact.wear_depth
-    off = np.where(presses, np.abs(exact - gap), np.maximum(-exact, 0.0))
-    off[contact.points.closed] = 0.0
     turned = surface.turned(own)[..., -1, :] - contact.frame[..., -1, :]
     angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
     way = placement.way(surface, y, own, distance, contact.settled)
     missed = way - (0.0 if placement.now.way is None else placement.now.way)
+    return (
+        _pressed(contact, stiffness, distance),
+        size * angle,
+        _dragged(contact, stiffness, missed),
+    )
+
+
+def _missed_by_rows(contact, stiffness: NodalStiffness, u: np.ndarray, fixed) -> tuple:
+    """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
+    ended = contact.placement.ended(contact.present, u)
+    ended.forces[fixed] = 0.0
+    return (
+        _pressed(contact, stiffness, ended.gap),
+        ended.forces,
+        _dragged(contact, stiffness, ended.slip),
+    )
+
+
+def _pressed(contact, stiffness: NodalStiffness, distance: np.ndarray) -> np.ndarray:
+    """Normal forces that distances at the end of a step, ``shape=(n,)``, would make beside the gaps used."""
+    exact = distance + contact.wear_depth
+    presses = contact.reaction[:, -1] > 0.0
+    off = np.where(presses, np.abs(exact - contact.gap), np.maximum(-exact, 0.0))
+    off[contact.points.closed] = 0.0
+    return stiffness.normal * off
+
+
+def _dragged(contact, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
+    """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
     contact.points.without_held(missed)
     made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, missed), axis=1)
     # Friction of what slips turns at most as its slip does.
     slip = np.linalg.norm(contact.slip_increment, axis=1)
-    friction, length = np.linalg.norm(r[:, :-1], axis=1), np.linalg.norm(missed, axis=1)
+    friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
+    length = np.linalg.norm(missed, axis=1)
     turns = np.divide(friction * length, slip, made.copy(), where=slip > 0.0)
-    way = np.where(friction > 0.0, np.minimum(made, turns), 0.0)
-    return stiffness.normal * off, size * angle, way
+    return np.where(friction > 0.0, np.minimum(made, turns), 0.0)
 
 
 def _moments(body, contacts, u: np.ndarray) -> list[float]:
@@ -102,7 +131,7 @@ def too_long(body, contacts, u: np.ndarray) -> str:
         u: Displacement of owned degrees of freedom.
     """
     lost = [(2.0, "")]
-    for contact in contacts:
+    for contact in [c for c in contacts if not c.surface.deformable]:
         with raised_together(body.comm):  # the user's functions
             turned = _turned_on_the_way(contact, u)
         some = np.flatnonzero((turned > TURNED).any(axis=0))

@@ -176,8 +176,7 @@ def _check_strayed(contact) -> bool:
         return False
     warnings.warn(
         f"a node has slid by {slid:.3g} along a deformable surface, further than half of the shortest edge of a facet, {most:.3g}: "
-        "who presses on whom is that of the undeformed state, and forces go to where the other body was. Take larger facets "
-        "there, or a rigid surface for the body that moves.",
+        "who presses on whom is that of the undeformed state, and forces go to where the other body was. Take sliding='large'.",
         stacklevel=5,
     )
     return True

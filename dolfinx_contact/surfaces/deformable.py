@@ -16,22 +16,26 @@ from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, unit
 
+SLIDING = ("large", "small")
+
 
 class DeformableSurface(Surface):
     """Facets of a deformable body on which the facets of a contact press: two bodies, whose meshes need not match.
 
     Both bodies are in one mesh, as parts that need not be connected.  The facets of the ``Contact`` carry the unknowns, the
     slave; forces go over by dual mortar functions, see ``contact/mortar.py``.  The slave is better the softer, finer or curved
-    side.  Sliding is small: who presses on whom is found once, in the undeformed state.
+    side.
 
     Args:
         V: The space of displacements, that of the contact.
         facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
         axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node;
             needed unless friction is isotropic or bodies two-dimensional.
+        sliding: "large" finds who presses on whom anew in each step, where both bodies are at its end; "small" once, in the
+            undeformed state, which saves time as long as nothing slides farther than a part of a facet.
 
     Raises:
-        ValueError: on all ranks, for facets that are not on the boundary.
+        ValueError: on all ranks, for facets that are not on the boundary, or another word for ``sliding``.
 
     Example:
         >>> below = dc.DeformableSurface(V, foot)  # then: dc.Contact(V, facets_above, below, friction)
@@ -43,7 +47,9 @@ class DeformableSurface(Surface):
     )
     curved = deformable = True
 
-    def __init__(self, V: Any, facets: Any, *, axis: ArrayLike | None = None) -> None:
+    def __init__(
+        self, V: Any, facets: Any, *, axis: ArrayLike | None = None, sliding: str = "large"
+    ) -> None:
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh = V.mesh
@@ -54,11 +60,13 @@ class DeformableSurface(Surface):
         boundary, facets = exterior_facet_indices(mesh.topology), given_facets(facets, mesh)
         with raised_together(mesh.comm):
             found = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
+            if sliding not in SLIDING:
+                raise ValueError(f"sliding must be one of {', '.join(SLIDING)}, got {sliding!r}.")
             if axis is not None:
                 self.axis = frozen(unit("axis", axis, mesh.geometry.dim))
         if mesh.comm.allreduce(found.size) == 0:
             raise ValueError("facets of the deformable surface are empty on all ranks.")
-        self.V, self.facets = V, frozen(found)
+        self.V, self.facets, self.sliding = V, frozen(found), sliding
         self._made = True
 
     @property
@@ -90,4 +98,4 @@ class DeformableSurface(Surface):
 
     def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()
-        return f"DeformableSurface(V, facets, axis={axis})"
+        return f"DeformableSurface(V, facets, axis={axis}, sliding={self.sliding!r})"

@@ -82,8 +82,8 @@ def moduli_of(domain, above, moduli):
     return modulus * NU / ((1 + NU) * (1 - 2 * NU)), modulus / (2 * (1 + NU))
 
 
-def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM, **options):  # fmt: skip
-    """A block on another one; the bottom is held, the top moves by ``way``.
+def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM, sliding="small", **options):  # fmt: skip
+    """A block on another one; the bottom is held, or moves by ``foot``, the top moves by ``way``.
 
     Args:
         swapped: Whether the lower one's facets carry the unknowns.
@@ -92,16 +92,16 @@ def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=
     domain, top, bottom, upper, lower, above = pair(cell, cells, size, gap, comm)
     d = domain.geometry.dim
     V = functionspace(domain, ("Lagrange", degree, (d,)))
-    u, way = fem.Function(V), fem.Constant(domain, np.zeros(d))
-    bcs = [fem.dirichletbc(way, fem.locate_dofs_topological(V, d - 1, top), V)]
-    bcs.append(fem.dirichletbc(np.zeros(d), fem.locate_dofs_topological(V, d - 1, bottom), V))
+    u, way, foot = fem.Function(V), *(fem.Constant(domain, np.zeros(d)) for _ in range(2))
+    ends = ((way, top), (foot, bottom))
+    bcs = [fem.dirichletbc(by, fem.locate_dofs_topological(V, d - 1, at), V) for by, at in ends]
     slave, master = (lower, upper) if swapped else (upper, lower)
-    surface = dc.DeformableSurface(V, master, axis=axis)
+    surface = dc.DeformableSurface(V, master, axis=axis, sliding=sliding)
     contact = dc.Contact(V, slave, surface, dc.Friction(mu, p))
     lame, shear = moduli_of(domain, above, moduli)
     F = work(u, V, lame, shear) * ufl.dx
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=tol, **options)
-    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, bcs=bcs, F=F)  # fmt: skip
+    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, foot=foot, bcs=bcs, F=F)  # fmt: skip
 
 
 def stress(w, lame, shear):
@@ -145,7 +145,8 @@ def patch(cell, degree, slips, moduli=(E, E), tilted=True, swapped=False, cells=
     ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)
     outside = ufl.inner(ufl.dot(stress(exact, lame, shear), ufl.FacetNormal(domain)), v) * ds(1)
     slave, master = (lower, upper) if swapped else (upper, lower)
-    surface = dc.DeformableSurface(V, master, axis=turn[:, 0] if d == 3 else None)
+    axis = turn[:, 0] if d == 3 else None
+    surface = dc.DeformableSurface(V, master, axis=axis, sliding="small")
     friction = dc.Friction(MU, P) if d == 3 else dc.Friction(MU[0])
     contact = dc.Contact(V, slave, surface, friction)
     F = work(u, V, lame, shear) * ufl.dx - outside

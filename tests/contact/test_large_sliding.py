@@ -1,0 +1,163 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Two deformable bodies that slide over many facets: even pressures, forces of fine steps, balance, slip that is objective."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from two_bodies import COMM, E, blocks, dc, pair, stress
+
+from dolfinx_contact.compat import cell_points, functionspace
+
+pytestmark = pytest.mark.ranks
+
+
+def largest(values) -> float:
+    return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
+
+
+def total(values) -> np.ndarray:
+    return COMM.allreduce(np.sum(values, axis=0))
+
+
+def even(cell, degree, cells, sides, swapped):
+    """A block on a larger one without lateral strain; what it leaves bare carries the pressure that it does."""
+    domain, top, bottom, upper, lower, _ = pair(cell, cells, sides)
+    d, p = domain.geometry.dim, 1e-4 * E
+    V = functionspace(domain, ("Lagrange", degree, (d,)))
+    u, v, way = fem.Function(V), ufl.TestFunction(V), fem.Constant(domain, np.zeros(d))
+    bare = fem.Function(functionspace(domain, ("DG", 0)))
+    tags = mesh.meshtags(domain, d - 1, np.sort(lower), np.ones(lower.size, np.int32))
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)
+    F = ufl.inner(stress(u, 0.0, E / 2), ufl.grad(v)) * ufl.dx + p * bare * v[d - 1] * ds(1)
+    bcs = [fem.dirichletbc(way, fem.locate_dofs_topological(V, d - 1, top), V)]
+    bcs.append(fem.dirichletbc(np.zeros(d), fem.locate_dofs_topological(V, d - 1, bottom), V))
+    slave, master = (lower, upper) if swapped else (upper, lower)
+    contact = dc.Contact(V, slave, dc.DeformableSurface(V, master), dc.Friction(0.0))
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10, geometry_tol=1e-8)
+    count = bare.x.array.size
+    middle = domain.geometry.x[cell_points(domain)[:count]].mean(axis=1)[:, : d - 1]
+
+    def slide(to):
+        way.value[:] = [*to, -2 * p / E]
+        off = np.abs(middle - sides[1] / 2 - to).max(axis=1)
+        bare.x.array[:] = off > sides[0] / 2
+        return problem.solve()
+
+    return slide, contact, p, V, u
+
+
+@pytest.mark.parametrize(
+    "cell, degree, cells, sides, swapped",
+    [
+        ("quadrilateral", 1, ((5, 1), (12, 1)), (1.0, 3.0), False),
+        ("triangle", 2, ((3, 1), (12, 1)), (1.0, 3.0), False),
+        ("hexahedron", 1, ((3, 3, 1), (4, 4, 1)), (1.0, 2.0), False),
+        pytest.param("quadrilateral", 1, ((5, 1), (12, 1)), (1.0, 3.0), True, marks=pytest.mark.slow),
+        pytest.param("tetrahedron", 2, ((3, 3, 1), (4, 4, 1)), (1.0, 2.0), False, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_an_even_pressure_slides_along(cell, degree, cells, sides, swapped):
+    """Over meshes that do not match an even pressure stays even: every node has it times its area, and displacements are linear."""
+    slide, contact, p, V, u = even(cell, degree, cells, sides, swapped)
+    flat = len(cells[0]) == 2
+    for to in ((0.0,), (0.25,), (1.0,), (-0.5,)) if flat else ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.5)):
+        step = slide(np.array(to))
+        assert step.error <= 1e-10 and step.geometry_error <= 1e-8
+        assert largest(contact.reaction[:, -1] - p * contact.area) <= 1e-7 * p
+        x, moved = V.tabulate_dof_coordinates(), u.x.array.reshape(-1, len(cells[0]))
+        height = x[:, len(cells[0]) - 1]
+        assert largest(moved[:, -1] + p / E * (height + 1)) <= 1e-7 * p / E
+
+
+def ironed(steps, cell="quadrilateral", degree=1, cells=((4, 2), (15, 2)), far=0.8, **options):
+    """A block pressed on a longer one and slid over its facets, of length 0.2; the force on it, and the scene."""
+    scene = blocks(cell, degree, cells, size=(1.0, 3.0), sliding="large", **options)
+    d = len(cells[0])
+    for part in np.linspace(0.0, 1.0, steps + 1):
+        scene.way.value[:] = [far * part, *[0.0] * (d - 2), -0.02]
+        scene.problem.solve()
+    return scene.contact.force(), scene
+
+
+@pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
+def test_ironing(degree, swapped):
+    """One facet a step: the force is within 1 % of that of steps ten times finer, and that on both bodies is in balance."""
+    coarse, scene = ironed(4, degree=degree, swapped=swapped)
+    left = np.zeros(scene.contact.points.size)
+    scene.contact.assemble_reaction(left)
+    assert np.abs(total(left.reshape(-1, 2))).max() <= 1e-12 * np.abs(coarse).max()
+    fine, _ = ironed(40, degree=degree, swapped=swapped)
+    assert np.abs(coarse - fine).max() <= 0.01 * np.abs(fine).max()
+
+
+@pytest.mark.parametrize("solver", ["CondensedNewton", "FixedPoint", "SparseNewton", "SNES"])
+def test_solvers_agree_in_space(solver):
+    """Slid obliquely by facets with orthotropic friction, every solver finds the same forces and work of friction."""
+    found = []
+    for name in dict.fromkeys(("CondensedNewton", solver)):
+        scene = blocks("hexahedron", 1, ((2, 2, 1), (6, 6, 1)), size=(1.0, 2.0), sliding="large", mu=(0.3, 0.15), p=(0.1, 0.2), axis=(1, 0.2, 0), solver=getattr(dc, name)(), geometry_tol=1e-4)  # fmt: skip
+        for k in range(3):
+            scene.way.value[:] = (0.15 * k, 0.1 * k, -0.01)
+            step = scene.problem.solve()
+        assert step.counts.slip > 0 and step.geometry_error <= 1e-4
+        found.append(np.append(scene.contact.force(), total(scene.contact.dissipation)))
+    assert found[0] == pytest.approx(found[-1], rel=1e-6)
+
+
+def test_bodies_that_move_together_do_not_slip():
+    """Both bodies go by several facets, and further than their size: forces stay, and nothing slips."""
+    scene = blocks("quadrilateral", 1, ((4, 2), (13, 2)), size=(1.0, 2.0), sliding="large", mu=0.3)
+    scene.way.value[:] = (0.001, -0.01)
+    scene.problem.solve()
+    before, path = scene.contact.reaction.copy(), total(scene.contact.slip_path)
+    for way in (0.7, 3.0):
+        scene.way.value[:], scene.foot.value[:] = (way + 0.001, -0.01), (way, 0.0)
+        scene.problem.solve()
+        assert largest(scene.contact.reaction - before) <= 1e-8 * largest(before)
+    assert total(scene.contact.slip_path) - path <= 1e-9
+
+
+def test_over_the_edge():
+    """Nodes that slide over the edge of the other body carry nothing, the others go on, until none is left."""
+    scene = blocks("quadrilateral", 1, ((4, 2), (6, 2)), size=(1.0, 1.0), sliding="large", mu=0.1)
+    for way in (0.0, 0.15, 0.4, 0.65, 0.9):
+        scene.way.value[:] = (way, -0.005)
+        step = scene.problem.solve()
+        off = scene.contact.x[:, 0] + way > 1.251  # with all their facets
+        assert not scene.contact.reaction[off].any() and not scene.contact.covered[off].any()
+        left = np.zeros(scene.contact.points.size)
+        scene.contact.assemble_reaction(left)
+        assert np.abs(total(left.reshape(-1, 2))).max() <= 1e-12 * largest(scene.contact.force())
+    scene.way.value[0] = 1.2
+    assert (
+        scene.problem.solve().counts.open == step.counts.open + step.counts.slip + step.counts.stick
+    )
+
+
+def test_checkpoints_and_rewind(tmp_path):
+    """A run that goes on from a file, or whose last step was taken back and made again, has the same bits on one rank."""
+    whole, parted = (blocks("quadrilateral", 1, ((4, 2), (13, 2)), size=(1.0, 2.0), sliding="large") for _ in range(2))  # fmt: skip
+    file = COMM.bcast(str(tmp_path / "state.npz"))
+    for k in range(5):
+        whole.way.value[:] = parted.way.value[:] = (0.2 * k, -0.01)
+        whole.problem.solve()
+        parted.problem.solve()
+        if k == 2:
+            parted.problem.rewind()
+            parted.problem.solve()
+            parted.problem.save(file)
+            parted.problem.reset()
+            parted.problem.load(file)
+    for name in ("reaction", "slip_path", "dissipation", "gap", "covered"):
+        one, other = (getattr(scene.contact, name) for scene in (whole, parted))
+        assert largest(one - other) <= (0.0 if COMM.size == 1 else 1e-9 * largest(one))
+
+
+def test_what_makes_no_sense_is_refused():
+    """Sliding is large or small."""
+    scene = blocks("quadrilateral", 1, ((2, 2), (3, 2)))
+    with pytest.raises(ValueError, match="sliding must be one of large, small, got 'huge'"):
+        dc.DeformableSurface(scene.V, scene.contact.surface.facets, sliding="huge")
