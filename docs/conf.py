@@ -41,3 +41,14 @@ html_extra_path = ["extra"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sphinx = False
+
+
+def setup(app) -> None:
+    app.connect("env-updated", leave_notes_out)
+
+
+def leave_notes_out(app, env) -> None:
+    """Dated notes are linked by notes/README and stand in no table of contents, which is no mistake."""
+    for name in env.found_docs:
+        if name.startswith("notes/2"):
+            env.metadata[name]["orphan"] = True
