@@ -105,7 +105,8 @@ class Contact(Guarded):
         self.displacements = Displacements(V)
         with raised_together(mesh.comm):
             self._weight = weight_on(self.displacements.V, weight)
-        self.nodes = frozen(contact_nodes(self.displacements.V, facets, self._weight))
+        nodes = contact_nodes(self.displacements.V, facets, self._weight)
+        self.nodes, self.left_out = map(frozen, nodes)
         self.x = frozen(self.displacements.x[self.nodes])
         self._area: np.ndarray | None = None
         self._axial: bool | None = None
@@ -679,6 +680,12 @@ class Contact(Guarded):
         A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
         """
         return self._history.sums[KEPT]
+
+    def penetration_between(self, u: np.ndarray) -> float:
+        """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
+        here = self.displacements.rows(u)[self.left_out]
+        gaps = self.surface.distances(self.displacements.x[self.left_out, : here.shape[1]] + here)
+        return max(0.0, -self.comm.allreduce(float(gaps.min(initial=0.0)), op=MPI.MIN))
 
     @property
     def load_function(self) -> np.ndarray:

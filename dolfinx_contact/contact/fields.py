@@ -116,8 +116,8 @@ def grows_with_radius(V, weight) -> bool:
     return bool(squares[1] ** 2 >= (1 - SQUARE) * squares[0] * squares[2] > 0.0)
 
 
-def contact_nodes(V, facets: np.ndarray, weight=None) -> np.ndarray:
-    """Owned nodes of facets that carry a part of an even pressure.  Collective.
+def contact_nodes(V, facets: np.ndarray, weight=None) -> tuple[np.ndarray, np.ndarray]:
+    """Owned nodes of facets that carry a part of an even pressure, and the others.  Collective.
 
     An even pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
     and with second order on quadrilaterals and on edges, all are positive. Those of the vertices of triangles of second
@@ -131,7 +131,7 @@ def contact_nodes(V, facets: np.ndarray, weight=None) -> np.ndarray:
     nodes = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, facets)
     nodes = np.unique(nodes[nodes < V.dofmap.index_map.size_local])
     if compat.lagrange_degree(V) == 1:
-        return nodes
+        return nodes, nodes[:0]
     comm = V.mesh.comm
     weights = areas(V, facets, weight is None, weight)[V.mesh.geometry.dim * nodes]
     zero = ZERO * comm.allreduce(np.abs(weights).max(initial=0.0), op=MPI.MAX)
@@ -145,7 +145,7 @@ def contact_nodes(V, facets: np.ndarray, weight=None) -> np.ndarray:
             )
     kept = weights > zero
     _warn_of_curved_edges(V, facets, nodes[kept], nodes[~kept], weight)
-    return nodes[kept]
+    return nodes[kept], nodes[~kept]
 
 
 def _warn_of_curved_edges(

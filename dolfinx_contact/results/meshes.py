@@ -13,7 +13,6 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import per_area
 from dolfinx_contact.contact.state import Status
-from dolfinx_contact.step.unseen import distances
 
 # VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
 TYPES = {
@@ -228,7 +227,7 @@ class SurfaceMesh:
         if others.size and not contact.surface.deformable:
             dim = moved.shape[1]
             x = contact.displacements.x[self._owned[others], :dim] + moved[others]
-            gaps[others] = distances(contact, x)
+            gaps[others] = contact.surface.distances(x)
         return gaps
 
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.results.meshes import BodyMesh, Mesh, SurfaceMesh
-from dolfinx_contact.step.unseen import distances
 from dolfinx_contact.support.checks import finite
 from dolfinx_contact.support.collective import raised_together
 
@@ -128,4 +127,4 @@ def _distances(contact, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.nd
     axes = [np.linspace(a, b, int(n)) for a, b, n in box.T]
     z, y, x = np.meshgrid(*reversed(axes), indexing="ij")  # x runs fastest, as in VTK's grids
     points = np.column_stack((x.ravel(), y.ravel(), z.ravel()))[:, :dim]
-    return box, distances(contact, points - (factor - 1.0) * contact.surface.displacement)
+    return box, contact.surface.distances(points - (factor - 1.0) * contact.surface.displacement)

@@ -44,7 +44,9 @@ class Step:
         contact_error: The largest of error, slip error and forward error, over the reactions alone: where they are small beside loads
             and supports, forces of the contact are as accurate as this says; 0 without reactions.
         bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
-        penetration: Largest penetration, >= 0, length.
+        penetration: Largest penetration of contact nodes, >= 0, length.
+        vertex_penetration: The same of nodes of the facets that carry nothing, the vertices of second-order tetrahedra; 0 without such
+            nodes, and with wear.
         geometry_error: Forces by which distances, normals and arms at the end of the step differ from those with which it was solved, over
             the forces that act; 0 on planes that are flat and do not turn, see docs/surfaces.md, and if sliding is small.
         iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
@@ -73,6 +75,7 @@ class Step:
     tried: tuple[Any, ...] = ()
     contact_error: float = 0.0
     geometry_error: float = 0.0
+    vertex_penetration: float = 0.0
 
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
@@ -131,8 +134,14 @@ def record(body, contacts, errors, found, seconds: float, geometry_error: float 
         seconds: That the step took on this rank.
         geometry_error: As ``Step`` has it.
     """
-    gap, penetration = 0.0, 0.0
+    gap, penetration, of_vertices = 0.0, 0.0, 0.0
     for contact in contacts:
+        if (
+            contact.displacements.degree > 1
+            and contact.wear is None
+            and not contact.surface.deformable
+        ):
+            of_vertices = max(of_vertices, contact.penetration_between(found.x))
         gap += contact.bipotential_gap.sum()
         penetration = max(penetration, -contact.gap.min(initial=0.0))
     return Step(
@@ -150,6 +159,7 @@ def record(body, contacts, errors, found, seconds: float, geometry_error: float 
         tried=found.tried,
         contact_error=errors.of_contact(found.forward_error),
         geometry_error=geometry_error,
+        vertex_penetration=of_vertices,
     )
 
 

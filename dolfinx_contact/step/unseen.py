@@ -164,7 +164,7 @@ class Unseen:
             ):  # nodes that stand out of a hollow body, and touch nothing, are no harm
                 sag = np.maximum(sag, 0.0)
             sag = np.abs(sag).max(axis=1)
-            near = distances(contact, x).min(axis=1) <= sag
+            near = contact.surface.distances(x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
 
@@ -222,7 +222,7 @@ def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
     missed = Missed()
     for facets in of:
         x = _positions(contact, facets, u)
-        gaps = distances(contact, x)
+        gaps = contact.surface.distances(x)
         opened = gaps if worn is None else gaps + worn[facets.nodes]
         near = opened.min(axis=1) < facets.size
         if near.any():
@@ -240,7 +240,7 @@ def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
         at = np.clip(centre + half * rule, 0.0, 1.0)
         shapes = facets.shapes(at)
         points = shapes @ x
-        there = distances(contact, points)
+        there = contact.surface.distances(points)
         bulge = np.einsum("mqk,mk->mq", shapes, gaps) - there
         bulge[np.isinf(there)] = 0.0
         above = np.einsum("mqk,mk->mq", shapes, opened)
@@ -293,12 +293,3 @@ def _said(where) -> str:
 def _positions(contact, facets: Facets, u: np.ndarray) -> np.ndarray:
     """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
-
-
-def distances(contact, x: np.ndarray) -> np.ndarray:
-    """Of positions, ``shape=(..., gdim)``, from the surface where it stands; infinite where it has none."""
-    surface = contact.surface
-    try:
-        return surface.distance(surface.relative(x.reshape(-1, x.shape[-1]))).reshape(x.shape[:-1])
-    except ValueError:  # a function that is made for the nodes alone
-        return np.full(x.shape[:-1], np.inf)

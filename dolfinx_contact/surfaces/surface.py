@@ -188,6 +188,13 @@ class Surface(Guarded):
         arm = x - self.point - self._displacement
         return self.point + arm + arm @ self._turn
 
+    def distances(self, x: np.ndarray) -> np.ndarray:
+        """Of positions, ``shape=(..., gdim)``, where the surface stands; infinite where it has none."""
+        try:
+            return self.distance(self.relative(x.reshape(-1, x.shape[-1]))).reshape(x.shape[:-1])
+        except ValueError:  # a function that is made for the nodes alone
+            return np.full(x.shape[:-1], np.inf)
+
     def moved_past(self, x: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """``relative(x + moved) - x`` with all digits of small motions."""
         past = moved - self._displacement

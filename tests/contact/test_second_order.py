@@ -61,6 +61,24 @@ def test_a_prism_of_first_order():
     assert contact.reaction[:, 2] == pytest.approx(carried[contact.nodes], rel=1e-9)
 
 
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_vertices_that_penetrate_are_counted(cell):
+    """What vertices of tetrahedra of second order penetrate is in the record; bricks have no such nodes."""
+    domain, bottom, top = box(cell, distorted=False)
+    V = functionspace(domain, ("Lagrange", 2, (3,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    bc = fem.dirichletbc(np.array([0.0, 0.0, -1e-3]), fem.locate_dofs_topological(V, 2, top), V)
+    plane = dc.RigidPlane((0, 0, 0), (0, 0, 1))
+    contact = dc.Contact(V, bottom, plane, dc.Friction(0.0))
+    step = dc.ContactProblem(elasticity(u, v, E, NU), u, contact, bcs=[bc]).solve()
+    nodes = fem.locate_dofs_topological(V, 2, bottom)
+    vertical = u.x.array.reshape(-1, 3)[nodes, 2]
+    assert step.vertex_penetration == pytest.approx(
+        max(0.0, -COMM.allreduce(vertical.min(initial=0.0), op=MPI.MIN)), rel=1e-6, abs=1e-12
+    )
+    assert (step.vertex_penetration > 1e-6) == (cell == "tetrahedron")
+
+
 def test_what_would_have_to_pull_is_refused():
     """On tetrahedra of degree 4 some integrals are negative: refused on all ranks, with what to do."""
     domain, bottom, _ = box("tetrahedron", distorted=False)
