@@ -69,6 +69,7 @@ class ElasticBody(OverRanks):
         self.closed = self._said = False
         self.known: FreeState | None = None  # the last one
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
+        self.parts = rigid_motion.connected_parts(self.displacements)
 
     def refresh(self, x=None) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed.

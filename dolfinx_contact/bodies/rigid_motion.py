@@ -24,7 +24,7 @@ SAMPLED = 2000
 
 
 def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
-    """Rigid motions of a part of the body that cost next to no energy.
+    """Rigid motions of a part of the body, of its ``parts``, that cost next to no energy.
 
     Every connected part of the mesh is tried: a spring in F gives energy to the rigid motions that the boundary
     conditions leave free.
@@ -38,10 +38,10 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
     """
     of = body.displacements
     x = of.x[: of.count, : of.dim]
-    part, parts = _connected_parts(of.V, body.comm)
+    part, parts = body.parts
     diagonal, soft, loose = body.diagonal(), [np.zeros((body.size, 0))], []
     for k in range(parts):
-        modes = of.vectors(rigid_modes(x, part[: of.count] == k, body.comm))
+        modes = of.vectors(rigid_modes(x, part == k, body.comm))
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
         left_free = vectors[:, values <= ROUNDING * values[-1]]
@@ -57,7 +57,7 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
             where = f"one of its {parts} separate parts" if parts > 1 else "the body"
             turned = root.T @ vectors[:, relative < ROUNDING]
             combination = left_free @ turned
-            middle, size = box(x, part[: of.count] == k, body.comm)
+            middle, size = box(x, part == k, body.comm)
             loose.append((where, free @ turned, combination, middle, size))
         soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
     if not loose:
@@ -138,8 +138,10 @@ def mean_strain(displacements, u: np.ndarray) -> float:
     return float(np.sqrt(parts[0] / parts[1]))
 
 
-def _connected_parts(V, comm) -> tuple[np.ndarray, int]:
-    """Number of the connected part of the mesh that each local node is in, and how many there are."""
+def connected_parts(displacements) -> tuple[np.ndarray, int]:
+    """Number of the connected part of the mesh that each owned node is in, and how many there are.  Collective."""
+    V = displacements.V
+    comm = V.mesh.comm
     local = _local_parts(compat.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
     # Names that no other rank uses; the owner of a node tells its name to those who see it as ghost.
     first = comm.exscan(local.max(initial=-1) + 1) or 0
@@ -154,7 +156,9 @@ def _connected_parts(V, comm) -> tuple[np.ndarray, int]:
     joined = _local_parts(same, same.max() + 1)
     numbers, part = np.unique(joined[mine], return_inverse=True)
     everywhere = np.unique(np.concatenate(comm.allgather(numbers)))
-    return np.searchsorted(everywhere, numbers)[part.reshape(-1)], everywhere.size
+    return np.searchsorted(everywhere, numbers)[part.reshape(-1)][
+        : displacements.count
+    ], everywhere.size
 
 
 def _local_parts(groups: np.ndarray, size: int) -> np.ndarray:

@@ -1,7 +1,7 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
 """What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps,
-contacts that are nowhere near their surface.
+contacts that are nowhere near their surface, linear bodies that turn.
 
 Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
 nodes miss is an error of their forces of about ``kappa`` times that length.
@@ -26,6 +26,9 @@ SHARE = 1.0
 
 # A surface stands out between nodes of a round body on its own account if it does by more than so many times the body.
 ROUND = 4.0
+
+# By what a linear body that turns is too large, over the lengths by which contact and supports deform it.
+GROWN = 0.1
 
 # What is rounding, over the size of a facet.
 CLEAR = 1e-6
@@ -81,6 +84,7 @@ class Unseen:
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._leaps = self._apart = True  # to be looked at
         self._near = [contact for contact in contacts if contact.surface.deformable]
+        self._turn, self._turns = None, bool(contacts)  # to be looked at
 
     def check(
         self,
@@ -105,6 +109,9 @@ class Unseen:
             self._check_facets(u, dict(zip(contacts, stiffness)))
         self._check_wear(contacts, stiffness)
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
+        self._turns = self._turns and not body.nonlinear
+        if self._turns:
+            self._check_turn(body, contacts, stiffness, u[: body.size])
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
@@ -140,6 +147,33 @@ class Unseen:
                     f"steps like this one into {int(np.ceil(times))} or more.",
                     stacklevel=4,
                 )
+
+    def _check_turn(self, body, contacts, stiffness: list[NodalStiffness], u: np.ndarray) -> None:
+        """A linear body that turns, and grows by so much that contact feels it.  Collective."""
+        if self._turn is None:
+            from dolfinx_contact.step.turned import Turn
+
+            self._turns = not any(contact.axial for contact in contacts)
+            self._turn = Turn(body)
+        angles = self._turn.angles(u)
+        theta = float(np.linalg.norm(angles, axis=1).max())
+        if theta <= CLEAR:
+            return
+        length = 0.5 * theta**2 * body.extent
+        pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
+        if not self._turns or length <= GROWN * body.largest(np.concatenate(pushed)):
+            return
+        if length <= -body.highest(-np.concatenate([contact.gap for contact in contacts])):
+            return
+        share = self._turn.share(contacts, u, angles)
+        if share > GROWN:
+            self._turns = False
+            warnings.warn(
+                f"the body has turned by {theta:.3g} rad, and F is linear in u: so it grows by theta^2 / 2 = {0.5 * theta**2:.2g} of its "
+                f"size, which is {share:.2g} times what contact and supports deform it by; pressures may be as far off. Let the surfaces "
+                "turn instead of the body, or write F for large rotations, see docs/nonlinear.md.",
+                stacklevel=4,
+            )
 
     def _is_straight(self, contact) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""

@@ -245,9 +245,10 @@ class CondensedBody:
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
         anchors, rows = slice(first, first + self._anchored), self._parts[1]
         placed, moved = np.zeros((2, first + self._tied))
-        held, before = (rows.of(x) for x in (step.statics.start, step.statics.last))
+        held = rows.of(step.statics.start)
         placed[anchors] = stiffness[: self._anchored] * held
-        moved[anchors] = stiffness[: self._anchored] * (held - before)
+        if starts:  # of the last one anchors tell where it left the body
+            moved[anchors] = placed[anchors] - starts[0][anchors]
         q = self._motion(step, self.displacement(free, placed))
         q[anchors] -= held
         starts = [start + moved for start in starts]

@@ -1,0 +1,128 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""By how much a linear body that turns is too large.
+
+A body that is linear in ``u`` and turns by ``theta`` moves along the tangents of circles, and so grows without any
+stress, by ``theta^2 / 2`` of its size.  That matters where contact and supports do not let it, beside the lengths by
+which these deform it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from dolfinx_contact.bodies.rigid_motion import rigid_modes
+from dolfinx_contact.surfaces.surface import cross, driven_surfaces, rotation_less_one
+
+# About how many nodes of a rank are asked how the body turns.
+SAMPLED = 2000
+
+# Part of a length that is rounding; part of the growth that has to be hindered: as much is left of it where a body is strained.
+ROUNDING, HINDERED = 1e-13, 1e-2
+
+
+class Turn:
+    """Mean rotations of the connected parts of a body.  Collective.
+
+    Args:
+        body: The body, with its ``parts``.
+    """
+
+    def __init__(self, body):
+        self._body, of = body, body.displacements
+        self._part, self._count = body.parts
+        nodes = np.arange(of.count)[:: of.count // SAMPLED + 1]
+        x, here = of.x[nodes, : of.dim], self._part[nodes]
+        sums = np.zeros((self._count, of.dim + 1))
+        np.add.at(sums, here, np.column_stack((x, np.ones(len(x)))))
+        sums = body.total(sums)
+        self._middle = sums[:, :-1] / np.maximum(sums[:, -1:], 1.0)
+        turning = _turning(x - self._middle[here])
+        m = turning.shape[2]
+        squares = np.zeros((self._count, m, m))
+        np.add.at(squares, here, turning.transpose(0, 2, 1) @ turning)
+        fit = turning @ np.linalg.pinv(body.total(squares), rcond=ROUNDING, hermitian=True)[here]
+        rows = np.broadcast_to((m * here[:, None] + np.arange(m))[:, None], fit.shape)
+        columns = np.broadcast_to(of.dofs(nodes)[:, :, None], fit.shape)
+        places = rows.ravel(), columns.ravel()
+        self._fit = sparse.csr_matrix((fit.ravel(), places), (m * self._count, of.size))
+
+    def angles(self, u: np.ndarray) -> np.ndarray:
+        """Rotation vector of each part, ``shape=(parts, 3)``, in 2-D ``(parts, 1)``, by least squares over its nodes.  Collective."""
+        return self._body.total(self._fit @ u).reshape(self._count, -1)
+
+    def share(self, contacts, u: np.ndarray, angles: np.ndarray) -> float:
+        """What contact and supports do not let the body grow, over that by which they deform it; 0 where it grows freely.  Collective.
+
+        Both are motions along normals of the nodes that touch, or would if the body had not grown, and of supports, but for what rigid
+        motions of the body and free motions of surfaces account for: root mean squares.
+
+        Args:
+            contacts: All contacts, in the state of ``u``.
+            u: Displacement of owned degrees of freedom.
+            angles: As ``angles`` returns them.
+        """
+        body, of = self._body, self._body.displacements
+        motions = self._motions(u, angles)
+        driven = driven_surfaces(body, contacts)
+        count, rows, touching = 0 if driven is None else driven.count, [], False
+        for k, contact in enumerate(contacts):
+            moved, gap = _moved(contact, u, motions)
+            felt = (contact.reaction[:, -1] > 0.0) | (gap < moved[:, -1, 0])
+            free = driven.axes[k] if count else np.zeros((*moved.shape[:2], 0))
+            rows.append(np.concatenate((moved, free), axis=2)[felt, -1])
+            touching = touching or felt.any()
+        if not body.total(np.array([float(touching)]))[0]:
+            return 0.0
+        fixed = body.fixed[of.are[body.fixed]]
+        rows.append(np.column_stack((motions[fixed], np.zeros((len(fixed), count)))))
+        grown, deformed = _left(body, np.concatenate(rows))
+        if grown == 0.0:
+            return 0.0
+        return float(np.sqrt(grown / deformed)) if deformed > 0.0 else np.inf
+
+    def _motions(self, u: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """By what the body grows, by what else than turning it moves, and rigid motions of its parts, ``shape=(owned dofs, 2 + m)``."""
+        of = self._body.displacements
+        x, moved = of.x[: of.count, : of.dim], of.rows(u)
+        arms = x - self._middle[self._part]
+        grown, turned = np.zeros_like(arms), np.zeros_like(arms)
+        for k, angle in enumerate(angles):
+            here = self._part == k
+            if angle.any():
+                grown[here] = -0.5 * cross(angle, cross(angle, arms[here]))
+                turned[here] = arms[here] @ rotation_less_one(angle).T
+        ends = x + moved
+        modes = [rigid_modes(ends, self._part == k, self._body.comm) for k in range(self._count)]
+        columns = np.stack((grown, moved - turned), axis=2)
+        return np.column_stack([of.vectors(columns), *map(of.vectors, modes)])
+
+
+def _moved(contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
+    if not contact.surface.curved:
+        return contact.points.motion(motions), contact.gap
+    surface, there = contact.placement.ended_at(u)
+    y = surface.relative(there)
+    frames = surface.turned(surface.frames(y))
+    return frames @ motions[contact.points.dofs], surface.distance(y) + contact.wear_depth
+
+
+def _left(body, rows: np.ndarray) -> np.ndarray:
+    """Squares of the first two columns less what all others account for, ``shape=(2,)``.  Collective."""
+    left, rest = rows[:, :2].copy(), rows[:, 2:]
+    size = np.sqrt(body.total((rest**2).sum(axis=0)))
+    rest = rest / np.where(size > 0.0, size, 1.0)
+    inverse = np.linalg.pinv(body.total(rest.T @ rest), rcond=ROUNDING, hermitian=True)
+    for _ in range(2):  # the second time for digits that the first one lost
+        left -= rest @ (inverse @ body.total(rest.T @ left))
+    squares, all_ = body.total(np.array([(left**2).sum(axis=0), (rows[:, :2] ** 2).sum(axis=0)]))
+    return np.where(squares > np.square([HINDERED, ROUNDING]) * all_, squares, 0.0)
+
+
+def _turning(arms: np.ndarray) -> np.ndarray:
+    """Velocities of arms in rotations about each axis, ``shape=(n, gdim, 3)``, in 2-D ``(n, 2, 1)``."""
+    if arms.shape[1] == 2:
+        return np.column_stack((-arms[:, 1], arms[:, 0]))[:, :, None]
+    return np.stack([np.cross(axis, arms) for axis in np.eye(3)], axis=2)
