@@ -28,6 +28,8 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.analysis.adapt import adapt as adapt
     from dolfinx_contact.analysis.converge import Converged as Converged
     from dolfinx_contact.analysis.converge import converge as converge
+    from dolfinx_contact.analysis.cycle_jump import CycleJump as CycleJump
+    from dolfinx_contact.analysis.cycle_jump import cycle_jump as cycle_jump
     from dolfinx_contact.analysis.estimate import Estimate as Estimate
     from dolfinx_contact.analysis.estimate import estimate as estimate
     from dolfinx_contact.analysis.increments import advance as advance
@@ -77,6 +79,7 @@ _NAMES = {  # by their module
     "surfaces.plane": ["RigidPlane"],
     "analysis.adapt": ["Adapted", "adapt"],
     "analysis.converge": ["Converged", "converge"],
+    "analysis.cycle_jump": ["CycleJump", "cycle_jump"],
     "analysis.estimate": ["Estimate", "estimate"],
     "analysis.increments": ["advance"],
     "law.bipotential": ["bipotential_gap"],

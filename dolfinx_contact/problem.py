@@ -35,7 +35,7 @@ from dolfinx_contact.problem_input import (
     hold,
     take_contacts,
 )
-from dolfinx_contact.problem_states import ProblemStates
+from dolfinx_contact.problem_states import Kept, ProblemStates
 from dolfinx_contact.results.record import (
     Counts,
     NotConverged,
@@ -520,6 +520,26 @@ class ContactProblem(Guarded):
         """
         check_alive(self, self.body, self.contacts)
         self._states.rewind()
+
+    def snapshot(self) -> Kept:
+        """The last converged state, to return to by ``restore`` as often as you like; kept in memory, nothing is copied.
+
+        It has what ``rewind`` takes back: displacement, contacts with their sums, and planes.  ``save`` writes the same to a file.
+        """
+        check_alive(self, self.body, self.contacts)
+        return self._states.snapshot()
+
+    def restore(self, snapshot: Kept) -> None:
+        """Go on from a snapshot; loads, boundary values and laws stay as they are.  Collective.
+
+        Args:
+            snapshot: What ``snapshot`` of this problem has returned.
+
+        Raises:
+            ValueError: it is none of this problem.
+        """
+        check_alive(self, self.body, self.contacts)
+        self._states.go_to(snapshot)
 
     def reset(self) -> None:
         """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""

@@ -22,6 +22,7 @@ class Kept(NamedTuple):
     surfaces: list  # displacements and rotations
     known: Any  # the body's free state
     past: tuple  # steps of the condensed solver
+    of: object  # whose states these are
 
 
 class ProblemStates:
@@ -41,7 +42,7 @@ class ProblemStates:
     def __init__(self, body, contacts, variables) -> None:
         self._body, self._contacts, self._variables = body, contacts, variables
         self._parts = [*contacts, *filter(None, [variables])]  # what has a history
-        self._stood, self.memory = self.places(), {}
+        self._stood, self.memory, self._mine = self.places(), {}, object()
         self._begin()
 
     def _begin(self) -> None:
@@ -57,7 +58,9 @@ class ProblemStates:
         """Keep the present state to go back to, and the one before, if there is one."""
         histories = [part.history() for part in self._parts]
         displacements, past = (self.last, self.before), tuple(self.memory["past"])
-        self._kept = Kept(displacements, histories, self.places(), self._body.known, past)
+        self._kept = Kept(
+            displacements, histories, self.places(), self._body.known, past, self._mine
+        )
         self._before = before
 
     def _remember(self, past) -> None:
@@ -103,7 +106,21 @@ class ProblemStates:
             raise ValueError(
                 "there is no step to go back by: rewind goes back once after a step; save and load go further."
             )
-        kept = self._before
+        self._go_to(self._before)
+
+    def snapshot(self) -> Kept:
+        """The last converged state, see ``ContactProblem.snapshot``."""
+        return self._kept
+
+    def go_to(self, kept: Kept) -> None:
+        """Go on from a snapshot, see ``ContactProblem.restore``.  Collective."""
+        if not isinstance(kept, Kept) or kept.of is not self._mine:
+            raise ValueError(
+                f"restore takes what snapshot of the same problem has returned, got {type(kept).__name__}."
+            )
+        self._go_to(kept)
+
+    def _go_to(self, kept: Kept) -> None:
         (self.last, self.before), self._body.known = kept.displacements, kept.known
         for part, history in zip(self._parts, kept.histories):
             part.go_back(history)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from dolfinx_contact.results.history import History
 from dolfinx_contact.results.record import NotConverged, Step
 from dolfinx_contact.support.checks import finite, number, positive
 from dolfinx_contact.support.collective import agree, raised_together
+from dolfinx_contact.support.progress import progress_bar
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
@@ -64,7 +64,7 @@ def advance(
     comm = problem.body.comm
     ends, start, smallest = _checked(comm, programme, points, start, smallest, monitor)
     history = History(problem) if history is None else history
-    bar, now = _bar(comm.rank, ends[-1] - start), start
+    now = start
 
     def accepted(at: float, step: Step) -> None:
         nonlocal now
@@ -72,16 +72,12 @@ def advance(
         if monitor is not None:
             with raised_together(comm):
                 monitor(at, step)
-        if bar is not None:
-            bar.update(at - now)
+        shown(at)
         now = at
 
-    try:
+    with progress_bar(comm.rank, ends[-1], start) as shown:
         for end in ends:
             _in_increments(problem, programme, now, end, smallest, accepted)
-    finally:
-        if bar is not None:
-            bar.close()
     return history
 
 
@@ -124,14 +120,3 @@ def _in_increments(problem, programme, now: float, end: float, smallest: float, 
         accepted(at, step)
         if easy >= EASY and parts > 1 and done % 2 == 0:
             parts, done, easy = parts // 2, done // 2, 0
-
-
-def _bar(rank: int, total: float):
-    """A progress bar, on a terminal and if tqdm is installed."""
-    if rank != 0 or not sys.stderr.isatty():
-        return None
-    try:
-        from tqdm import tqdm
-    except ImportError:
-        return None
-    return tqdm(total=total)

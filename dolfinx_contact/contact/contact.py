@@ -38,6 +38,7 @@ from dolfinx_contact.law.supported import supported
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
+from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
@@ -82,7 +83,7 @@ class Contact(Guarded):
     """
 
     rho: np.ndarray | None
-    _settable = ("friction", "wear", "rho")
+    _settable = ("friction", "wear", "rho", "repeats")
     _remedy = (
         "results are read-only, and what a contact was made of stays; friction and wear may be exchanged between "
         "steps, and for another space, plane or other facets make a new Contact."
@@ -109,6 +110,7 @@ class Contact(Guarded):
         self.nodes, self.left_out = map(frozen, nodes)
         self.x = frozen(self.displacements.x[self.nodes])
         self._area: np.ndarray | None = None
+        self._repeats = 1.0
         self._axial: bool | None = None
         self._dragged: np.ndarray | None = None
         self._forget_supported()
@@ -190,6 +192,15 @@ class Contact(Guarded):
     def wear(self, wear: Wear | None) -> None:
         check_wear(wear)
         self._laws.wear = wear
+
+    @property
+    def repeats(self) -> float:
+        """How many times what a step wears, works and slips counts, 1 at first; ``cycle_jump`` sets it.  The same on all ranks."""
+        return self._repeats
+
+    @repeats.setter
+    def repeats(self, times: float) -> None:
+        self._repeats = positive("repeats", times, finite=True)
 
     @property
     def law(self):
@@ -544,6 +555,7 @@ class Contact(Guarded):
             work += work_of_friction(law, none, slipped, self.reaction, slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(slip, axis=1)
+        work, path = self.repeats * work, self.repeats * path
         depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
         if self.surface.spin is not None:

@@ -1,0 +1,153 @@
+"""Wear over many cycles: jumps against cycles simulated one by one and closed forms; killed runs, ranks, and what is refused."""
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import pytest
+import scenes
+
+pytestmark = pytest.mark.ranks
+COMM = scenes.COMM
+MU, WEIGHT, ACCURACY = 0.3, 1.0, 0.02
+
+
+def pad(coefficient, stroke, comm=COMM):
+    """A pad under dead weight on a plane that goes to and fro by ``stroke``: the scene and its cycle."""
+    wear = dc.Wear(coefficient)
+    scene = scenes.block(comm=comm, cells=(6, 3), mu=MU, p=None, E=1000.0, tol=1e-8, wear=wear)
+    plane = scene.surface
+    plane.free, plane.force = ("n",), (0, WEIGHT)
+    scene.problem.solve()
+
+    def cycle(done):
+        for way in (stroke, 0.0, -stroke, 0.0):
+            plane.displacement = (way, plane.displacement[1])
+            scene.problem.solve()
+
+    return scene, cycle
+
+
+def total(scene, array):
+    return scene.contact.comm.allreduce(float(scene.contact.area @ array))
+
+
+@pytest.mark.parametrize("coefficient, stroke", [(1e-4, 0.2), (3e-2, 4e-4)])
+def test_estimates_are_the_errors_of_jumps(coefficient, stroke):
+    """In gross and in partial slip, jumps wear what cycles one by one do: to the accuracy, and with the error that is estimated, within three."""
+    truth, cycle = pad(coefficient, stroke)
+    for done in range(40):
+        cycle(done)
+    scene, cycle = pad(coefficient, stroke)
+    found = dc.cycle_jump(scene.problem, cycle, 40, ACCURACY)
+    slips = COMM.allreduce((truth.contact.status != dc.Status.SLIP).sum())
+    assert (slips > 0) == (stroke < 0.01)
+    assert found.cycles == 40 and found.reached and found.simulated < 40
+    assert found.volume == pytest.approx(total(scene, scene.contact.wear_depth), rel=1e-12)
+    assert found.volume == pytest.approx(coefficient * COMM.allreduce(scene.contact.dissipation.sum()), rel=1e-9)  # fmt: skip
+    expected = truth.contact.wear_depth
+    off = scene.contact.wear_depth - expected
+    volume, largest = total(truth, expected), truth.problem.body.largest
+    errors = {
+        "volume_error": abs(total(scene, off)) / volume,
+        "depth_error": largest(np.abs(off)) / largest(expected),
+        "profile_error": total(scene, np.abs(off)) / volume,
+    }
+    for name, error in errors.items():
+        assert error <= ACCURACY
+        assert error / 3 <= getattr(found, name) <= 3 * error, name
+
+
+def test_a_million_cycles_of_gross_slip():
+    """Under dead weight the worn volume is k mu N times the way; few cycles are simulated for it."""
+    coefficient, stroke, cycles = 1e-10, 2.0, 10**6
+    scene, cycle = pad(coefficient, stroke)
+    found = dc.cycle_jump(scene.problem, cycle, cycles, ACCURACY)
+    assert found.volume == pytest.approx(coefficient * MU * WEIGHT * 4 * stroke * cycles, rel=ACCURACY)  # fmt: skip
+    assert found.simulated <= 50 and found.rejected == 0
+    assert found.table[-1]["cycle"] == cycles == sum(row["jump"] for row in found.table)
+
+
+def test_a_killed_programme_goes_on(tmp_path):
+    """A programme that is ended and started again in the same folder makes the jumps of one that was not; so does one rank alone."""
+    path = COMM.bcast(tmp_path, root=0) / "programme"
+    scene, cycle = pad(1e-5, 0.2)
+    straight = dc.cycle_jump(scene.problem, cycle, 500)
+
+    def killed(row):
+        if row["cycle"] > 40:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        dc.cycle_jump(*pad_of(1e-5, 0.2), 500, path=path, monitor=killed)
+    assert COMM.bcast(len(list(path.iterdir())) if COMM.rank == 0 else None, root=0) == 3
+    again, cycle = pad(1e-5, 0.2)
+    resumed = dc.cycle_jump(again.problem, cycle, 500, path=path)
+    alone = dc.cycle_jump(*pad_of(1e-5, 0.2, scenes.MPI.COMM_SELF), 500)
+    for other in (resumed, alone):
+        assert [row["jump"] for row in other.table] == [row["jump"] for row in straight.table]
+        assert other.volume == pytest.approx(straight.volume, rel=1e-7)
+        assert other.depth == pytest.approx(straight.depth, rel=1e-6)
+    if COMM.size == 1:
+        assert resumed == straight
+        assert np.array_equal(again.contact.reaction, scene.contact.reaction)
+    with pytest.raises(ValueError, match="500 cycles on, further than cycles = 10"):
+        dc.cycle_jump(again.problem, cycle, 10, path=path)
+    COMM.barrier()
+    if COMM.rank == 0:
+        (path / "record.json").write_text("{}")
+    COMM.barrier()
+    with pytest.raises(ValueError, match="no record of cycle_jump"):
+        dc.cycle_jump(again.problem, cycle, 500, path=path)
+
+
+def pad_of(*given):
+    scene, cycle = pad(*given)
+    return scene.problem, cycle
+
+
+def test_what_fails_leaves_the_last_jump():
+    """An error of the cycle on one rank is that of all; the problem is at the end of the last jump, and wears as before."""
+    scene, cycle = pad(1e-5, 0.2)
+    depths = []
+
+    def fails(done):
+        cycle(done)
+        if done > 2 and COMM.rank == COMM.size - 1:
+            raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space"):
+        dc.cycle_jump(scene.problem, fails, 100, monitor=lambda row: depths.append(scene.contact.wear_depth))  # fmt: skip
+    assert np.array_equal(scene.contact.wear_depth, depths[-1]) and scene.contact.repeats == 1
+
+
+def test_what_cannot_be_meant():
+    """Cycles, accuracy, wear and snapshots are checked."""
+    scene, cycle = pad(1e-5, 0.2)
+    problem = scene.problem
+    for given, said in (((cycle, 1.5), "cycles must be"), ((cycle, 10, 0.0), "accuracy must be"), ((None, 10), "cycle must be")):  # fmt: skip
+        with pytest.raises(ValueError, match=said):
+            dc.cycle_jump(problem, *given)
+    with pytest.raises(ValueError, match="repeats must be"):
+        scene.contact.repeats = 0
+    snapshot, other = problem.snapshot(), pad(1e-5, 0.2)[0]
+    with pytest.raises(ValueError, match="of the same problem"):
+        other.problem.restore(snapshot)
+    scene.contact.wear = None
+    with pytest.raises(ValueError, match="law of wear"):
+        dc.cycle_jump(problem, cycle, 10)
+
+
+def test_snapshots_are_returned_to():
+    """From a snapshot the same steps follow, as often as one likes."""
+    scene, cycle = pad(1e-5, 0.2)
+    snapshot, before, found = scene.problem.snapshot(), scene.contact.wear_depth, []
+    for _ in range(3):
+        scene.problem.restore(snapshot)
+        assert np.array_equal(scene.contact.wear_depth, before)
+        assert scene.surface.displacement[0] == 0.0
+        cycle(0)
+        found.append(scene.contact.wear_depth)
+    assert (found[0] > before).all()
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-9)
