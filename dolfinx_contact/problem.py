@@ -375,11 +375,12 @@ class ContactProblem(Guarded):
 
     def _at_its_end(self, step, found) -> tuple[LoadStep, SolverResult, float, str]:
         """The step repeated with the geometry of its end and slip from touching on, what is missed, and why it is refused.  Collective."""
-        from dolfinx_contact.step.geometry import REPEATED, undivided
+        from dolfinx_contact.step.geometry import Ends, undivided
         from dolfinx_contact.step.touching import landing
 
         said, missed, known = "", 0.0, self._keep_one_start(None)
-        for repeated in range(REPEATED + 1):
+        ends = Ends(self.body, self.contacts)
+        for repeated in range(ends.most + 1):
             if not step.errors.within(step.tol):
                 break
             missed, said = self._geometry(step, found, repeated)
@@ -388,10 +389,10 @@ class ContactProblem(Guarded):
             late = landing(self.body, self.contacts, step, found.x, self.geometry_tol)
             if max(missed, late) <= self.geometry_tol:
                 break
-            if repeated == REPEATED:
-                said = undivided(max(missed, late), self.geometry_tol)
+            if repeated == ends.most:
+                said = undivided(max(missed, late), self.geometry_tol, repeated)
                 break
-            step, again = self._repeated(step, found)
+            step, again = self._repeated(step, ends.after(found.x))
             known = self._keep_one_start(known)
             found = again._replace(iterations=found.iterations + again.iterations)
         return step, found, missed, said
@@ -407,14 +408,14 @@ class ContactProblem(Guarded):
         said = "" if repeated else too_long(self.body, contacts, found.x)
         return geometry_error(self.body, contacts, stiffness, found.x, step.scale), said
 
-    def _repeated(self, step, found) -> tuple[LoadStep, SolverResult]:
-        """The step with the geometry of its end.  Collective."""
+    def _repeated(self, step, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
+        """The step with the geometry of a displacement at its end.  Collective."""
         for surface in {id(c.surface): c.surface for c in self.contacts}.values():
             surface.end_step()
         placed = [contact.placement.now for contact in self.contacts]
         for contact in self.contacts:
             contact.restore()
-        step = self.load_step(step.holding, found.x)
+        step = self.load_step(step.holding, end)
         for contact, before in zip(self.contacts, placed):
             contact.placement.count_as(before)
         return self._with_friction(step)

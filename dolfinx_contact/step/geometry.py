@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
@@ -19,8 +20,35 @@ from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 # How often a step is repeated with the geometry of its end.
 REPEATED = 5
 
+# The same with deformable surfaces, and differences of ends that are mixed.
+RENEWED, MIXED = 12, 3
+
 # Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
 TURNED, PLACES = 0.5, 32
+
+
+class Ends:
+    """Displacements whose geometry a step is repeated with: those at which it has ended.
+
+    On deformable surfaces, after the first one, they are mixed by Anderson's method: rows follow the displacement of facets,
+    which in soft bodies follows the rows nearly as far.
+
+    Attributes:
+        most: How often a step is repeated.
+    """
+
+    def __init__(self, body, contacts):
+        changes = any(c.surface.deformable and c.changes for c in contacts)
+        self.most, self._mix, self._at = REPEATED, None, None
+        if changes:
+            self.most, self._mix = RENEWED, Anderson(body.size, MIXED, body.total)
+
+    def after(self, x: np.ndarray) -> np.ndarray:
+        """The next one, after a solution with the last one ended at ``x``, owned degrees of freedom.  Collective."""
+        at, self._at = self._at, x
+        if at is not None and self._mix is not None:
+            self._at = self._mix.step(at, x - at)[0]
+        return self._at
 
 
 def geometry_error(
@@ -149,11 +177,11 @@ def too_long(body, contacts, u: np.ndarray) -> str:
     )
 
 
-def undivided(missed: float, tol: float) -> str:
+def undivided(missed: float, tol: float, repeated: int) -> str:
     """What to say of a step whose geometry stays different, in words."""
     return (
         f"distances, normals or arms at the end of the step differ by {missed:.1e} of the forces from those with which it was "
-        f"solved, after {REPEATED} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "
+        f"solved, after {repeated} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "
         "it, or let dc.advance do so"
     )
 

@@ -82,26 +82,41 @@ def moduli_of(domain, above, moduli):
     return modulus * NU / ((1 + NU) * (1 - 2 * NU)), modulus / (2 * (1 + NU))
 
 
-def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM, sliding="small", **options):  # fmt: skip
+def blocks(cell="hexahedron", degree=1, cells=((2, 2, 2), (3, 3, 2)), mu=0.3, p=None, swapped=False, moduli=(E, E), solver=None, tol=1e-10, axis=None, gap=0.0, size=(1.0, 1.0), comm=COMM, sliding="small", form=None, held=True, **options):  # fmt: skip
     """A block on another one; the bottom is held, or moves by ``foot``, the top moves by ``way``.
 
     Args:
         swapped: Whether the lower one's facets carry the unknowns.
         size: Lengths of upper and lower block along the surface.
+        form: Residual of displacement and Lame's constants; None is linear elasticity.
+        held: Whether the top is moved; else it carries the even force ``load``.
     """
     domain, top, bottom, upper, lower, above = pair(cell, cells, size, gap, comm)
     d = domain.geometry.dim
     V = functionspace(domain, ("Lagrange", degree, (d,)))
     u, way, foot = fem.Function(V), *(fem.Constant(domain, np.zeros(d)) for _ in range(2))
     ends = ((way, top), (foot, bottom))
-    bcs = [fem.dirichletbc(by, fem.locate_dofs_topological(V, d - 1, at), V) for by, at in ends]
+    bcs = [fem.dirichletbc(by, fem.locate_dofs_topological(V, d - 1, at), V) for by, at in ends[not held:]]  # fmt: skip
     slave, master = (lower, upper) if swapped else (upper, lower)
     surface = dc.DeformableSurface(V, master, axis=axis, sliding=sliding)
     contact = dc.Contact(V, slave, surface, dc.Friction(mu, p))
     lame, shear = moduli_of(domain, above, moduli)
-    F = work(u, V, lame, shear) * ufl.dx
+    F = work(u, V, lame, shear) * ufl.dx if form is None else form(u, lame, shear)
+    load, tags = fem.Constant(domain, np.zeros(d)), mesh.meshtags(domain, d - 1, np.sort(top), np.ones(top.size, np.int32))  # fmt: skip
+    if not held:
+        ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)(1)
+        F -= ufl.inner(load, ufl.TestFunction(V)) * ds
     problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=tol, **options)
-    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, foot=foot, bcs=bcs, F=F)  # fmt: skip
+    return SimpleNamespace(domain=domain, V=V, u=u, contact=contact, problem=problem, way=way, foot=foot, load=load, bcs=bcs, F=F, ends=(top, bottom))  # fmt: skip
+
+
+def rubber(u, lame, shear):
+    """Neo-Hooke: ``mu / 2 (tr C - d - 2 ln J) + lambda / 2 (ln J)^2``."""
+    d = len(u)
+    G = ufl.Identity(d) + ufl.grad(u)
+    log = ufl.ln(ufl.det(G))
+    energy = shear / 2 * (ufl.tr(G.T * G) - d - 2 * log) + lame / 2 * log**2
+    return ufl.derivative(energy * ufl.dx, u, ufl.TestFunction(u.function_space))
 
 
 def stress(w, lame, shear):
