@@ -327,7 +327,9 @@ class ElasticBody(OverRanks):
         """
         if preconditioner(A, self.options, self.prefix) == "gamg":
             levels = self.ksp.getPC()
-            with options_given(self.prefix, self.options or {}):  # smoothers read them once more
+            with options_given(
+                self.prefix, self._own_solver().of_levels()
+            ):  # smoothers read them once more
                 return StiffenedMultigrid(levels, A, S, how)
         return self.solver(A)
 

@@ -20,8 +20,12 @@ SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 FULL = SYMMETRIC | {"mat_mumps_icntl_7": 0}
 SMALL, DENSE = 100, 0.5
 
-# Conjugate gradients with smoothed aggregation. Jacobi smoothing holds on all levels. Every solve starts
-# from zero, so that a run continued from a checkpoint has the same bits.
+# Of the finest level's smoother among options: PETSc names levels by number, which nobody knows before they are made.
+FINEST = "mg_finest_"
+
+# Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest level: a quarter less time
+# than Chebyshev's polynomial with Jacobi, which smooths the others, whose matrices may have rows of zeros
+# (notes/2026-11-27-multigrid.md). Every solve starts from zero, so that a run continued from a checkpoint has the same bits.
 MULTIGRID = {
     "ksp_type": "cg",
     "ksp_rtol": 1e-12,
@@ -32,6 +36,10 @@ MULTIGRID = {
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 2,
     "mg_levels_pc_type": "jacobi",
+    FINEST + "ksp_type": "richardson",
+    FINEST + "ksp_max_it": 1,
+    FINEST + "pc_type": "sor",
+    FINEST + "pc_sor_local_symmetric": "",
 }
 
 # Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), by itself 20), once that was too little, and what it answers
@@ -109,6 +117,22 @@ def options_given(prefix: str, options: dict):
     finally:
         for key in ours:
             del database[key]
+
+
+def without_finest(options: dict) -> dict:
+    """Options for all but the finest level."""
+    return {key: value for key, value in options.items() if not key.startswith(FINEST)}
+
+
+def of_finest(options: dict, prefix: str, levels: int) -> dict:
+    """Options of the finest of so many levels, by the number that PETSc gives it; none where the user says how all levels smooth."""
+    database = PETSc.Options(prefix)
+    own = {key[len(FINEST) :]: value for key, value in options.items() if key.startswith(FINEST)}
+    of_all = {key: value for key, value in options.items() if key.startswith("mg_levels_")}
+    said = any(MULTIGRID.get(key) != value for key, value in of_all.items())
+    if said or any(database.hasName(f"mg_levels_{key}") for key in own):
+        return {}
+    return {f"mg_levels_{levels - 1}_{key}": value for key, value in own.items()}
 
 
 def _heed_signals(*_) -> None:
@@ -202,10 +226,24 @@ class LinearSolver:
     def _set_up(self, A, prefix: str, options: dict) -> list[str]:
         """Factorise, or set up the levels; the options that PETSc did not ask for."""
         self.ksp.setOperators(A)
-        with options_given(prefix, options) as unread:
+        with options_given(prefix, without_finest(options)) as unread:
             self.ksp.setFromOptions()
             self.ksp.setUp()  # reads the options of the levels, which must still be there
-        return unread
+        pc = self.ksp.getPC()
+        if pc.getType() != "gamg" or pc.getMGLevels() == 1:
+            return unread
+        finest = of_finest(options, prefix, pc.getMGLevels())
+        with options_given(prefix, finest) as of_smoother:
+            smoother = pc.getMGSmoother(pc.getMGLevels() - 1)
+            smoother.setFromOptions()
+            smoother.setUp()
+        return unread + of_smoother
+
+    def of_levels(self) -> dict:
+        """Options by which smoothers like these are made, the finest level's by its number."""
+        levels = self.ksp.getPC().getMGLevels()
+        finest = of_finest(self._options, self.ksp.getOptionsPrefix(), levels) if levels > 1 else {}
+        return without_finest(self._options) | finest
 
     def destroy(self) -> None:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
