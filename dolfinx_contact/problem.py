@@ -33,6 +33,7 @@ from dolfinx_contact.problem_input import (
     checked_undetermined,
     follow,
     hold,
+    support,
     take_contacts,
 )
 from dolfinx_contact.problem_states import Kept, ProblemStates
@@ -78,7 +79,7 @@ class ContactProblem(Guarded):
         u: Displacement, a Function, or one of a mixed space with displacements.  Holds the solution after a step; at the start of one, the first too, it is
             only a guess, the last converged state is kept inside.
         contacts: The contacts; a node of an edge may belong to several.
-        bcs: Dirichlet conditions; their values may change between steps.
+        bcs: Dirichlet conditions; their values may change between steps, and ``problem.bcs = [...]`` releases or adds supports.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
         solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small
             contacts, the second for large ones, the third for nonlinear bodies, and says so in ``step.solver``.
@@ -121,8 +122,8 @@ class ContactProblem(Guarded):
     """
 
     monitor: Callable[[int, float, Counts], object] | None
-    _settable = ("monitor", "solver", "tol", "undetermined", "geometry_tol")
-    _remedy = "monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
+    _settable = ("bcs", "monitor", "solver", "tol", "undetermined", "geometry_tol")
+    _remedy = "bcs, monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
         self,
@@ -193,6 +194,24 @@ class ContactProblem(Guarded):
     @solver.setter
     def solver(self, solver: Solver | None) -> None:
         self._solver = checked_solver(solver)
+
+    @property
+    def bcs(self) -> tuple[Any, ...]:
+        """The Dirichlet conditions; others may be assigned between steps, on all ranks, see docs/howto/stages.md.  Collective.
+
+        Displacement, reactions, friction, sums and surfaces stay; the next step starts from them with the new supports.  What is
+        held from now on moves from where it is to its prescribed value, of what is released the force is gone.
+
+        Raises:
+            ValueError: on all ranks, for conditions that make no sense; those of before stay.
+        """
+        return tuple(self.body.bcs)
+
+    @bcs.setter
+    def bcs(self, bcs: Sequence[Any]) -> None:
+        check_alive(self, self.body, self.contacts)
+        self._unbind()
+        support(self.body, self.contacts, bcs)
 
     @property
     def tol(self) -> float:

@@ -15,7 +15,7 @@ from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.support.checks import positive
-from dolfinx_contact.support.collective import from_first, raised_together
+from dolfinx_contact.support.collective import agree, from_first, raised_together
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 STRAINED = 0.5  # mean strain above which linear elasticity says nothing
@@ -159,10 +159,15 @@ def checked_options(name: str, options) -> dict | None:
     return options
 
 
-def hold(contacts, body) -> None:
+def hold(contacts, body, level: int = 3) -> None:
     """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
 
     Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
+
+    Args:
+        contacts: The contacts.
+        body: The body.
+        level: Of the caller in whose name is warned.
     """
     left_out = [np.zeros((0, 3))]
     for contact in contacts:
@@ -188,8 +193,29 @@ def hold(contacts, body) -> None:
         f"{len(where)} of {nodes} contact nodes, between {low} and {high}, are left out: boundary conditions give "
         "their displacement along the normal, so that they cannot touch. Take their facets out of the contact, or "
         "them out of the conditions, if that is not meant.",
-        stacklevel=3,
+        stacklevel=level,
     )
+
+
+def support(body, contacts, bcs) -> None:
+    """Give a body other Dirichlet conditions, and let contacts know.  Collective.
+
+    Raises:
+        ValueError: on all ranks, for conditions that make no sense; those of before stay.
+    """
+    with raised_together(body.comm):
+        bcs = checked_conditions(bcs, body.V)
+    agree(body.comm, bcs=len(bcs))
+    before = body.bcs
+    body.support(bcs)
+    try:
+        hold(contacts, body, level=5)  # who assigned them
+    except Exception:
+        body.support(before)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what was said when these were given
+            hold(contacts, body)
+        raise
 
 
 def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
@@ -228,9 +254,9 @@ def follow(contacts, body, u: np.ndarray, start: np.ndarray, known: list) -> boo
         if contact.follows:
             contact.follow(u, start)
     changed = [c for c, points in zip(contacts, known) if c.points is not points]
-    known[:] = [contact.points for contact in contacts]
     if changed:
         hold(changed, body)
+    known[:] = [contact.points for contact in contacts]
     return bool(changed)
 
 

@@ -30,7 +30,7 @@ class ElasticBody(OverRanks):
     Args:
         F: Residual form, linear in ``u``.
         u: Displacement.
-        bcs: Dirichlet conditions; their values may change between steps, their places not.
+        bcs: Dirichlet conditions; their values may change between steps, others come by ``support``.
         derivative: Of ``F``, as ``derivative_of`` returns it.
         options: PETSc options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
@@ -46,7 +46,7 @@ class ElasticBody(OverRanks):
     def __init__(
         self, F, u, bcs, derivative, options=None, prefix=None, of=None, form_options=None
     ):
-        self.u, self.V, self.bcs = u, u.function_space, list(bcs)
+        self.u, self.V = u, u.function_space
         self.comm = self.V.mesh.comm
         compat.free_garbage(self.comm)  # of bodies that nobody closed
         self.tangent, self.form_options = derivative, form_options or {}
@@ -57,8 +57,7 @@ class ElasticBody(OverRanks):
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
         self._work, self.displacements = fem.Function(self.V), of or Displacements(self.V)
         self.size = self.displacements.size
-        fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
-        self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
+        self.support(bcs)
         default = DIRECT if self.displacements.mixed else None  # a saddle point: no multigrid
         self.options = default if options is None else dict(options)
         self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
@@ -71,8 +70,14 @@ class ElasticBody(OverRanks):
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
         self.parts = rigid_motion.connected_parts(self.displacements)
 
+    def support(self, bcs) -> None:
+        """From now on these are the Dirichlet conditions; ``refresh`` sets everything up for them."""
+        self.bcs = list(bcs)
+        fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
+        self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
+
     def refresh(self, x=None) -> int:
-        """Assemble the stiffness if a constant or coefficient in it changed.
+        """Assemble the stiffness if a constant or coefficient in it changed, or what is fixed.
 
         Args:
             x: Last converged displacement; not used here.
@@ -82,8 +87,9 @@ class ElasticBody(OverRanks):
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
         stiffness_checks.agree_on_values(given, self.comm)
-        digest = digest_of(self._parameters)
-        if not self.comm.allreduce(digest != self._digest, op=MPI.LOR):
+        # That of all ranks' parts: whether it is another one is the same on all.
+        digest = digest_of((), *self.comm.allgather(digest_of(self._parameters, self.fixed)))
+        if digest == self._digest:
             return self._assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
         self._assemble()

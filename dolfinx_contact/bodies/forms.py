@@ -76,9 +76,11 @@ def depends_on(form, u) -> bool:
     return any(c is u for c in form.coefficients())
 
 
-def digest_of(parameters) -> bytes:
-    """A number that changes with the values of constants and coefficients."""
+def digest_of(parameters, *more) -> bytes:
+    """A number that changes with the values of constants and coefficients, and with more bytes or arrays."""
     digest = hashlib.blake2b()
+    for part in more:
+        digest.update(part)
     for parameter in parameters:
         values = parameter.x.array if hasattr(parameter, "x") else parameter.value
         digest.update(np.ascontiguousarray(values))

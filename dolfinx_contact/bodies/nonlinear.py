@@ -56,9 +56,7 @@ class NonlinearBody(ElasticBody):
         super().__init__(F, u, bcs, derivative, options, prefix, of, form_options)
         self._before = before
         self._given = [*self._parameters, *self._load_parameters]
-        self._place = None  # where K stands
         self._rounding = None
-        self.soft = None
 
     # -- at a displacement ---------------------------------------------------------------------
 
@@ -92,6 +90,11 @@ class NonlinearBody(ElasticBody):
 
     # -- a step --------------------------------------------------------------------------------
 
+    def support(self, bcs) -> None:
+        """See ``ElasticBody``."""
+        super().support(bcs)
+        self._place = self.soft = None  # where K stands, and motions that are soft: not known
+
     def refresh(self, x=None) -> int:
         """Agree on what is given, and linearise at the last converged displacement.
 
@@ -109,12 +112,13 @@ class NonlinearBody(ElasticBody):
             with raised_together(self.comm):
                 check_diagonal(self.diagonal(), self.displacements)
             if self.soft is None:
-                self.soft, loose = rigid_motion.soft_motions(self)
+                soft, loose = rigid_motion.soft_motions(self)
                 if loose is not None:
                     raise ValueError(
                         f"{loose.refusal()} Contact alone does not hold a body whose F is not linear in u: fix it by "
                         "Dirichlet conditions, or add a soft spring to F."
                     )
+                self.soft = soft
         return self._assemblies
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:

@@ -239,8 +239,11 @@ class Contact(Guarded):
         self._forget_supported()
 
     def meet(self, fixed: np.ndarray) -> None:
-        """Let frames that are means of facets' know of supports at these degrees of freedom.  Collective."""
-        self._placement.meet(fixed)
+        """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
+        if self._placement.meet(fixed):
+            self._history.last = self._placement.turned(self._settled, self.wear_depth)
+            self._history.restore()
+            self._settle_here()
 
     def _forget_supported(self) -> None:
         """Friction, points or the last state are others now."""

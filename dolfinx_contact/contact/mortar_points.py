@@ -71,6 +71,7 @@ class MortarPlacement(Placement):
         flat = ((self.x - rows.m @ self._master.x) * frames[:, -1]).sum(axis=1)
         flat[~rows.covered] = self._apart  # opposite nothing: closed
         points = MortarPoints(self._dofs, frames, self._owned, rows, self._master.dofs, self._comm)
+        points.met = self._supported
         still = self.surface.rotation
         frames, flat, at = frozen(frames), frozen(flat), frozen(u.view())
         found = Placed(self.x, still, frames, frames, flat, points, None, None, still, at=at)
@@ -144,14 +145,14 @@ class MortarPlacement(Placement):
         """See ``Placement``."""
         return self.changes
 
-    def meet(self, fixed: np.ndarray) -> None:
+    def meet(self, fixed: np.ndarray) -> bool:
         """Take frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
         held = np.isin(self._dofs, fixed)
-        if not self._comm.allreduce(bool((held != self._supported).any())):
-            return
+        if not self._comm.allreduce(bool((held != self.now.points.met).any())):
+            return False
         self._supported, self._projected = held, (None, None)
         self.now = self.placed(self.now.at)
-        self.settle()
+        return True
 
 
 class Ended(NamedTuple):
@@ -220,9 +221,11 @@ class MortarPoints(ContactPoints):
     Attributes:
         alone: Nodes opposite nothing, or next to nothing, ``shape=(n,)``.
         share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
+        met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
     """
 
     local = False
+    met: np.ndarray
 
     def __init__(self, dofs, frames, owned, rows: Rows, opposite: np.ndarray, comm):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape

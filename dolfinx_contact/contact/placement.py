@@ -147,8 +147,9 @@ class Placement:
         """How far a node has slid beyond what its frame was taken for, and how far it may: lengths.  None on rigid surfaces."""
         return 0.0, np.inf
 
-    def meet(self, fixed: np.ndarray) -> None:
-        """Frames are the surface's, whatever supports hold."""
+    def meet(self, fixed: np.ndarray) -> bool:
+        """Frames are the surface's, whatever supports hold: whether they are others now."""
+        return False
 
     def settle(self) -> None:
         """These are the frames of the last step that converged."""
@@ -260,6 +261,13 @@ class Placement:
         if now.points is not before.points:
             last = last._replace(reaction=frozen(carried(last.reaction, before.frame, now.frame)))
         return last
+
+    def turned(self, last: State, worn: np.ndarray) -> State:
+        """The last state in frames that supports have turned, of the same nodes opposite to the same ones; ``worn`` depths, ``shape=(n,)``."""
+        before, now = self.settled, self.now
+        moved = times(now.own, turned_back(before.own, last.displacement))
+        reaction, gap = carried(last.reaction, before.frame, now.frame), now.flat + worn + moved[:, -1]  # fmt: skip
+        return last._replace(displacement=frozen(moved), reaction=frozen(reaction), gap=frozen(gap))
 
     # -- motion --------------------------------------------------------------------------------
 

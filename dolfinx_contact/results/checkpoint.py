@@ -25,7 +25,7 @@ from dolfinx_contact.support.numbering import original_cells, original_nodes
 VERSION = 1
 
 # Ends of the names of arrays that not every history has, and of those that files without a version may lack.
-LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed")
+LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed", "fixed")
 NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
 
 ANEW = "Take another one, or write it anew with problem.save."
@@ -74,6 +74,7 @@ def save(path, body, contacts, states, past, variables) -> None:
 def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
     """Displacements and histories of contacts by name; this rank's rows.  Collective."""
     mine = {name: body.displacements.rows(of) for name, of in zip(("u", "before"), states)}
+    mine["fixed"] = _fixed(body)
     if body.displacements.mixed:
         mine |= {f"mixed_{name}": _by_cells(body, of) for name, of in zip(("u", "before"), states)}
     with raised_together(body.comm):  # the user's functions
@@ -84,6 +85,13 @@ def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
             at = contacts[k].placement.now.at
             mine[f"{k}_placed"] = body.displacements.rows(at)
     return mine
+
+
+def _fixed(body) -> np.ndarray:
+    """1 where displacements are given, else 0, ``shape=(nodes, dim)``."""
+    fixed = np.zeros(body.size, dtype=np.uint8)
+    fixed[body.fixed] = 1
+    return body.displacements.rows(fixed)
 
 
 def _write(path, file: dict[str, np.ndarray]) -> None:
@@ -129,7 +137,7 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
     with raised_together(comm):
         if comm.rank == 0:
             file = _opened(path)
-            _check_file(path, file, asked, stiffness)
+            _check_file(path, file, asked)
             _check_arrays(path, file, like)
             orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
             parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
@@ -138,6 +146,11 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
                 past = _past(path, file, order)
     mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
+    with raised_together(comm):
+        _check_supports(path, mine, body)
+    with raised_together(comm):
+        if comm.rank == 0:
+            _check_stiffness(path, file, stiffness)
     own = [
         {n.removeprefix(prefix): a for n, a in mine.items() if n.startswith(prefix)}
         for prefix in (f"contact{k}_" for k in range(len(contacts)))
@@ -178,8 +191,8 @@ def _opened(path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path} is no checkpoint: {error}.") from None
 
 
-def _check_file(path, file, asked, stiffness: float) -> None:
-    """Raise a ``ValueError`` unless the file has as many nodes and the same stiffness as the problem that asks."""
+def _check_file(path, file, asked) -> None:
+    """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
     if not {"u", "before", "nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
     if (version := _number(path, file, "version", 0)) > VERSION:
@@ -191,6 +204,23 @@ def _check_file(path, file, asked, stiffness: float) -> None:
         if name not in file or file[name].shape != (size,):
             found = file[name].size if name in file else "none"
             raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
+
+
+def _check_supports(path, mine: dict[str, np.ndarray], body) -> None:
+    """Raise a ``ValueError`` if other displacements of this rank were given in the run that wrote the file."""
+    here = _fixed(body)
+    saved = mine.get("fixed", here)  # older checkpoints do not have it
+    differs = np.flatnonzero((saved != here).any(axis=1))
+    if differs.size:
+        where = body.displacements.x[differs[0], : body.displacements.dim].tolist()
+        raise ValueError(
+            f"checkpoint {path} was written with other supports, as at the node at {where}: set problem.bcs to those that the run had, "
+            "load, and then change them."
+        )
+
+
+def _check_stiffness(path, file, stiffness: float) -> None:
+    """Raise a ``ValueError`` unless the file has the same stiffness as the problem that asks."""
     saved = _number(path, file, "stiffness", stiffness)  # older checkpoints do not have it
     if not abs(saved - stiffness) <= 1e-9 * stiffness:
         raise ValueError(
@@ -293,7 +323,7 @@ def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
     part = {}
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
-        of_body = {"u", "before", "load", "free", "rough"}
+        of_body = {"u", "before", "fixed", "load", "free", "rough"}
         of_body |= {name for name in file if name.endswith("_placed")}
         names = of_body if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
