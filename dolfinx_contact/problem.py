@@ -93,8 +93,8 @@ class ContactProblem(Guarded):
             it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
         undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
             "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, by volume: with the least integral of |du|^2.
-        geometry_tol: Largest ``step.geometry_error``: of forces that distances, normals and arms at the end of a step may differ by
-            from those with which it was solved, on surfaces that are curved, turn, are wavy or deformable, see docs/surfaces.md.
+        geometry_tol: Largest ``step.geometry_error``: of reactions that distances, normals, textures and arms at the end of a step may differ by
+            from those with which it was solved, on surfaces that are curved, turn, are wavy, textured or deformable, see docs/surfaces.md.
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
@@ -425,7 +425,7 @@ class ContactProblem(Guarded):
             return 0.0, ""
         contacts, stiffness = map(list, zip(*both))
         said = "" if repeated else too_long(self.body, contacts, found.x)
-        return geometry_error(self.body, contacts, stiffness, found.x, step.scale), said
+        return geometry_error(self.body, contacts, stiffness, found.x, step.carried), said
 
     def _repeated(self, step, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
         """The step with the geometry of a displacement at its end.  Collective."""

@@ -105,17 +105,26 @@ def directions(contact, friction: Friction) -> np.ndarray:
 
 
 def _axes(contact, friction: Friction):
-    given = friction.given()["axes"]
-    if not is_field(given):
+    if not is_field(given := friction.given()["axes"]):
         return given
-    n, gdim, of_surface = contact.nodes.size, contact.points.dim, friction.of == "surface"
-    values = _values(contact, "axes", given, {}, contact.home if of_surface else None)
+    if friction.of == "surface":
+        return axes_at(contact, given, contact.home, contact.own_frame)
+    return axes_at(contact, given, None, contact.frame)
+
+
+def axes_at(contact, given, at: np.ndarray | None, frame: np.ndarray) -> np.ndarray:
+    """Axes at positions of the nodes in frames there, ``shape=(n, 2)``; None is the reference positions.
+
+    Raises:
+        ValueError: values of another shape, or along the normal.  On this rank alone.
+    """
+    n, gdim = contact.nodes.size, contact.points.dim
+    values = _values(contact, "axes", given, {}, at)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
-    frame = contact.own_frame if of_surface else contact.frame
     if len(values) == 2:
         along = values
     elif contact.surface.curved:

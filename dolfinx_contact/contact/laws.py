@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dolfinx_contact.contact.friction_field import directed, directions, followed, on_nodes
+from dolfinx_contact.contact.friction_field import axes_at, directed, directions, followed, on_nodes
 from dolfinx_contact.contact.input import check_law, warn_of_percent
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.law.wear import Wear
@@ -64,6 +64,19 @@ class Laws:
     def textured(self) -> bool:
         """Whether axes of friction depend on where nodes are on the surface."""
         return self._field is not None and self._field.of == "surface"
+
+    def turned(self, contact, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
+        """Radians by which axes of the surface's texture at other positions differ from those in use, ``shape=(n,)``; 0 of others.
+
+        Args:
+            contact: The contact.
+            at: Positions relative to the surface, ``shape=(n, gdim)``.
+            frame: Frames there, in its axes.
+        """
+        if not self.textured:
+            return 0.0
+        new, old = axes_at(contact, self._field.given()["axes"], at, frame), self.friction.axes
+        return np.abs(new[:, 0] * old[:, 1] - new[:, 1] * old[:, 0])
 
     @property
     def follow_pressure(self) -> bool:

@@ -47,8 +47,8 @@ class Step:
         penetration: Largest penetration of contact nodes, >= 0, length.
         vertex_penetration: The same of nodes of the facets that carry nothing, the vertices of second-order tetrahedra; 0 without such
             nodes, and with wear.
-        geometry_error: Forces by which distances, normals and arms at the end of the step differ from those with which it was solved, over
-            the forces that act; 0 on planes that are flat and do not turn, see docs/surfaces.md, and if sliding is small.
+        geometry_error: Forces by which distances, normals, textures and arms at the end of the step differ from those with which it was
+            solved, over the reactions; 0 on planes that are flat and do not turn, see docs/surfaces.md, and if sliding is small.
         iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
             started (the last step's, or its continuation), already was the solution.
         seconds: Wall time of the step.

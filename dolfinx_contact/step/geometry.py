@@ -54,14 +54,14 @@ class Ends:
 def geometry_error(
     body, contacts, stiffness: list[NodalStiffness], u: np.ndarray, S: float
 ) -> float:
-    """Forces by which the geometry at the end of a step differs from that used, over the forces that act.  Collective.
+    """Forces by which the geometry at the end of a step differs from that used, over the reactions.  Collective.
 
     Args:
         body: The body.
         contacts: Those whose geometry changes; in the state of ``u``.
         stiffness: Of their nodes.
         u: Displacement of owned degrees of freedom.
-        S: Forces that act.
+        S: Norm of the reactions.
     """
     squares = np.zeros(3)
     for contact, of in zip(contacts, stiffness):
@@ -77,19 +77,19 @@ def geometry_error(
 
 
 def _missed(contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Of gaps, normals and ways, as forces on each node, ``shape=(n,)``."""
+    """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
     placement, r = contact.placement, contact.reaction
     surface, there = placement.ended_at(u)
     y = surface.relative(there)
     own, distance = surface.frames(y), surface.distance(y)
-    size = np.linalg.norm(r, axis=1)
+    size, friction = np.linalg.norm(r, axis=1), np.linalg.norm(r[:, :-1], axis=1)
     turned = surface.turned(own)[..., -1, :] - contact.frame[..., -1, :]
     angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
     way = placement.way(surface, y, own, distance, contact.settled)
     missed = way - (0.0 if placement.now.way is None else placement.now.way)
     return (
         _pressed(contact, stiffness, distance),
-        size * angle,
+        np.hypot(size * angle, friction * contact.texture_turned(y, own)),
         _dragged(contact, stiffness, missed),
     )
 
@@ -180,7 +180,7 @@ def too_long(body, contacts, u: np.ndarray) -> str:
 def undivided(missed: float, tol: float, repeated: int) -> str:
     """What to say of a step whose geometry stays different, in words."""
     return (
-        f"distances, normals or arms at the end of the step differ by {missed:.1e} of the forces from those with which it was "
+        f"distances, normals or arms at the end of the step differ by {missed:.1e} of the reactions from those with which it was "
         f"solved, after {repeated} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "
         "it, or let dc.advance do so"
     )

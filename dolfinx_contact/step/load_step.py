@@ -215,10 +215,16 @@ class LoadStep:
         """Forces that act in the state judged last."""
         return self.errors.scale * self.unit
 
+    @property
+    def carried(self) -> float:
+        """Reactions of that state, but no less than the tolerance of the forces that act: beside stiff springs they may be small."""
+        return self.scale * max(self.errors.share, self.tol)
+
     def rest(self) -> None:
-        """Call sticking what slips by less than the tolerance leaves unknown of the state judged last."""
+        """Call sticking what slips by less than is unknown of the state judged last, or than the tolerance of its reactions."""
         errors = self.errors
-        unknown = max(self.tol, ROUNDED * errors.rounding) * errors.scale * self.unit
+        unknown = max(self.tol * errors.share, errors.largest, ROUNDED * errors.rounding)
+        unknown *= errors.scale * self.unit
         for contact, stiffness in zip(self.contacts, self.stiffness):
             still = at_rest(contact, stiffness, unknown)
             if still.any():

@@ -23,10 +23,10 @@ def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
         contacts: All contacts, in the state of ``x``.
         step: The ``LoadStep``.
         x: Displacement of owned degrees of freedom.
-        tol: Part of the forces that act which does not matter.
+        tol: Part of the reactions which does not matter.
 
     Returns:
-        The largest change of friction over the forces that act; above ``tol`` the step has to be solved again.
+        The largest change of friction over the reactions; above ``tol`` the step has to be solved again.
     """
     lands = [(c.last.gap > c.gap_rounding(x)) & (c.reaction[:, -1] > 0.0) for c in contacts]
     new = [at & ~c.counts_from.any(axis=1) for c, at in zip(contacts, lands)]
@@ -45,7 +45,7 @@ def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
 
 
 def _felt(body, contacts, step, slips, at) -> float:
-    """How much friction changes with slips at most, over the forces that act: by what they make, and twice what friction carries."""
+    """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries."""
     squares = 0.0
     for contact, of, slip, here in zip(contacts, step.stiffness, slips, at):
         slip = np.where(here[:, None], slip, 0.0)
@@ -54,7 +54,7 @@ def _felt(body, contacts, step, slips, at) -> float:
         most = 2.0 * contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
         squares += np.square(np.minimum(made, most)).sum()
     size = float(np.sqrt(body.total([squares])[0]))
-    return size / step.scale if size > 0.0 else 0.0
+    return size / step.carried if size > 0.0 else 0.0
 
 
 def _without(body, contacts, step, x: np.ndarray, nodes) -> np.ndarray | None:
@@ -79,12 +79,12 @@ def opening(body, contacts, step, tol: float) -> None:
         body: The body.
         contacts: All contacts, in their state at the end.
         step: The ``LoadStep``.
-        tol: Part of the forces that act which does not matter.
+        tol: Part of the reactions which does not matter.
     """
     opens = [(c.settled.reaction[:, -1] > 0.0) & (c.reaction[:, -1] == 0.0) for c in contacts]
     before = [np.where(at[:, None], c.settled.reaction, 0.0) for c, at in zip(contacts, opens)]
     size = np.sqrt(body.total([sum(np.square(r).sum() for r in before)])[0])
-    if size <= tol * step.scale:
+    if size <= tol * step.carried:
         return
     forces, points = np.zeros(body.size), [c.placement.settled.points for c in contacts]
     for of, reaction in zip(points, before):
