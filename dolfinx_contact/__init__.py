@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # what type checkers and editors read; a test compares it wit
     from dolfinx_contact.results.record import NotConverged as NotConverged
     from dolfinx_contact.results.record import Step as Step
     from dolfinx_contact.results.writer import Writer as Writer
+    from dolfinx_contact.solvers.base import SolverName as SolverName
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton as CondensedNewton
     from dolfinx_contact.solvers.condensed.newton import solve_condensed as solve_condensed
     from dolfinx_contact.solvers.condensed.result import (
@@ -93,6 +94,7 @@ _NAMES = {  # by their module
     "results.profile": ["profile"],
     "results.record": ["Counts", "NotConverged", "Step"],
     "results.writer": ["Writer"],
+    "solvers.base": ["SolverName"],
     "solvers.condensed.newton": ["CondensedNewton", "solve_condensed"],
     "solvers.condensed.result": ["CondensedNotConverged", "CondensedResult"],
     "solvers.fixed_point.fixed_point": ["FixedPoint"],

@@ -43,6 +43,7 @@ from dolfinx_contact.results.record import (
     Step,
     converged,
     counts,
+    named,
     record,
     warn_of_contact,
     warn_of_rounding,
@@ -82,7 +83,7 @@ class ContactProblem(Guarded):
         bcs: Dirichlet conditions; their values may change between steps, and ``problem.bcs = [...]`` releases or adds supports.
         J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
         solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small
-            contacts, the second for large ones, the third for nonlinear bodies, and says so in ``step.solver``.
+            contacts, the second for large ones, the third for nonlinear bodies, and says so in ``step.solver`` and ``step.reason``.
         tol: Largest error, slip error and forward error of a converged step, see docs/errors.md.
         petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, of large bodies multigrid.
         petsc_options_prefix: Their prefix.
@@ -284,7 +285,7 @@ class ContactProblem(Guarded):
             raise_interrupt(failure)
             raise
         self._states.advance(found.x)
-        self._log(f"step solved: {done}, {done.seconds:.3g} s, {done.solver}")
+        self._log(f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
         self._large = self._large or check_size(self.body, found.x, self.u.x.array)
         self._unseen.check(
             self.body, self.contacts, self._stiffness, self.u.x.array, done.counts, self._large
@@ -305,7 +306,7 @@ class ContactProblem(Guarded):
         if said or not converged(step.errors, done, self.tol):
             if not said:
                 said = (
-                    f"not converged: {done}, tol {self.tol:.1e}, by {done.solver}. {step.refusal()}"
+                    f"not converged: {done}, tol {self.tol:.1e}, by {named(done)}. {step.refusal()}"
                 )
             raise NotConverged(
                 f"{said}.",
@@ -465,8 +466,9 @@ class ContactProblem(Guarded):
             if settled or step.errors.within(0.0):
                 break
             last, tol = change, max(goal, min(ROUGH, PART * change))
-        said = f"{found.chosen}, {rounds} times with friction that follows the pressure"
-        return step.within(goal), found._replace(iterations=iterations, chosen=said)
+        said = f"{rounds} times with friction that follows the pressure"
+        reason = f"{found.reason}; {said}" if found.reason else said
+        return step.within(goal), found._replace(iterations=iterations, reason=reason)
 
     def _keep_one_start(self, before):
         """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""

@@ -53,7 +53,8 @@ class Step:
             started (the last step's, or its continuation), already was the solution.
         seconds: Wall time of the step.
         counts: Contact nodes open, sticking and slipping.
-        solver: The solver that was used, and why it was chosen where the user did not.
+        solver: The solver that found the state: a ``SolverName``, or the name that a solver of one's own gives.
+        reason: Why this one, where the user did not choose, how others ended, and what it says of its way; in words.
         tried: What the solver tried, in order, where it has more than one method.
 
     Example:
@@ -76,6 +77,7 @@ class Step:
     contact_error: float = 0.0
     geometry_error: float = 0.0
     vertex_penetration: float = 0.0
+    reason: str = ""
 
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
@@ -89,6 +91,11 @@ class Step:
 def _said(error: float) -> str:
     """A number; of what cannot be measured, as where rounding hides the loads on what has moved far away, that it cannot."""
     return f"{error:.3e}" if np.isfinite(error) else "unknown"
+
+
+def named(step: Step) -> str:
+    """Solver and reason of a step in words."""
+    return f"{step.solver}: {step.reason}" if step.reason else str(step.solver)
 
 
 class NotConverged(RuntimeError):
@@ -155,11 +162,12 @@ def record(body, contacts, errors, found, seconds: float, geometry_error: float 
         iterations=found.iterations,
         seconds=body.largest(np.array([seconds])),
         counts=counts(body, contacts),
-        solver=found.chosen,
+        solver=found.solver,
         tried=found.tried,
         contact_error=errors.of_contact(found.forward_error),
         geometry_error=geometry_error,
         vertex_penetration=of_vertices,
+        reason=found.reason,
     )
 
 

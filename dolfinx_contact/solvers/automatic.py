@@ -91,18 +91,18 @@ class BoundAutomatic:
 
     def solve(self, step) -> SolverResult:
         """See ``BoundSolver``."""
-        iterations, smallest, best, start, said = 0, np.inf, None, None, []
-        why, solvers = self._why, self._solvers
+        iterations, smallest, best, start, ended = 0, np.inf, None, None, []
+        solvers = self._solvers
         # Of a body that contact alone holds the fixed point finds at once what takes Newton's fallbacks thousands of iterations.
         brief = step.statics is not None and isinstance(solvers[0], CondensedNewton)
         for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
             if solver not in self._bound:
                 self._bound[solver] = solver.bind(*self._arguments)
-            options = {"fallbacks": False} if brief and not said else {}
+            options = {"fallbacks": False} if brief and not ended else {}
             found = self._bound[solver].solve(step, start, **options)
             iterations += found.iterations
-            said.append(f"{found.chosen} ({why})")
             errors = step.measure(found.x)
+            ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
             done = errors.within(step.tol if near else 0.0)
             # Where nothing acts errors are over no force that could be compared.
@@ -115,5 +115,5 @@ class BoundAutomatic:
                 break
             if not options and step.slides():
                 break
-            why = f"the other one ended at {errors.largest:.1e}"
-        return best._replace(iterations=iterations, chosen=", then ".join(said))
+        said = [self._why, best.reason, *(how for other, how in ended if other is not best)]
+        return best._replace(iterations=iterations, reason="; ".join(filter(None, said)))

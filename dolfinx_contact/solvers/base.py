@@ -8,11 +8,30 @@ everything set up for the body's present stiffness, and is thrown away when the 
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 KEPT = 64  # earlier steps in the memory of a problem: more than a cycle has
+
+
+class SolverName(str, Enum):
+    """The solvers of this package, as ``step.solver`` names them; ``NONE`` where there was nothing to solve.
+
+    Example:
+        >>> step.solver == dc.SolverName.CONDENSED_NEWTON  # equal to "CondensedNewton", too
+        True
+    """
+
+    CONDENSED_NEWTON = "CondensedNewton"
+    FIXED_POINT = "FixedPoint"
+    SPARSE_NEWTON = "SparseNewton"
+    SNES = "SNES"
+    NONE = "none"
+
+    __str__ = str.__str__  # the plain word on every Python
+    __format__ = str.__format__
 
 
 class SolverResult(NamedTuple):
@@ -22,15 +41,17 @@ class SolverResult(NamedTuple):
         x: Displacement of owned degrees of freedom, the best one found.
         iterations: Iterations of the solver.
         forward_error: Estimate of how far the reactions are from the exact ones, over the forces that act.
-        chosen: Name of the solver, and why it was chosen where the user did not.
+        solver: A ``SolverName``, or the name of another one.
         tried: Methods that were tried, in order, where the solver has more than one.
+        reason: Why this solver, where the user did not choose it, and what it says of its way; in words.
     """
 
     x: np.ndarray
     iterations: int
     forward_error: float
-    chosen: str
+    solver: str
     tried: tuple = ()
+    reason: str = ""
 
 
 class BoundSolver(Protocol):

@@ -7,12 +7,12 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact.petsc.linear_solver import stage
-from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.base import SolverName, SolverResult
 
 # Penetration over the largest displacement that three digits of it leave no doubt about.
 CERTAIN = 0.1
 
-NOTHING = "none: nothing touches"
+NOTHING, NO_SOLUTION = "nothing touches", "there is no solution"
 
 
 def without_reactions(body, contacts, step) -> SolverResult | None:
@@ -28,7 +28,7 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
     if not may_touch(body, contacts, trial):
         trial = refined(body, step, trial)
         if step.errors.within(step.tol):
-            return SolverResult(trial, 0, 0.0, NOTHING)
+            return SolverResult(trial, 0, 0.0, SolverName.NONE, reason=NOTHING)
     if step.surfaces is not None:
         step.surfaces.move_to(np.zeros(step.surfaces.count))
     return None
@@ -39,7 +39,7 @@ def unmoved(body, step, last: np.ndarray) -> SolverResult:
     x, fixed = last.copy(), body.fixed
     x[fixed] = step.b[fixed]
     step.measure(x)
-    return SolverResult(x, 0, np.inf, "none: there is no solution")
+    return SolverResult(x, 0, np.inf, SolverName.NONE, reason=NO_SOLUTION)
 
 
 def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
@@ -52,7 +52,7 @@ def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
     x += body.solve(step.forces(x))
     if may_touch(body, contacts, x) or not step.measure_open(x).within(step.tol):
         return None
-    return SolverResult(x, 0, 0.0, NOTHING)
+    return SolverResult(x, 0, 0.0, SolverName.NONE, reason=NOTHING)
 
 
 def presses(body, contacts, trial: np.ndarray) -> bool:

@@ -49,7 +49,7 @@ def test_rubber_with_multigrid():
     scene = block(cells=(4, 3), petsc_options=MULTIGRID)
     move(scene, -0.3 * HEIGHT)
     step = scene.problem.solve()
-    assert "FixedPoint, linearised" in step.solver
+    assert step.solver == dc.SolverName.FIXED_POINT and "linearised" in step.reason
     assert scene.contact.force()[1] == pytest.approx(scenes.pressed(0.7, 2)[0], rel=1e-7)
 
 

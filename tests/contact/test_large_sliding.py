@@ -193,7 +193,7 @@ def test_multigrid():
             scene.way.value[:] = (0.3 * k, 0.0, -0.01)
             step = scene.problem.solve()
         found.append(scene.contact.force())
-    assert "FixedPoint" in step.solver
+    assert step.solver == dc.SolverName.FIXED_POINT
     assert largest(found[0] - found[1]) <= 1e-6 * largest(found[0])
 
 

@@ -280,7 +280,9 @@ def test_linear_solver_is_the_users_choice():
     options = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": 1e-12}
     other, scene = run(petsc_options=options, petsc_options_prefix="mine_")
     assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
-    assert scene.problem.solve().solver.startswith("FixedPoint (without a factorisation")
+    step = scene.problem.solve()
+    assert step.solver == dc.SolverName.FIXED_POINT
+    assert step.reason.startswith("without a factorisation")
     for solver, told in (
         (None, "ksp_max_it.*factorisation"),
         (dc.CondensedNewton(), "factorisation"),

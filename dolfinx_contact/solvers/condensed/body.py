@@ -13,7 +13,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.solvers.base import KEPT, SolverResult
+from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Rows,
     bytes_needed,
@@ -223,7 +223,7 @@ class CondensedBody:
         forward = max(change, step.measure(x).largest)
         if fallbacks or forward <= step.tol:  # else another search follows, from the same steps
             self.past.append((rows, force, self._tied))
-        return SolverResult(x, iterations, forward, "CondensedNewton", result.tried)
+        return SolverResult(x, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried)
 
     def _limited(self, step) -> dict:
         """Limits of the search for a loose body.  Collective."""

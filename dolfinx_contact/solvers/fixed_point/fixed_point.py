@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.solvers.fixed_point.newton_krylov import search_by_newton
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
@@ -139,7 +139,9 @@ class BoundFixedPoint:
                 newton = False
             if search.over or _slides(step, search.best, tried=True):
                 break
-        return SolverResult(search.best, search.iterations, search.forward_error, "FixedPoint")
+        return SolverResult(
+            search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
+        )
 
     def _fall(self, search, factor: float, every: int) -> None:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""

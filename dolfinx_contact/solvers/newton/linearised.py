@@ -71,7 +71,7 @@ class BoundLinearised:
             except (LinearSolverError, np.linalg.LinAlgError):
                 break
             iterations += found.iterations
-            used.append(found.chosen)
+            used.append(found.solver)
             judged = self._part(step, x, found.x, max(errors))
             if judged is None:
                 break
@@ -82,8 +82,9 @@ class BoundLinearised:
             errors.append(last)
             if now.within(step.tol) and (forward <= step.tol or now.within(0.0)):
                 break
-        names = ", ".join(dict.fromkeys(used)) or type(self._solver).__name__
-        return SolverResult(best, iterations, forward, f"{names}, linearised {len(used)} times")
+        solver = used[-1] if used else type(self._solver).__name__
+        said = f"linearised {len(used)} times"
+        return SolverResult(best, iterations, forward, solver, reason=said)
 
     def _linear_step(self, step, x: np.ndarray, forces: np.ndarray, error: float) -> SolverResult:
         """The contact step of the body linearised at ``x``, whose forces ``-F(x)`` and error are known."""

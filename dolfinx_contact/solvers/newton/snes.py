@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from dolfinx_contact.bodies.stiffness_checks import warn_of_unread
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
-from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
 from dolfinx_contact.solvers.search import Search
@@ -84,7 +84,9 @@ class BoundSNES(OnTangent):
                     said = self._iterate(_Equations(step, self._tangent, maps, search), x)
                 except LinearSolverError as failure:
                     said = str(failure)
-        return SolverResult(search.best, search.iterations, search.forward_error, f"SNES: {said}")
+        return SolverResult(
+            search.best, search.iterations, search.forward_error, SolverName.SNES, reason=said
+        )
 
     def _supports_moved(self, step, x: np.ndarray, maps, search, stands: bool) -> np.ndarray:
         """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""

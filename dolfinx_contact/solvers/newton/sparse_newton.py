@@ -14,7 +14,7 @@ import numpy as np
 
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
-from dolfinx_contact.solvers.base import BoundSolver, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
@@ -87,7 +87,9 @@ class BoundSparseNewton(OnTangent):
                 break
             if not search.goes_on:
                 break
-        return SolverResult(search.best, search.iterations, search.forward_error, NAME)
+        return SolverResult(
+            search.best, search.iterations, search.forward_error, SolverName.SPARSE_NEWTON
+        )
 
     def _fall(self, search, descent, x: np.ndarray, forces: np.ndarray, maps) -> tuple:
         """Steps with the same maps until the search ends or one gets short: the last iterate and its forces."""
