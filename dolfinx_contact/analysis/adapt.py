@@ -38,11 +38,11 @@ class Adapted:
     """What ``adapt`` returns.
 
     Attributes:
-        value: The quantity of the better problem on the last mesh.
-        error: Estimated for the other problem on that mesh, over its value: for ``value`` on the safe side.
-        reached: Whether ``error`` is at most what was asked for.
-        problem, reference: On the last mesh, in the state at the programme's end.
-        estimate: Of all quantities on the last mesh.
+        value: The quantity in the higher-order problem on the last mesh.
+        error: Estimated relative error of the lower-order problem on that mesh; conservative for ``value``.
+        reached: Whether ``error`` is at most the requested one.
+        problem, reference: The two problems on the last mesh, at the end of the load history.
+        estimate: ``Estimate`` of all quantities on the last mesh.
         tried: A ``Tried`` for each mesh.
 
     Example:
@@ -69,20 +69,21 @@ def adapt(
     share: float = 0.5,
     quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,
 ) -> Adapted:
-    """Divide the cells of a mesh where the error is until a quantity is accurate enough.  Collective.
+    """Refine a mesh where the error is, until a quantity is accurate enough.  Collective.
 
-    On each mesh ``compute`` takes the whole programme from its beginning: no history is carried from mesh to mesh.
+    On each mesh, ``compute`` repeats the whole load history: no state is transferred from mesh to mesh.
     ``estimate`` gives the error of the quantity and the energy norm of the difference on each cell; the cells with the largest
-    norms, which together have the part ``share`` of their sum of squares, are divided (W. Doerfler, SIAM J. Numer. Anal. 33 (1996)
-    1106).  Estimates, no bounds; the error of increments is not seen.  New nodes on a curved boundary halve its old edges.
+    norms, which together make up the part ``share`` of the sum of squares, are divided (W.  Doerfler, SIAM J.  Numer.  Anal. 33
+    (1996) 1106).  These are estimates, not bounds, and do not include the error of increments.  New boundary nodes are midpoints
+    of old edges, also on a curved boundary.
 
     Args:
-        compute: From a mesh two problems on it, of lower and of higher order, at the programme's end.
-        mesh: Of triangles or tetrahedra, to begin with.
-        accuracy: Of the quantity, relative.
-        quantity: Name of one of ``estimate``'s quantities, ``pressure`` and ``shear`` excepted, or of ``quantities``, which are as there.
-        meshes: At most so many.
-        share: Between 0 and 1; less makes more meshes, each better adapted.
+        compute: Function of a mesh that returns two problems on it, of lower and of higher order, at the end of the load history.
+        mesh: Initial mesh, of triangles or tetrahedra.
+        accuracy: Requested relative error of the quantity.
+        quantity: Name of one of the quantities of ``estimate``, except ``pressure`` and ``shear``, or of ``quantities``.
+        meshes: Largest number of meshes.
+        share: Between 0 and 1; a smaller one means more meshes, each better adapted.
 
     Returns:
         An ``Adapted``; ``reached`` says whether the meshes sufficed.

@@ -31,11 +31,11 @@ class Converged:
     """What ``converge`` returns.
 
     Attributes:
-        value: Of the finest run.
-        error: Its estimated error over its size: ``mesh_error + increment_error``.
-        mesh_error, increment_error: Their shares.
-        reached: Whether ``error`` is at most what was asked for.
-        tried: Values by mesh and number of parts, of all runs.
+        value: The number from the finest run.
+        error: Its estimated relative error, ``mesh_error + increment_error``.
+        mesh_error, increment_error: The parts of mesh and increments.
+        reached: Whether ``error`` is at most the requested one.
+        tried: Values of all runs, by mesh and number of parts.
 
     Example:
         >>> found = dc.converge(lambda n, parts: 1.0 + n**-2, 0.01, meshes=[4, 8, 16])
@@ -64,27 +64,29 @@ def converge(
 ) -> Converged:
     """Refine meshes and halve increments until the estimated error of a number is small enough.  Collective.
 
-    On every mesh but the last in use the increments are halved first, where it costs least.  The estimates, which are no bounds:
+    Increments are halved first on the coarser meshes, where this is cheap.  The estimates, which are not bounds:
 
-    - increments: twice the change that halving them makes on the mesh before, which is their error if it falls with the first order;
+    - increments: twice the change caused by halving them on the previous mesh, which is their error if convergence is of first
+    order;
     - mesh: the change from the mesh before, over ``s - 1``, where ``s`` is the factor by which changes shrank last, but 2 at
       least and 4 at most.  With cells of half the size ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226
       (1927) 299).  With two meshes s = 2.  From mesh to mesh the estimate falls to an eighth at most, since two values may agree by chance.
 
     Args:
-        compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that takes the programme with every
-            increment divided into so many parts and returns the number, the same on all ranks.
-        accuracy: Relative.
-        meshes: What ``compute`` makes a mesh of, from the coarsest to the finest, at least two; each with cells of half the size.
-        halvings: Of the increments, at most; 0 if there is no history, or none is to be estimated.
-        comm: The ranks that compute together; ``MPI.COMM_SELF`` where each rank has a number of its own.
+        compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that runs the load history with every increment
+            divided into this number of parts and returns the number, the same on all ranks.
+        accuracy: Requested relative error.
+        meshes: First arguments of ``compute``, from the coarsest mesh to the finest, at least two, each with cells of half the
+            size.
+        halvings: Largest number of halvings of the increments; 0 if there is no history, or its error is not to be estimated.
+        comm: The ranks that compute together; ``MPI.COMM_SELF`` if each rank computes a separate number.
 
     Returns:
-        A ``Converged``.  Where meshes or halvings do not suffice it says so by ``reached``.
+        A ``Converged``; ``reached`` says whether meshes and halvings sufficed.
 
     Raises:
-        ValueError: fewer than two meshes, one given twice, an accuracy that is not positive, a value that is zero, no finite
-            real number, or not the same on all ranks.
+        ValueError: fewer than two meshes, one given twice, an accuracy that is not positive, or a value that is zero, not a
+            finite real number, or not the same on all ranks.
 
     Example:
         >>> found = dc.converge(lambda n, parts: 1.0 + n**-2 + 0.1 / parts, 0.01, [4, 8, 16, 32], halvings=6)

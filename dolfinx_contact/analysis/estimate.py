@@ -42,10 +42,10 @@ class Estimate:
 
     Attributes:
         quantities: By name, ``Estimated``.
-        energy_norm: Of the difference of displacements over that of the reference's, dimensionless: the error of
-            stresses in the mean.  None if the two problems have different meshes.
-        cells: Function of degree 0, the energy norm of the difference on each cell; their squares sum up to that of the
-            body.  None with ``energy_norm``.
+        energy_norm: Energy norm of the difference of displacements over that of the reference, dimensionless: the mean error of
+            stresses.  None if the two problems have different meshes.
+        cells: Function of degree 0, the energy norm of the difference on each cell; the sum of squares is that of the body.  None
+            if ``energy_norm`` is.
 
     Example:
         What ``estimate`` returns, made by hand:
@@ -87,27 +87,27 @@ def estimate(
     *,
     share: float = 1.0,
 ) -> Estimate:
-    """Estimate the discretisation's error of a problem's present state.  Collective.
+    """Estimate the discretisation error of a problem's present state.  Collective.
 
-    ``reference`` is the same body with a better space, which was taken through the same programme: of second order on the
-    same mesh, of a finer mesh, of smaller increments.  The difference of a quantity is its estimated error,
-    ``abs(J(u) - J(U)) * share``, which is the error itself if the reference's own is small beside it (saturation;
-    R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  An estimate, no bound.  Since each problem has slipped in its own way, work of friction and
-    all that depends on history are estimated as accumulated.  A surface that is driven by displacement may belong to both; one driven
-    by force moves in each problem in its own way: make one for each.
+    ``reference`` is the same body after the same load history, but with second order on the same mesh, a finer mesh, or smaller
+    increments.  The estimated error of a quantity is the difference, ``abs(J(u) - J(U)) * share``, which is the true error if
+    that of the reference is much smaller (saturation; R.  E.  Bank, R.  K.  Smith, SIAM J.  Numer.  Anal. 30 (1993) 921).  It is
+    an estimate, not a bound.  Each problem has its own slip history, so estimates for frictional work and other history variables
+    include accumulated errors.  Both problems may share a surface driven by displacement; a surface driven by force moves
+    differently in each, so make two.
 
     Args:
-        problem: Whose error is asked for.
-        reference: The better one.  On the same mesh object, with a space that contains the problem's, tractions are compared,
-            and cells get indicators.
-        quantities: Functions of a problem that return a number, the same on all ranks, by name; or several, such as the force
-            after each step so far: then the value is the largest, and the error the largest of theirs.  They come beside
+        problem: The problem whose error is estimated.
+        reference: The more accurate one.  On the same mesh object, with a space that contains that of the problem, tractions are
+            compared, and cells get indicators.
+        quantities: Functions by name, which take a problem and return a number, the same on all ranks, or several, such as the
+            force after each step so far.  Of several numbers, the value is the largest, and the error is the largest of theirs.
+            They are added to
             ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
             reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object, or where all
             contacts are with planes, there are also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of
             the nodal normal and tangential tractions, reaction over area, with those of the differences as errors.
-        share: The error over the difference.  ``1 / (1 - 2**-p)`` for a reference on cells of half the size where errors fall
-            with order p.
+        share: Error over difference, ``1 / (1 - 2**-p)`` for a reference on cells of half the size and convergence of order p.
 
     Raises:
         ValueError: problems that do not belong together, or quantities that are not finite numbers.

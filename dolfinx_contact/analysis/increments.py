@@ -35,27 +35,27 @@ def advance(
     history: History | None = None,
     monitor: Callable[[float, Step], object] | None = None,
 ) -> History:
-    """Solve load steps along a programme, from ``start`` through all ``points``.
+    """Solve the load steps of a load history, from ``start`` through all ``points``.
 
-    An increment from one point to the next is tried as a whole.  A step that does not converge is tried again with half
-    of it, from the last converged state; after two steps that converge increments are doubled again.  Every point is the end of a step.
-    ``logging.getLogger("dolfinx_contact")`` tells of halved increments; on a terminal there is a progress bar if tqdm is installed.
+    The increment from one point to the next is first tried as a whole.  If a step does not converge, it is repeated with half the
+    increment, from the last converged state.  After two converged steps, increments are doubled again.  Every point is the end of
+    a step.  ``logging.getLogger("dolfinx_contact")`` reports halved increments; on a terminal there is a progress bar if tqdm is installed.
 
     Args:
         problem: The ContactProblem.  Collective.
-        programme: Function of the programme's parameter, a time for instance, that sets loads, boundary values and planes.
-        points: Values of the parameter, rising.
-        start: Its value for the problem's present state.
-        smallest: Smallest increment, over the distance of its two points.
-        history: Table to record every step in, with the column ``t``; None makes one.
+        programme: Function of a parameter, such as time, that sets loads, boundary values and planes.
+        points: Increasing values of the parameter.
+        start: Value of the parameter in the problem's present state.
+        smallest: Smallest increment, relative to the distance of its two points.
+        history: ``History`` that records every step, with the column ``t``; None makes one.
         monitor: None, or a function of parameter and record, called after every step.
 
     Returns:
         The table.
 
     Raises:
-        NotConverged: a step with the smallest increment did not converge; problem and table are at the last one that did.
-        ValueError: points that do not rise.
+        NotConverged: a step with the smallest increment did not converge; problem and table are at the last converged step.
+        ValueError: points that do not increase.
 
     Example:
         >>> def programme(t): held.value = (0, 0, -0.01 * t)

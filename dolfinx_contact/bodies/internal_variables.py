@@ -16,16 +16,17 @@ from dolfinx_contact.support.numbering import original_cells
 
 
 class InternalVariables(Guarded):
-    """Functions that are state, such as plastic strains, hardening, viscous stresses, and what the user does with them.
+    """Internal variables of a material, such as plastic strains, hardening or viscous stresses, and the user's functions that
+    update them.
 
     Args:
-        state: The user's Functions.  A step that fails leaves them as they were; saved in checkpoints.
-        before_residual: None, or ``f(u)``, called before F or J is assembled: sets coefficients of both from ``u`` and
-            ``state``, and changes no ``state``.  ``ContactProblem`` then has to be given ``J``.
-        after_step: None, or ``f(u)``, called once after every step that converged: moves ``state`` on.
+        state: The user's Functions.  A failed step leaves them unchanged; checkpoints contain them.
+        before_residual: None, or ``f(u)``, called before each assembly of F or J.  It sets their coefficients from ``u`` and
+            ``state``, and must not change ``state``.  ``ContactProblem`` then needs ``J``.
+        after_step: None, or ``f(u)``, called once after every converged step.  It updates ``state``.
 
     Raises:
-        ValueError: something that is no Function, or cannot be called.
+        ValueError: a ``state`` that is not a Function, or an argument that cannot be called.
 
     Example:
         >>> creep = fem.Function(V)

@@ -49,30 +49,31 @@ if TYPE_CHECKING:
 class Contact(Guarded):
     """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
 
-    Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The
-    local frame is (t1, t2, n), in two dimensions (t, n): the plane's axis, the direction across
-    it, and the normal.  On a curved surface every node has its own, see docs/surfaces.md.
+    Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The local frame is (t1, t2, n), in
+    two dimensions (t, n): the plane's axis, the direction across it, and the normal.  On a curved surface every node has its own
+    frame, see docs/surfaces.md.
 
     Args:
-        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2; or a mixed
-            space, whose first such sub-space they are, or that sub-space itself.
-        facets: Local indices of boundary facets, integers; a rank may have none.  Or ``(facet_tags, tag)``, those with a tag, an
-            integer, or with one of several.
+        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2; or a mixed space, whose
+            first such sub-space is taken, or that sub-space itself.
+        facets: Local indices of boundary facets, integers; a rank may have none.  Or ``(facet_tags, tag)`` with one tag, an
+            integer, or several.
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
-        friction: The friction law, or a number, its isotropic coefficient, the same on all ranks; or on all of them one with coefficients
-            per node, ``shape=(n, 2)``, for the n nodes of each; or of fields, evaluated at the nodes here.
-        wear: Archard's law, if worn depth is to open the gap; None costs nothing.
-        weight: Of the surface measure, where the forms have one: ``2 * pi * r`` with axial symmetry, a thickness.  A number, a UFL
-            expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and so pressures, worn depths and friction that
-            follows the pressure; reactions have it from the forms.
+        friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.  Coefficients may be given per
+            node, ``shape=(n, 2)`` for this rank's n nodes, or as fields, which the contact evaluates at its nodes.
+        wear: Archard's law, whose worn depth opens the gap; None is no wear.
+        weight: Factor of the surface measure, the one in the forms: ``2 * pi * r`` with axial symmetry, or a thickness.  A
+            number, a UFL expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and thus pressures, worn depths
+            and pressure-dependent friction; reactions follow from the forms, which contain it.
 
     Raises:
-        ValueError: on all ranks, for facets that are not boundary facets of the mesh, a space that
-            does not fit, a plane of another dimension or without an axis where friction needs one.
+        ValueError: on all ranks, for facets that are not boundary facets of the mesh, an unsuitable space, a plane of another
+            dimension, or a plane without an axis if friction needs one.
 
     Attributes:
         nodes: Indices of the nodes among the blocks of ``displacements.V``, which is ``V`` or that sub-space collapsed,
-            ``shape=(n,)``: those of the facets, but not vertices of tetrahedra of second order, on which an even pressure makes no force.
+            ``shape=(n,)``: those of the facets, without the vertices of second-order tetrahedra, where a uniform pressure causes
+            no force.
         x: Reference positions, ``shape=(n, 3)``, global frame.
         rho: Augmentation parameter of ``update``, ``shape=(n,)``, force per length; see ``set_metric``.
 
@@ -173,8 +174,8 @@ class Contact(Guarded):
 
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks; fields are evaluated then, anew at the start
-        of each step, and as the state goes on if they follow it.
+        """The friction law.  Another one may be assigned between steps, on all ranks.  Fields are evaluated then, at the start of
+        each step, and during a step if they depend on its state.
         """
         return self._laws.friction
 
@@ -367,7 +368,7 @@ class Contact(Guarded):
         return self._placement.carried_by(axis, turns)
 
     def move(self, u: fem.Function | np.ndarray) -> None:
-        """Gaps and slip increments for a displacement, from the last converged step on.
+        """Compute gaps and slip increments for a displacement; slip counts from the last converged step.
 
         Args:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
@@ -403,9 +404,9 @@ class Contact(Guarded):
 
     @property
     def slip_before_touching(self) -> np.ndarray:
-        """What nodes that landed in the last step had gone along the surface before, ``shape=(n, gdim - 1)``, local frame, length.
+        """Tangential motion before touching, of nodes that landed in the last step, ``shape=(n, gdim - 1)``, local frame, length.
 
-        It counts as no slip, where that matters to friction.
+        It does not count as slip if that changes friction.
         """
         before = self._placement.landed_after
         return np.zeros_like(self.slip_increment) if before is None else before
@@ -479,10 +480,10 @@ class Contact(Guarded):
         self.respond(u, self._map(map))
 
     def springs(self, map: str = "bipotential") -> np.ndarray:
-        """Springs that belong to ``update``, ``shape=(n, gdim)``, local frame, force per length.
+        """Spring stiffnesses that match ``update``, ``shape=(n, gdim)``, local frame, force per length.
 
-        ``rho diag(Q^2, 1)`` for the paper's map, ``rho`` in all directions for the return map;
-        none along the plane without friction.
+        ``rho diag(Q^2, 1)`` for the paper's map, ``rho`` in all directions for the return map; zero along the plane without
+        friction.
         """
         return self._map(map).springs(self.friction, self.points.dim)
 
@@ -534,7 +535,7 @@ class Contact(Guarded):
     # -- history -------------------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Forget the history: undeformed, unworn body, no reactions, the surface where it is now."""
+        """Clear the history: undeformed, unworn body, no reactions, the surface in its present position."""
         if self.follows:
             self._placement.stand(self._wanders)
         self._history.begin(self._placement.at_rest())
@@ -547,7 +548,7 @@ class Contact(Guarded):
         self._forget_supported()
 
     def advance(self) -> None:
-        """Make the present state the last converged one, from which the next slip is measured."""
+        """Accept the present state as the last converged one, from which the next slip counts."""
         before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
         law, law_before = self.friction, self.law_before
         slip = self.slip_kept + self.slip_increment
@@ -679,7 +680,7 @@ class Contact(Guarded):
 
     @property
     def dissipation(self) -> np.ndarray:
-        """Work of friction since the start, ``shape=(n,)``, force times length; it never decreases."""
+        """Frictional work since the start, ``shape=(n,)``, force times length; it never decreases."""
         return self._history.sums["dissipation"]
 
     @property
@@ -715,8 +716,7 @@ class Contact(Guarded):
     def bipotential_gap(self) -> np.ndarray:
         """Certificate b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
 
-        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``;
-        penetration is reported by itself.
+        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``; ``gap`` shows penetration.
         """
         return self.law.bipotential_gap(
             self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
@@ -724,7 +724,7 @@ class Contact(Guarded):
 
     @property
     def slip_residual(self) -> np.ndarray:
-        """What of the slip increments the slip rule leaves unexplained, ``shape=(n, gdim - 1)``, length.
+        """Defect of the slip increments from the slip rule, ``shape=(n, gdim - 1)``, length.
 
         ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
         on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
@@ -734,7 +734,8 @@ class Contact(Guarded):
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective.
 
-        With axial symmetry its axial component alone is a force; the other one is the sum of radial forces, which balance.
+        With axial symmetry, only the axial component is a force; the radial one is a sum over the circumference, whose resultant
+        is zero.
         """
         if self.surface.curved:
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
@@ -743,8 +744,8 @@ class Contact(Guarded):
     def moment(self) -> np.ndarray:
         """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
 
-        With lever arms from where the point is to where the nodes are.  After a step it is ``surface.moment`` about the axes
-        that are free.
+        Lever arms are taken in the deformed state, from the present position of the point.  After a step, the moment about free
+        axes equals ``surface.moment``.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
         arms = self.arms
@@ -758,8 +759,8 @@ class Contact(Guarded):
     def area(self) -> np.ndarray:
         """Area of the contact surface that belongs to each node, ``shape=(n,)``, undeformed state, see ``facing_areas``.
 
-        The integral of the node's shape function, times ``weight``, over the facets as the surface sees them: facets that are turned away from
-        it have none.  Without a weight a length in two dimensions.  Collective at the first call.
+        The integral of the node's shape function times ``weight`` over the facets, projected on the surface; facets facing away
+        do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
         """
         if self._area is None:
             self._area = frozen(fields.facing_areas(self, self._weight))
@@ -777,7 +778,8 @@ class Contact(Guarded):
 
     @property
     def pressure(self) -> np.ndarray:
-        """Normal reaction over nodal area, ``shape=(n,)``, force per area; zero where a node has none.  Collective at first."""
+        """Normal reaction over nodal area, ``shape=(n,)``, force per area; zero at nodes without area.  The first call is
+        collective."""
         return fields.per_area(self.reaction[:, -1], self.area)
 
     @property
@@ -795,7 +797,7 @@ class Contact(Guarded):
         return self._axial
 
     def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
-        """Values at the contact nodes, ``shape=(n,)``, as a scalar Function for output.  Collective."""
+        """A scalar Function for output with these values at the contact nodes, ``shape=(n,)``, and zero elsewhere.  Collective."""
         return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
 
     def everywhere(self, values: ArrayLike) -> np.ndarray:

@@ -15,7 +15,7 @@ from dolfinx_contact.support.attributes import frozen
 
 
 class Status(IntEnum):
-    """What a contact node does, which is the branch that the projection took; after a step a slip below its ``tol`` is none.
+    """Status of a contact node, the branch that the projection took.  After a step, slip below its ``tol`` counts as stick.
 
     Example:
         >>> slipping = contact.x[contact.status == dc.Status.SLIP]  # where the nodes are that slip

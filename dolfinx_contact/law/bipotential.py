@@ -21,8 +21,8 @@ def bipotential_gap(
 
     For a reaction in the friction cone and no penetration it is
     ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, and zero exactly where the law holds. It is
-    computed as a sum of non-negative terms. Elsewhere the gap is infinite: project reactions and
-    clip gaps at zero first for a certificate, and report what was cut off by itself.
+    computed as a sum of non-negative terms. Elsewhere the gap is infinite: for a certificate, first project reactions and clip
+    gaps at zero, and report these changes separately.
 
     Args:
         r: Reactions in the local frame, ``shape=(n, 3)``, or ``(n, 2)`` in two dimensions.

@@ -81,23 +81,22 @@ class Friction(Guarded):
 
     Args:
         mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
-            ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is
-            frictionless, infinity perfectly rough: what touches sticks; a contact takes 1e3 for all that is larger. Or a field, see below.
-        p: Coefficients of the slip rule, of the same forms, positive. Omitted: associated, ``p = mu``.
+            ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is frictionless, infinity perfectly
+            rough: touching nodes stick; a contact replaces values above 1e3 by 1e3. Or a field, see below.
+        p: Coefficients of the slip rule, in the same forms, positive. Omitted: associated, ``p = mu``.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
-        axes: Principal friction direction x at each node, e.g. of grooves: unit vectors
-            ``(cos, sin)`` in the tangential part of the local frame, ``shape=(n, 2)``, with which they turn. Omitted: the
-            frame's own first direction. As a field also directions in space, ``(3, n)``, of any length, which
-            are projected on the surface.
-        of: Whose texture a field of ``axes`` is: of the "body", at reference positions, whose directions stay while surfaces
-            turn; or of the "surface", a callable of its own positions, that moves and turns with it. ``mu``, ``p`` and wear
-            are of the body.
+        axes: Principal friction direction x at each node, e.g. of grooves: unit vectors ``(cos, sin)`` in the tangential part of
+            the local frame, ``shape=(n, 2)``, which rotate with it. Omitted: the first direction of the frame. A field may also
+            give directions in space, ``(3, n)``, of any length, which are projected on the surface.
+        of: Owner of a field of ``axes``. "body": evaluated at reference positions; directions stay while surfaces rotate.
+            "surface": a callable of positions on the surface; directions move and rotate with it. ``mu``, ``p`` and wear belong
+            to the body.
 
-    ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as DOLFINx interpolates them, that return
-    values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them
-    at its own nodes when it takes the law, and anew at the start of each step: ``contact.friction`` has the values. A callable of ``mu``
-    or ``p`` that also has an argument named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth`` gets that array of
-    the contact, ``shape=(n,)``: the law follows the state, the pressure that at the end of the step, see docs/howto/fields.md.
+    ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as for DOLFINx's ``interpolate``, that return
+    values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them at
+    its own nodes when it gets the law, and again at the start of each step: ``contact.friction`` has the values. A callable for
+    ``mu`` or ``p`` may also have an argument named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth``: it gets that
+    array of the contact, ``shape=(n,)``, the pressure at the end of the step, the others at its start, see docs/howto/fields.md.
 
     Raises:
         ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
@@ -110,7 +109,7 @@ class Friction(Guarded):
         frictionless: All ``mu`` are zero.
         isotropic: Both directions have the same ``mu`` and ``p`` everywhere.
         associated: ``p`` is proportional to ``mu`` everywhere.
-        field: Something is given as a field; what is above is then known to a contact's ``friction`` alone.
+        field: Something is given as a field; the values above are then available only in ``contact.friction``.
         exponent: ``k`` of a field.
 
     Example:
@@ -224,7 +223,7 @@ class Friction(Guarded):
         return np.column_stack((cos * x + sin * y, cos * y - sin * x))
 
     def against_slip(self, r_t: np.ndarray) -> np.ndarray:
-        """Unit vectors along ``P^-2 r_t``, against which nodes slip [dSFMH07, Section 1].
+        """Unit vectors along ``P^-2 r_t``, opposite to slip [dSFMH07, Section 1].
 
         Args:
             r_t: Tangential reactions, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions, local frame.

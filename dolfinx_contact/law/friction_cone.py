@@ -52,8 +52,9 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
             half line ``r_t = 0, r_n >= 0``.
 
     Returns:
-        The projected points, ``shape=(n, 3)``. A row of ``tau`` that is infinite or NaN gives a row
-        of NaN, a projection beyond the range of double precision infinity; the others are not touched by it. (For a frictionless cone only ``tau_n`` counts.)
+        The projected points, ``shape=(n, 3)``. A row of ``tau`` with an infinite or NaN entry gives a row of NaN, a projection
+        beyond the range of double precision gives infinity; other rows are not affected. (For a frictionless cone, only ``tau_n``
+        counts.)
 
     Raises:
         ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.

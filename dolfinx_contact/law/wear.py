@@ -10,19 +10,18 @@ from dolfinx_contact.support.checks import finite
 
 
 class Wear(Guarded):
-    """Wear that feeds back: after every step worn depth opens the gap of the next one.
+    """Archard wear with feedback: the worn depth of a step opens the gap of the next one.
 
-    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the work of friction along principal
-    direction i during the step (``dissipation.py``) and ``A`` the nodal area; so the worn volume, the sum of depth times area, is
-    ``sum k_i w_i`` exactly.  With one coefficient and isotropic friction ``k = K / (mu H)`` is Archard's
-    law, K his coefficient and H the hardness [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
+    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the frictional work along principal direction i in the
+    step (``dissipation.py``) and ``A`` the nodal area.  So the worn volume, the sum of depth times area, is exactly ``sum k_i
+    w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
+    hardness H [J.  F.  Archard, J.  Appl.  Phys. 24 (1953) 981].
 
-    Wear is explicit: the depth of a step opens the gap of the next one.  A depth that takes more than its reaction from a node
-    (depth times the node's stiffness) makes depth run ahead of pressure: a warning then says into how many steps to divide.
+    Wear is integrated explicitly.  If the depth worn in a step, times the node's stiffness, exceeds the node's reaction, the step
+    is too large: a warning says into how many steps to divide it.
 
     Args:
-        coefficient: k, a number, or a pair for the two friction directions; volume per work, which
-            is one over stress, >= 0.
+        coefficient: k, a number, or a pair for the two friction directions; volume per work, the inverse of a stress, >= 0.
 
     Raises:
         ValueError: a coefficient that is negative, not finite or not real, or more than two.

@@ -147,7 +147,7 @@ def raise_interrupt(failure: BaseException) -> None:
 
 
 class LinearSolverError(RuntimeError):
-    """PETSc's linear solver did not solve; the message has its reason and options.
+    """PETSc's linear solver failed; the message has its reason and options.
 
     Example:
         >>> try:

@@ -11,7 +11,7 @@ import numpy as np
 
 
 class RoundingWarning(UserWarning):
-    """An answer is as good as double precision allows, which is less than the tolerance asked for.
+    """The answer is as accurate as double precision allows, but not to the requested tolerance.
 
     Example:
         >>> warnings.simplefilter("error", dc.RoundingWarning)  # a step limited by rounding raises it

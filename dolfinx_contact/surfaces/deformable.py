@@ -20,22 +20,22 @@ SLIDING = ("large", "small")
 
 
 class DeformableSurface(Surface):
-    """Facets of a deformable body on which the facets of a contact press: two bodies, whose meshes need not match.
+    """Facets of a second deformable body, onto which the facets of a contact press; the meshes need not match.
 
-    Both bodies are in one mesh, as parts that need not be connected.  The facets of the ``Contact`` carry the unknowns, the
-    slave; forces go over by dual mortar functions, see ``contact/mortar.py``.  The slave is better the softer, finer or curved
-    side.
+    Both bodies are in one mesh, as parts that need not be connected.  The facets of the ``Contact`` are the slave side, which
+    carries the unknowns; dual mortar functions transfer the forces, see ``contact/mortar.py``.  As slave, prefer the softer,
+    finer or curved side.
 
     Args:
         V: The space of displacements, that of the contact.
         facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
         axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node;
             needed unless friction is isotropic or bodies two-dimensional.
-        sliding: "large" finds who presses on whom anew in each step, where both bodies are at its end; "small" once, in the
-            undeformed state, which saves time as long as nothing slides farther than a part of a facet.
+        sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end; "small" pairs them once,
+            in the undeformed state, which saves time as long as nothing slides farther than a part of a facet.
 
     Raises:
-        ValueError: on all ranks, for facets that are not on the boundary, or another word for ``sliding``.
+        ValueError: on all ranks, for facets that are not on the boundary, or another value of ``sliding``.
 
     Example:
         >>> below = dc.DeformableSurface(V, foot)  # then: dc.Contact(V, facets_above, below, friction)

@@ -29,26 +29,26 @@ FLAT = 1e-12
 class RigidSurface(CurvedSurface):
     """A rigid surface given by its signed distance, driven by displacement, rotation or force.
 
-    Any smooth function does that is zero on the surface and positive where the body may be: gaps are its value over the
-    length of its gradient, which on the surface, and for a distance everywhere, is exact.  Within a step a node feels the
-    tangent plane where the node is at its end, see docs/surfaces.md.
+    Any smooth function will do that is zero on the surface and positive where the body may be.  Gaps are its value over the
+    length of its gradient, which is exact on the surface, and everywhere for a true distance.  Within a step, each node sees the
+    tangent plane at its position at the end of the step, see docs/surfaces.md.
 
     Args:
-        distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface, global components
-            as long as it stands where it was made; gives ``shape=(n,)``.  Or a scalar expression of UFL in
-            ``SpatialCoordinate``, numbers and ``Constant`` of any mesh; its gradient is then UFL's.
-        point: About which it rotates, at which force acts, ``shape=(gdim,)``, global frame, length units.
-        gradient: Function of the same positions that gives the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
-            central differences, exact to ten digits.  A Contact compares it with differences at its nodes.
+        distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface and are the global ones at
+            first; returns ``shape=(n,)``.  Or a scalar UFL expression in ``SpatialCoordinate``, numbers and ``Constant`` of any
+            mesh, which UFL then differentiates.
+        point: Centre of rotation and point at which force acts, ``shape=(gdim,)``, global frame, length units.
+        gradient: Function of the same positions that returns the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
+            central differences, exact to ten digits.  A Contact checks it against differences at its nodes.
         axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
             unless friction is isotropic or the body two-dimensional.
 
     Raises:
-        ValueError: vectors that make no sense, or what is no function.
+        ValueError: vectors that make no sense, or an argument that is not a function.
 
     Attributes:
         point, axis: As given, ``axis`` of unit length; read-only.
-        displacement, rotation, free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+        displacement, rotation, free, force, moment, stiffness, drive, guides: As in ``RigidSphere``.
 
     Example:
         >>> bump = dc.RigidSurface(lambda x: x[2] + 0.1 * (x[0] ** 2 + 2 * x[1] ** 2), point=(0, 0, 0), axis=(1, 0, 0))

@@ -14,40 +14,39 @@ from dolfinx_contact.surfaces.surface import Surface, unit
 
 
 class RigidPlane(Surface):
-    """A rigid plane on which bodies press and slide, driven by displacement or by force.
+    """A rigid plane, driven by displacement or by force.
 
-    Along the directions in ``free`` the plane moves until its forces are in equilibrium, see docs/force.md:
+    Along the directions in ``free``, the plane moves until its forces are in equilibrium, see docs/force.md:
 
         sum of the reactions = force + stiffness (drive - displacement).
 
     Args:
-        point: Any point of the plane, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
-        normal: Direction towards the side where the body may be, ``shape=(gdim,)``; need not be of
-            unit length.
+        point: Any point on the plane, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
+        normal: Direction towards the side where the body may be, ``shape=(gdim,)``, of any length.
         axis: First principal friction direction, ``shape=(gdim,)``; made orthogonal to the normal.
             Needed unless friction is isotropic or the body two-dimensional.
-        height: None, or a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the plane: the
-            waviness of its face, ``shape=(n,)``, length units, whose slopes are neglected.
+        height: None, or a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the plane, which returns the
+            waviness of the plane, ``shape=(n,)``, length units.  Slopes are neglected.
 
     Raises:
         ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
 
     Attributes:
         point, normal, axis: As given, the latter two of unit length; read-only.
-        displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global
-            frame, length units; zero at first, a read-only array.  Assign another one between steps: the plane
-            moves, and slip is relative to it.  Along free directions a step finds it.
-        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.
-            Assigned between steps: normal and axis turn with the plane, and slip is relative to it.
-        free: Directions of the frame along which a force drives the plane, a tuple of "t1", "t2" and "n", in two
-            dimensions of "t" and "n", and rotations about these, "r1", "r2", "rn", in two dimensions "r"; none at first.
-        force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Its components along
-            directions that are not free do not count: a guide carries the rest.
+        displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global frame, length units; zero at
+            first, a read-only array.  To move the plane, assign another one between steps; slip is relative to the plane.  Along
+            free directions, it is a result of the step.
+        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.  Assign
+            another one between steps; normal and axis rotate with the plane, and slip is relative to it.
+        free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the frame, "r1", "r2", "rn" about
+            them; in two dimensions "t", "n" and "r".  Empty at first.
+        force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Components along directions
+            that are not free have no effect: a guide carries them.
         moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
             dimensions one number, global frame; None is zero.
-        stiffness: Of springs that pull the plane along free directions, by name, ``{"t1": 200.0}``: force per length, of
-            rotations moment per radian.  Or one number for all free directions, or one for each in the order of ``free``.  Zero,
-            a dead load, at first and for directions without a name.
+        stiffness: Springs that pull the plane along free directions, by name, ``{"t1": 200.0}``: force per length, for rotations
+            moment per radian.  Or one number for all free directions, or one for each in the order of ``free``.  Directions
+            without a spring, at first all of them, carry a dead load.
         drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
 
     Example:

@@ -100,14 +100,14 @@ class _Round(CurvedSurface):
 class RigidSphere(_Round):
     """A rigid sphere, in two dimensions a circle, driven by displacement and rotation.
 
-    Within a step a node feels the plane that touches the sphere where the node is at its end, see docs/surfaces.md.
+    Within a step, each node sees the tangent plane of the sphere at its position at the end of the step, see docs/surfaces.md.
 
     Args:
-        centre: Its centre, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
-        radius: Of the sphere, length units.
+        centre: ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
+        radius: Length units.
         axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
             unless friction is isotropic or the body two-dimensional.
-        inside: Whether the body is inside, in a spherical socket.
+        inside: Whether the body is inside the sphere, which is then a spherical socket.
 
     Raises:
         ValueError: vectors or a radius that make no sense.
@@ -117,9 +117,9 @@ class RigidSphere(_Round):
         displacement: From the first position, ``shape=(gdim,)``, global frame, length units; assign another one
             between steps.
         rotation: About the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle.
-        free, force, moment, stiffness, drive: As of ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
+        free, force, moment, stiffness, drive: As in ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
             dimensions "x", "y", "r", along and about ``guides``.
-        guides: Directions of these names, one a row, ``shape=(gdim, gdim)``, global frame; do not turn.
+        guides: Directions of these names, one per row, ``shape=(gdim, gdim)``, global frame; they do not rotate.
 
     Example:
         >>> ball = dc.RigidSphere(centre=(0.5, 0.5, -2), radius=2, axis=(1, 0, 0))
@@ -143,16 +143,16 @@ class RigidSphere(_Round):
 
 
 class RigidCylinder(_Round):
-    """A rigid cylinder without ends, driven by displacement and rotation; in two dimensions take ``RigidSphere``.
+    """An infinite rigid cylinder, driven by displacement and rotation; in two dimensions use ``RigidSphere``.
 
-    Its axis is the first principal friction direction.  Within a step a node feels the plane that touches the cylinder
-    where the node is at its end, see docs/surfaces.md.
+    Its axis is the first principal friction direction.  Within a step, each node sees the tangent plane of the cylinder at its
+    position at the end of the step, see docs/surfaces.md.
 
     Args:
-        point: Any point of its axis, ``shape=(3,)``, global frame, length units.
-        axis: Direction of its axis, ``shape=(3,)``; need not be of unit length.
-        radius: Of the cylinder, length units.
-        inside: Whether the body is inside, in a bore.
+        point: Any point on its axis, ``shape=(3,)``, global frame, length units.
+        axis: Direction of its axis, ``shape=(3,)``, of any length.
+        radius: Length units.
+        inside: Whether the body is inside the cylinder, which is then a bore.
 
     Raises:
         ValueError: vectors or a radius that make no sense.
@@ -162,7 +162,7 @@ class RigidCylinder(_Round):
         displacement: From the first position, ``shape=(3,)``, global frame, length units; assign another one between
             steps.
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``.
-        free, force, moment, stiffness, drive, guides: As of ``RigidSphere``.
+        free, force, moment, stiffness, drive, guides: As in ``RigidSphere``.
 
     Example:
         >>> roll = dc.RigidCylinder(point=(0.5, 0, -2), axis=(0, 1, 0), radius=2)
