@@ -1,4 +1,4 @@
-"""Frictional contact of elastic bodies with rigid planes, for FEniCSx, by the bi-potential method.
+"""Frictional contact of bodies with rigid or deformable surfaces, for FEniCSx, by the bi-potential method.
 
 A name is imported where it is first used: those of arrays, such as ``solve_condensed``, ``project_cone`` and
 ``Friction``, need NumPy alone; those of bodies, such as ``ContactProblem``, need DOLFINx and PETSc.

@@ -72,45 +72,45 @@ ROUGH, PART = 1e-3, 0.03
 
 
 class ContactProblem(Guarded):
-    """An elastic body pressed against rigid planes, solved load step by load step.
+    """A body in contact with surfaces, solved load step by load step.
 
     Args:
-        F: Residual form, internal minus external virtual work.  One that is not linear in ``u`` makes a nonlinear
-            body, see docs/nonlinear.md.
-        u: Displacement, a Function, or one of a mixed space with displacements.  Holds the solution after a step; at the start of one, the first too, it is
-            only a guess, the last converged state is kept inside.
-        contacts: The contacts; a node of an edge may belong to several.
+        F: Residual form, internal minus external virtual work.  If it is not linear in ``u``, the body is nonlinear, see
+            docs/nonlinear.md.
+        u: Displacement, a Function, or one of a mixed space with displacements.  Holds the solution after a step.  At the start
+            of any step, it is only an initial guess; the problem keeps the last converged state itself.
+        contacts: One ``Contact`` or several; a node on an edge may belong to several.
         bcs: Dirichlet conditions; their values may change between steps, and ``problem.bcs = [...]`` releases or adds supports.
-        J: Derivative of ``F`` with respect to ``u``; found by UFL if None.
-        solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small
-            contacts, the second for large ones, the third for nonlinear bodies, and says so in ``step.solver`` and ``step.reason``.
+        J: Derivative of ``F`` with respect to ``u``; by UFL if None.
+        solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small contacts,
+            the second for large ones, the third for nonlinear bodies; ``step.solver`` names the choice, ``step.reason`` its reason.
         tol: Largest error, slip error and forward error of a converged step, see docs/errors.md.
-        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, of large bodies multigrid.
+        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, for large bodies multigrid.
         petsc_options_prefix: Their prefix.
         internal: ``InternalVariables`` of the material, None if it has none.
-        form_compiler_options: Of FFCx, as ``fem.form`` takes them.
-        jit_options: Of the compilation of what FFCx writes, as ``fem.form`` takes them.
-        entity_maps: How meshes lie in each other, where ``F`` has Functions on other ones than ``u``, as ``fem.form`` takes
-            it: a dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Older ones have nothing of the kind.
-        undetermined: What to do where a body that contact alone holds can still move without any change of reactions:
-            "refused" is a ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, by volume: with the least integral of |du|^2.
-        geometry_tol: Largest ``step.geometry_error``: of reactions that distances, normals, textures and arms at the end of a step may differ by
-            from those with which it was solved, on surfaces that are curved, turn, are wavy, textured or deformable, see docs/surfaces.md.
+        form_compiler_options: Options of FFCx, as in ``fem.form``.
+        jit_options: Options of the compilation of generated code, as in ``fem.form``.
+        entity_maps: Relation between meshes, if ``F`` has Functions on another mesh than that of ``u``, as in ``fem.form``: a
+            dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Not available in older releases.
+        undetermined: What to do if a body held by contact alone can move without a change of reactions: "refused" raises a
+            ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, with the smallest integral of
+            |du|^2 over the volume.
+        geometry_tol: Largest ``step.geometry_error`` of a converged step, on curved, rotating, wavy, textured or deformable
+            surfaces, see docs/surfaces.md.
 
     Attributes:
-        monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number
-            in the step, largest error and ``Counts``.  Of the condensed problem's iterates (steps of Newton's method,
-            sweeps) the error is the residual over the largest reaction; then come the body's own errors.
+        monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number in the
+            step, largest error and ``Counts``.  For iterates of the condensed problem, the error is the residual over the largest
+            reaction; the errors of the body follow.
 
-    ``logging.getLogger("dolfinx_contact")`` has a line a step, of level INFO, on rank 0; ``logging.basicConfig(level=20)``
+    ``logging.getLogger("dolfinx_contact")`` gets a line per step, of level INFO, on rank 0; ``logging.basicConfig(level=20)``
     prints them.
 
-    On several ranks constants, in ``F`` and ``bcs``, have to be the same on all; of Functions the values of the ranks that
-    own them count.
+    On several ranks, constants in ``F`` and ``bcs`` must be the same on all; for Functions, the values on the owning ranks count.
 
-    ``close``, or ``with dc.ContactProblem(...) as problem``, frees what PETSc holds.  On one rank a problem that is no
-    longer used is freed by itself.  On several ranks PETSc frees on all of them at once only: there the next problem on
-    the same mesh does it, and a run that makes many meshes has to close its problems.
+    ``close``, or ``with dc.ContactProblem(...) as problem``, frees PETSc objects.  On one rank, a problem that is no longer used
+    is freed automatically.  On several ranks, PETSc frees objects only on all ranks at once: the next problem on the same mesh
+    does this, and a run that makes many meshes must close its problems.
 
     Raises:
         ValueError: on all ranks, for input that makes no sense; the message says what and why.
@@ -198,13 +198,13 @@ class ContactProblem(Guarded):
 
     @property
     def bcs(self) -> tuple[Any, ...]:
-        """The Dirichlet conditions; others may be assigned between steps, on all ranks, see docs/howto/stages.md.  Collective.
+        """The Dirichlet conditions.  Others may be assigned between steps, on all ranks, see docs/howto/stages.md.  Collective.
 
-        Displacement, reactions, friction, sums and surfaces stay; the next step starts from them with the new supports.  What is
-        held from now on moves from where it is to its prescribed value, of what is released the force is gone.
+        Displacement, reactions, history variables and surfaces stay; the next step starts from them with the new supports.  A new
+        support moves from its present displacement to the prescribed value; the force of a released one vanishes.
 
         Raises:
-            ValueError: on all ranks, for conditions that make no sense; those of before stay.
+            ValueError: on all ranks, for conditions that make no sense; the previous ones stay.
         """
         return tuple(self.body.bcs)
 
@@ -258,15 +258,15 @@ class ContactProblem(Guarded):
         self.close()
 
     def solve(self) -> Step:
-        """Solve one load step; the history advances when it succeeds.  Collective.
+        """Solve one load step; if it converges, the history advances.  Collective.
 
         Returns:
             The record of the step.
 
         Raises:
             NotConverged: the error stayed above ``tol``; carries the record and the best state.
-            ValueError: loads, boundary values, planes or ``u`` that are not finite, or a body that
-                nothing holds.  After any exception the last converged state is in place.
+            ValueError: loads, boundary values, planes or ``u`` that are not finite, or a body that nothing holds.  After any
+                exception, the problem is in its last converged state.
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
@@ -328,7 +328,7 @@ class ContactProblem(Guarded):
     ) -> LoadStep:
         """The next step as solvers see it: present loads, boundary values and planes.  Collective.
 
-        For solvers of one's own and for measurements; ``solve`` makes it for itself.
+        For solvers of your own and for measurements; ``solve`` makes its own.
 
         Args:
             holding: Planes that held nodes hold, or cannot hold, if that is known.
@@ -532,10 +532,10 @@ class ContactProblem(Guarded):
     # -- converged states ----------------------------------------------------------------------
 
     def rewind(self) -> None:
-        """Go back by one accepted step, as if it had not been made, to try another one.  Collective.
+        """Undo the last accepted step.  Collective.
 
-        Displacement, contacts with their sums, and planes are those of the end of the step before; loads, boundary values and
-        laws stay as they are.  One step is kept: after it, ``rewind`` again needs another one to go back by.
+        Displacement, history variables of contacts, and planes return to the end of the step before; loads, boundary values and
+        laws stay as they are.  Only one step can be undone, until another one is accepted.
 
         Raises:
             ValueError: no step has been accepted since the beginning, the last ``reset``, ``load`` or ``rewind``.
@@ -544,34 +544,34 @@ class ContactProblem(Guarded):
         self._states.rewind()
 
     def snapshot(self) -> Kept:
-        """The last converged state, to return to by ``restore`` as often as you like; kept in memory, nothing is copied.
+        """The last converged state, for ``restore``, which may be called any number of times; kept in memory, nothing is copied.
 
-        It has what ``rewind`` takes back: displacement, contacts with their sums, and planes.  ``save`` writes the same to a file.
+        It contains displacement, history variables of contacts, and planes.  ``save`` writes the same to a file.
         """
         check_alive(self, self.body, self.contacts)
         return self._states.snapshot()
 
     def restore(self, snapshot: Kept) -> None:
-        """Go on from a snapshot; loads, boundary values and laws stay as they are.  Collective.
+        """Continue from a snapshot; loads, boundary values and laws stay as they are.  Collective.
 
         Args:
-            snapshot: What ``snapshot`` of this problem has returned.
+            snapshot: A result of this problem's ``snapshot``.
 
         Raises:
-            ValueError: it is none of this problem.
+            ValueError: it belongs to another problem.
         """
         check_alive(self, self.body, self.contacts)
         self._states.go_to(snapshot)
 
     def reset(self) -> None:
-        """Return to the undeformed body without reactions or history, and surfaces to where they were when the problem was made."""
+        """Return to the undeformed body without reactions or history, and surfaces to their positions when the problem was made."""
         check_alive(self, self.body, self.contacts)
         self._states.reset()
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a checkpoint: all that the next step starts from, of all ranks, in one file.
+        """Write a checkpoint: everything that the next step starts from, of all ranks, in one file.
 
-        The file is replaced in one go, so a run that is killed leaves the last one whole.  Collective.
+        The file is replaced only when the new one is complete, so a killed run leaves the last one intact.  Collective.
 
         Args:
             path: File name, usually ending in ``.npz``.
@@ -582,11 +582,11 @@ class ContactProblem(Guarded):
     def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
 
-        On one rank the steps that follow have the same bits as without the interruption.  On several
-        ranks MUMPS adds in the order in which messages arrive, and they agree to rounding.
+        On one rank, the following steps agree bit for bit with an uninterrupted run.  On several ranks, MUMPS adds in the order
+        in which messages arrive, and they agree to rounding.
 
         Raises:
-            ValueError: the file is no checkpoint of this problem.
+            ValueError: the file is not a checkpoint of this problem.
         """
         check_alive(self, self.body, self.contacts)
         self._states.load(path)

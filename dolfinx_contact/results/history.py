@@ -21,20 +21,18 @@ if TYPE_CHECKING:
 class History:
     """Records totals and tracked nodes after every step, and writes them to a CSV file as it goes.
 
-    Every row has ``step``, the caller's own columns, the step's record, and for each contact
-    (``contact0_...``) the total reaction in global components, the sum of the norms of the
-    tangential reactions, dissipation and worn volume so far, and the displacement of a plane that force drives when the
-    table is made; for each tracked node
-    (``node0_...``) its local reaction, displacement relative to the plane, slip path, dissipation, gap and
-    status.
+    Every row has ``step``, the caller's own columns and the step's record.  For each contact (``contact0_...``), it has the total
+    reaction in global components, the sum of the norms of the tangential reactions, dissipation and worn volume so far, and the
+    displacement of a plane that is driven by force when the table is made.  For each tracked node (``node0_...``), it has its
+    local reaction, displacement relative to the plane, slip path, dissipation, gap and status.
 
     Args:
-        problem: The ContactProblem that is recorded.
+        problem: The ContactProblem to record.
         path: CSV file, written by rank 0; None keeps the rows in memory only.
-        points: Positions of the nodes to track, ``shape=(m, gdim)``, global frame, length units: the
-            nearest contact node of ``contact`` is taken.
+        points: Positions of the nodes to track, ``shape=(m, gdim)``, global frame, length units; the nearest contact node of
+            ``contact`` is taken.
         contact: Index of the contact that has the tracked nodes.
-        resume: Keep this many rows of an existing file, those of the steps before a checkpoint.
+        resume: Number of rows to keep of an existing file, those of the steps before a checkpoint.
 
     Raises:
         ValueError: points of another dimension, or fewer rows in the file than ``resume``.
@@ -83,7 +81,7 @@ class History:
     def record(self, step: Step, **columns: object) -> dict[str, Any]:
         """Append a row for ``step``, the record of the last solve; ``columns`` come first.  Collective.
 
-        A row that could not be written, on a full disk for instance, is kept and written with the next one.
+        A row that cannot be written, for instance on a full disk, is kept and written with the next one.
 
         Raises:
             ValueError: other columns than in the first row.
@@ -111,7 +109,7 @@ class History:
         """One column over all steps, ``shape=(steps,)``.
 
         Raises:
-            ValueError: there is no such column; the message has the names of those there are.
+            ValueError: there is no such column; the message lists the existing ones.
         """
         if self.rows and name not in self.rows[0]:
             raise ValueError(f"there is no column {name!r}; there are {', '.join(self.rows[0])}.")

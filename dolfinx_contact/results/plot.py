@@ -33,21 +33,23 @@ def plot(
     title: str = "",
     factor: float = 1.0,
 ) -> None:
-    """Draw the body, its contact nodes by status, and the rigid surfaces where they stand now.  Collective.
+    """Draw the body, its contact nodes by status, and the rigid surfaces in their present positions.  Collective.
 
     Needs PyVista, ``pip install pyvista``, and no display.  A body in space is seen from below the contact, through the surface.
 
     Args:
         problem: The ContactProblem.
         path: The picture, ``*.png``.
-        colour: What colours the body: a scalar Function of a Lagrange space or another scalar UFL expression, such as von Mises stress.
-        title: Of its colours.
-        factor: By which displacements, those of surfaces too, are enlarged; rotations are not.
+        colour: Field that colours the body: a scalar Function of a Lagrange space or another scalar UFL expression, such as von
+            Mises stress.
+        title: Title of its colour bar.
+        factor: Magnification of displacements, also those of surfaces; rotations are not magnified.
 
     Raises:
-        ValueError: on all ranks, for a path that does not end in ``.png``, a ``colour`` that is no scalar, a ``factor`` that is not finite.
+        ValueError: on all ranks, for a path that does not end in ``.png``, a ``colour`` that is not scalar, or a ``factor`` that
+            is not finite.
         ModuleNotFoundError: on all ranks, without PyVista.
-        RuntimeError: on all ranks, if PyVista cannot draw here; the message has what it said.
+        RuntimeError: on all ranks, if PyVista cannot draw here; the message quotes it.
 
     Example:
         >>> dc.plot(problem, "block.png", factor=20)  # doctest: +SKIP

@@ -43,8 +43,8 @@ def profile(
 
     Args:
         problem: The ContactProblem.
-        points: Positions on the undeformed contact surface in their order, ``shape=(k, gdim)``, global frame; the nearest point of the
-            surface counts.
+        points: Positions on the undeformed contact surface in order, ``shape=(k, gdim)``, global frame; each is moved to the
+            nearest point of the surface.
         path: CSV file; None writes none.
         contact: Index of the contact.
 
@@ -53,7 +53,7 @@ def profile(
         ``shear_traction_x``, ...; ``gap``; ``slip_x``, ...; ``wear_depth``; ``displacement_x``, ...; ``status`` of the nearest node.
 
     Raises:
-        ValueError: on all ranks, for points of another shape, or farther from the surface than a facet is large.
+        ValueError: on all ranks, for points of another shape, or farther from the surface than the size of a facet.
         OSError: on all ranks, if the file cannot be written.
 
     Example:

@@ -35,27 +35,25 @@ class Step:
     """Record of a load step, the same on all ranks.
 
     Attributes:
-        error: What is out of balance, off the law or penetrates, over the forces that act; see
-            docs/errors.md.
-        slip_error: Defect of the slip rule, as a force over the forces that act; see the same place.
-        rounding: What double precision leaves of both; where it exceeds the tolerance, no more was asked.
-        forward_error: How far the reactions may still be from the exact ones, over the same forces: an
-            estimate from the solver's last correction.
-        contact_error: The largest of error, slip error and forward error, over the reactions alone: where they are small beside loads
-            and supports, forces of the contact are as accurate as this says; 0 without reactions.
-        bipotential_gap: Sum of the nodal certificates, >= 0, force times length.
+        error: Error of equilibrium, law and non-penetration, relative to the acting forces; see docs/errors.md.
+        slip_error: Defect of the slip rule, as a force relative to the acting forces; see docs/errors.md.
+        rounding: Rounding error of both in double precision; if it exceeds the tolerance, it replaces the tolerance.
+        forward_error: Estimated error of the reactions, relative to the same forces, from the solver's last correction.
+        contact_error: The largest of error, slip error and forward error, relative to the reactions alone: the accuracy of
+            contact forces that are small compared with loads and support forces; 0 without reactions.
+        bipotential_gap: Sum of ``contact.bipotential_gap`` over all nodes, >= 0, force times length.
         penetration: Largest penetration of contact nodes, >= 0, length.
-        vertex_penetration: The same of nodes of the facets that carry nothing, the vertices of second-order tetrahedra; 0 without such
-            nodes, and with wear.
-        geometry_error: Forces by which distances, normals, textures and arms at the end of the step differ from those with which it was
-            solved, over the reactions; 0 on planes that are flat and do not turn, see docs/surfaces.md, and if sliding is small.
-        iterations: Corrections that the solver made; 0 if the state without contact, or the one in which the solver
-            started (the last step's, or its continuation), already was the solution.
+        vertex_penetration: Largest penetration of facet nodes that carry no load, the vertices of second-order tetrahedra; 0
+            without such nodes, and with wear.
+        geometry_error: Change of distances, normals, textures and lever arms between the solution and its end position, as a
+            force relative to the reactions, see docs/surfaces.md; 0 on flat planes that do not rotate, and with small sliding.
+        iterations: Corrections by the solver; 0 if the contact-free solution, or the solver's initial state (the last step's, or
+            its extrapolation), already was the solution.
         seconds: Wall time of the step.
         counts: Contact nodes open, sticking and slipping.
-        solver: The solver that found the state: a ``SolverName``, or the name that a solver of one's own gives.
-        reason: Why this one, where the user did not choose, how others ended, and what it says of its way; in words.
-        tried: What the solver tried, in order, where it has more than one method.
+        solver: The solver that found the state: a ``SolverName``, or the name that your own solver gives.
+        reason: In words: why this solver was chosen, if the user did not choose; how others ended; remarks of the solver.
+        tried: Methods that the solver tried, in order, if it has several.
 
     Example:
         >>> step = problem.solve()
@@ -99,12 +97,12 @@ def named(step: Step) -> str:
 
 
 class NotConverged(RuntimeError):
-    """A step did not reach its tolerance; the problem is back in its last converged state.
+    """A step did not reach its tolerance; the problem keeps its last converged state.
 
     Attributes:
         step: Record of the step, with what was tried.
-        displacement: The best one found, owned degrees of freedom; not a solution.
-        reactions: Of each contact in that state, local frame.
+        displacement: The best state found, owned degrees of freedom; not a solution.
+        reactions: Reactions of each contact in that state, local frame.
 
     Example:
         >>> try:

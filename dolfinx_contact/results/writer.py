@@ -98,20 +98,22 @@ def _replace(path: Path, file: ET.Element) -> None:
 class Writer:
     """Writes the body and its contact surfaces after a step, as a time series.  Any number of ranks.
 
-    ``block.pvd`` is the body: ``displacement`` and the fields.  ``block_contact.pvd`` is the contact surface alone, those of all
-    contacts, told apart by ``contact``: ``pressure``, ``shear_traction``, ``slip`` in the last step, ``status`` (0 open, 1 stick, 2
+    ``block.pvd`` is the body: ``displacement`` and the fields.  ``block_contact.pvd`` is the contact surface alone, of all
+    contacts, distinguished by ``contact``: ``pressure``, ``shear_traction``, ``slip`` in the last step, ``status`` (0 open, 1 stick, 2
     slip), ``gap``, ``wear_depth``, ``dissipation``, ``displacement`` and ``reaction``; vectors are in global components.  Nodal
-    forces in ``reaction`` add up to ``contact.force()``.  The meshes are in ``block_data``, a file a step.  Rank 0 gathers and writes all.
+    forces in ``reaction`` add up to ``contact.force()``.  The meshes are in ``block_data``, one file per step.  Rank 0 gathers
+    and writes everything.
 
     Args:
         problem: The ContactProblem.
         path: The collection, ``*.pvd``.
-        fields: What else is written of the body, by name: Functions of Lagrange spaces by their values at nodes, other UFL expressions,
-            such as stress, by those in the middle of each cell.  Scalars, vectors and tensors.
-        resume: Keep this many steps of an existing series, those before a checkpoint.
+        fields: Further fields of the body, by name: Functions of Lagrange spaces, written at nodes, and other UFL expressions,
+            such as stress, written at the midpoint of each cell.  Scalars, vectors and tensors.
+        resume: Number of steps to keep of an existing series, those before a checkpoint.
 
     Raises:
-        ValueError: on all ranks, for another ending than ``.pvd``, a name that is taken, or fewer steps in the file than ``resume``.
+        ValueError: on all ranks, for a path that does not end in ``.pvd``, a name already in use, or fewer steps in the file than
+            ``resume``.
 
     Example:
         >>> writer = dc.Writer(problem, "block.pvd")

@@ -41,11 +41,10 @@ class CondensedNewton:
 
     Args:
         slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
-        max_iterations: Iterations of all methods together; by default as many as ``solve_condensed`` gives problems of that
-            size, and 200,000 for a body.
-        newton_iterations: Newton iterations of one attempt.
+        max_iterations: Iteration limit of all methods together; by default that of ``solve_condensed``, and 200,000 for a body.
+        newton_iterations: Iteration limit of one attempt of Newton's method.
         max_seconds: Wall time after which the search ends, seconds.
-        fallbacks: Try other methods where Newton's fails.
+        fallbacks: Try other methods if Newton's method fails.
 
     Raises:
         ValueError: an option is not a positive number.
@@ -150,8 +149,9 @@ def solve_condensed(
 ) -> CondensedResult:
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
-    No body and no DOLFINx is needed: ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without
-    reactions; per contact (t1, t2, n), in two dimensions (t, n): ``w_n`` the gap at the end of the step, ``w_t`` the slip.
+    Needs neither a body nor DOLFINx.  ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without reactions.
+    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` the
+    slip.
 
     The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
 
@@ -160,27 +160,27 @@ def solve_condensed(
     - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector along ``P^-2 r_t``),
       ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that vector.
 
-    Both are relative to forces that act in the state itself; where bodies jam and ``|r|`` exceeds the load ``|kappa (q_t, min(q_n, 0))|``,
-    they are relative to that.  An answer whose errors are above ``tol`` but below ``rounding`` is returned with a ``RoundingWarning``,
-    one whose ``local_error`` is above the root of ``tol`` with a ``UserWarning``.
+    Both are relative to the reactions in the state itself, or to the load ``|kappa (q_t, min(q_n, 0))|`` if bodies jam and
+    ``|r|`` exceeds it.  An answer whose errors are above ``tol`` but below ``rounding`` is returned with a ``RoundingWarning``,
+    one whose ``local_error`` is above the square root of ``tol`` with a ``UserWarning``.
 
     Args:
         W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
             rank-deficient and slightly unsymmetric.
         q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
-        friction: A ``Friction``, or a number, of coefficients for all contacts, or ``shape=(n, 2)`` for each; or an array of one
-            coefficient of isotropic friction per contact, ``shape=(n,)``, for two contacts, too.
+        friction: A ``Friction``, with coefficients for all contacts or ``shape=(n, 2)`` for each; or isotropic coefficients, a
+            number for all contacts or an array of one per contact, ``shape=(n,)``, also for two contacts.
         solver: ``CondensedNewton(...)``; None is one with default options.
         tol: Largest error and, unless the solver says otherwise, slip error.
-        r0: Reactions to start from, of the shape of ``q``.
+        r0: Initial reactions, of the shape of ``q``.
         max_seconds: Wall time after which the search ends, seconds.
 
     Returns:
-        Reactions, displacements, status, errors and how they were found.
+        A ``CondensedResult``: reactions, displacements, status, errors and the methods used.
 
     Raises:
         ValueError: input that makes no sense.
-        CondensedNotConverged: nothing reached ``tol``, with the best state.  ``CondensedNewton(max_iterations=200_000)`` searches longer.
+        CondensedNotConverged: no method reached ``tol``; has the best state.  ``CondensedNewton(max_iterations=200_000)`` searches longer.
 
     Example:
         >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips

@@ -29,20 +29,19 @@ class CondensedResult:
         reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
         displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
         status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
-        error: ``|r - proj(r - kappa w)|`` over the forces that act, see ``solve_condensed``.
-        slip_error: Defect of the slip rule, as a force, over the same.
-        local_error: The largest of both errors of one contact, over the force that acts in it, ``max(|r|, kappa |w|)`` of
-            that contact; zero if rounding may explain it.  ``error`` and ``slip_error`` hardly see contacts that are far
-            softer, or bear far less, than others.
-        rounding: What double precision leaves of the errors; an error above ``tol`` is below it.
-        change: How much Newton's next step would still move the reactions, over the same forces:
-            an estimate of what is missing to the solution nearby, which where W is ill conditioned
-            is far more than the error.  It knows nothing of other solutions.
+        error: ``|r - proj(r - kappa w)|`` relative to the acting forces, see ``solve_condensed``.
+        slip_error: Defect of the slip rule, as a force, relative to the same.
+        local_error: The largest error of any single contact, relative to the force that acts there, ``max(|r|, kappa |w|)``; zero
+            if rounding may explain it.  ``error`` and ``slip_error`` hardly see contacts that are much softer, or carry much
+            less, than others.
+        rounding: Rounding error of both in double precision; an error above ``tol`` is below it.
+        change: Size of the next Newton step of the reactions, relative to the same forces: an estimate of the distance to the
+            nearest solution.  If W is ill conditioned, it is much larger than the error.  It says nothing about other solutions.
         iterations: Of all methods tried.
         seconds: Wall time of all methods tried.
         branch: The method that gave the answer.
-        tried: All that were tried, in order.
-        tied: Forces of the tied rows of a kernel operator, if it has any.
+        tried: All methods tried, in order.
+        tied: Forces of the bilateral constraints of a kernel operator, if it has any.
 
     Example:
         >>> found = dc.solve_condensed(np.eye(3), [[0.5, 0, -1]], friction)
@@ -70,7 +69,7 @@ class CondensedNotConverged(RuntimeError):
 
     Attributes:
         best: The ``CondensedResult`` of the smallest errors found; not a solution.
-        tried: What was tried, a tuple of ``Attempt``.
+        tried: The methods tried, a tuple of ``Attempt``.
 
     Example:
         >>> try:

@@ -37,26 +37,24 @@ ASTRAY = 1e3
 class FixedPoint:
     """Predictor and corrector in every iteration, without a condensed operator.
 
-    One iteration takes the reactions that the body asks for, ``K u - f`` at the contact nodes,
-    does the predictor and the projection on the friction cone [dSFMH07, Section 2], puts the new
-    reactions into the residual, and corrects the displacement by one back-solve with the
-    stiffness plus springs at the contact nodes.  The zero of the residual
-    does not depend on the augmentation parameter rho.  Anderson's method accelerates the sequence.  Every twenty
-    iterations the contact is linearised, and the layers next to the plane are then corrected with that
-    tangent before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
+    An iteration takes the reactions required for equilibrium, ``K u - f`` at the contact nodes, applies predictor and projection
+    on the friction cone [dSFMH07, Section 2], puts the new reactions into the residual, and corrects the displacement by one
+    back-solve with the stiffness plus springs at the contact nodes.  The solution does not depend on the augmentation parameter
+    rho.  Anderson's method accelerates the iteration.  Every twenty iterations, the contact is linearised; with this tangent, the
+    near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
 
-    If the error does not fall any more, Newton's method on the same residual is tried, see ``search_by_newton``: an
-    iteration is then one of GMRES with the same correction.  If that fails, too, the fixed point goes on with another rho.
+    If the error stalls, Newton's method is applied to the same residual, see ``search_by_newton``: an iteration is then one of
+    GMRES, preconditioned by the same correction.  If that fails, too, the fixed point continues with another rho.
 
     Attributes:
         map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
-            ``Contact.update``.  The law is the same; with strongly non-associated friction "return"
-            needs fewer iterations.
-        rho: Augmentation parameter over the nodal normal stiffness; None finds it: the next value of a short list is
-            tried where one does not converge, at the cost of a factorisation.
-        depth: Number of previous corrections that Anderson's method mixes.
+            ``Contact.update``.  Both have the same solutions; with strongly non-associated friction, "return" needs fewer
+            iterations.
+        rho: Augmentation parameter relative to the nodal normal stiffness.  None tries the values of a short list until one
+            converges, at the cost of a factorisation each.
+        depth: Number of previous corrections that Anderson's method combines.
         newton: Whether Newton's method may be tried, with the first rho.
-        max_iterations: Iterations with one rho; those of Newton's method come on top.
+        max_iterations: Iterations with one rho, not counting those of Newton's method.
         max_seconds: Wall time after which the search ends, seconds.
 
     Raises:

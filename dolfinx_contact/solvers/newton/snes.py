@@ -31,16 +31,15 @@ REASONS = {
 class SNES:
     """PETSc's SNES on the equations of ``SparseNewton``, with its types, line searches, monitors and options.
 
-    One step of Newton's method brings supports to their places and finds who touches; SNES goes on from there.  It ends
-    when the errors of the step are at most ``tol`` of the problem, so that ``snes_rtol`` and the like are not asked.  The
-    prefix of its options is the problem's ``petsc_options_prefix``; linear systems are factorised, the prefix of their options ends
-    in ``tangent_``.
+    One Newton step brings supports to their positions and finds which nodes touch; SNES continues from there.  It ends when the
+    errors of the step are at most ``tol`` of the problem; ``snes_rtol`` and the like are ignored.  The prefix of its options is
+    the problem's ``petsc_options_prefix``.  Linear systems are factorised; the prefix of their options ends in ``tangent_``.
 
     Attributes:
-        petsc_options: Of SNES, without prefix.  PETSC_OPTIONS and the command line go before them.
+        petsc_options: Options of SNES, without prefix.  PETSC_OPTIONS and the command line override them.
 
     Raises:
-        ValueError: options that are no dictionary.
+        ValueError: options that are not a dictionary.
 
     Example:
         >>> solver = dc.SNES({"snes_linesearch_type": "l2"})  # for ContactProblem(..., solver=solver)

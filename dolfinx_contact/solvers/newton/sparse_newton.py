@@ -35,13 +35,13 @@ BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
 
 @dataclass(frozen=True)
 class SparseNewton:
-    """Newton's method on forces out of balance of body and contact together, see ``ContactTangent``.
+    """Newton's method on the residual of body and contact together, see ``ContactTangent``.
 
-    One iteration assembles the tangent of the body, puts the derivatives of predictor and corrector into its rows of
-    contact nodes, and factorises it (MUMPS).  Bodies that are linear in ``u`` are not assembled again.
+    An iteration assembles the tangent of the body, replaces its rows at contact nodes with the derivatives of predictor and
+    corrector, and factorises it (MUMPS).  Bodies that are linear in ``u`` are not assembled again.
 
     Attributes:
-        max_iterations: Iterations at most.
+        max_iterations: Largest number of iterations.
         max_seconds: Wall time after which the search ends, seconds.
 
     Raises:
