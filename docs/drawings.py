@@ -97,7 +97,7 @@ def projection() -> None:
     axes.plot([-mu, 0, mu], [1, 0, 1], color=CONE)
     axes.plot([-0.5 / mu, 0, 0.5 / mu], [-0.5, 0, -0.5], color=INK, lw=1)
     predictor = np.array([[0.80, 0.0, 0.45]])
-    found = dc.project_cone(predictor, mu)[0]
+    found = dc.law.project_cone(predictor, mu)[0]
     start, end = predictor[0, [0, 2]], found[[0, 2]]
     arrow(axes, start, end, FORCE, "")
     axes.plot(*start, "o", color=SLIP)

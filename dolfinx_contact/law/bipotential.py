@@ -39,7 +39,7 @@ def bipotential_gap(
 
     Example:
         >>> slip = [[-0.01, 0]]  # mm; the reaction is on the cone and against it: the law holds
-        >>> dc.bipotential_gap([[0.3, 0, 1]], [0], slip, dc.Friction(mu=0.3)).round(12)
+        >>> dc.law.bipotential_gap([[0.3, 0, 1]], [0], slip, dc.Friction(mu=0.3)).round(12)
         array([0.])
     """
     friction = as_friction(friction)

@@ -60,7 +60,7 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
         ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.
 
     Example:
-        >>> dc.project_cone([[0.1, 0, 1], [0.1, 0, -1]], (0.30, 0.15))
+        >>> dc.law.project_cone([[0.1, 0, 1], [0.1, 0, -1]], (0.30, 0.15))
         array([[0.1, 0. , 1. ],
                [0. , 0. , 0. ]])
     """
@@ -89,7 +89,7 @@ def load_function(r: ArrayLike, mu: ArrayLike) -> np.ndarray:
         ValueError: As :func:`project_cone`.
 
     Example:
-        >>> dc.load_function([[0.1, 0, 1]], (0.30, 0.15)).round(3)  # negative: sticks
+        >>> dc.law.load_function([[0.1, 0, 1]], (0.30, 0.15)).round(3)  # negative: sticks
         array([-0.667])
     """
     return Friction(mu).law(3).load_function(as_nodes("r", r, 3))

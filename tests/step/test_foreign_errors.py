@@ -127,10 +127,10 @@ def test_without_friction_a_tangential_force_is_outside_the_cone():
     )
     field = np.array([[0.0, 0.0], [0.0, 0.0]])
     mixed = np.array([[0.3, 0.2], [0.0, 0.0]])
-    assert dc.bipotential_gap(r, gap, slip, dc.Friction(0.0)).tolist() == [math.inf, 0.5]
-    assert dc.bipotential_gap(r, gap, slip, dc.Friction(field)).tolist() == [math.inf, 0.5]
-    found = dc.bipotential_gap(r, gap, slip, dc.Friction(mixed))
-    alone = dc.bipotential_gap(r[:1], gap[:1], slip[:1], dc.Friction((0.3, 0.2)))
+    assert dc.law.bipotential_gap(r, gap, slip, dc.Friction(0.0)).tolist() == [math.inf, 0.5]
+    assert dc.law.bipotential_gap(r, gap, slip, dc.Friction(field)).tolist() == [math.inf, 0.5]
+    found = dc.law.bipotential_gap(r, gap, slip, dc.Friction(mixed))
+    alone = dc.law.bipotential_gap(r[:1], gap[:1], slip[:1], dc.Friction((0.3, 0.2)))
     assert found.tolist() == [alone[0], 0.5]
 
 
@@ -145,13 +145,17 @@ def test_projection_of_the_largest_and_of_unaligned_numbers():
             [np.inf, 0, 0],
         ]
     )
-    found, small = (dc.project_cone(points, (0.3, 0.15)) for points in (tau, tau[:3] * 2.0**-900))
+    found, small = (
+        dc.law.project_cone(points, (0.3, 0.15)) for points in (tau, tau[:3] * 2.0**-900)
+    )
     assert np.isfinite(found[:3]).all() and np.isnan(found[3:]).all()
     assert np.allclose(found[:3] * 2.0**-900, small, rtol=1e-14, atol=0)
     room = np.zeros(3 * 24 + 1, dtype=np.uint8)
     unaligned = room[1:].view(np.float64).reshape(3, 3)
     unaligned[:] = tau[2]
-    assert np.array_equal(dc.project_cone(unaligned, 0.3), dc.project_cone(tau[[2, 2, 2]], 0.3))
+    assert np.array_equal(
+        dc.law.project_cone(unaligned, 0.3), dc.law.project_cone(tau[[2, 2, 2]], 0.3)
+    )
 
 
 def test_a_checkpoint_needs_a_name(scene, tmp_path):

@@ -274,7 +274,7 @@ def test_a_number_is_isotropic_friction(scene):
     W, q = np.eye(3), np.array([0.05, 0.0, -1.0])
     with_number, with_law = (dc.solve_condensed(W, q, law) for law in (0.02, dc.Friction(0.02)))
     assert with_number.reaction == pytest.approx(with_law.reaction)
-    assert dc.bipotential_gap([[0.3, 0, 1]], [0], [[-0.01, 0]], 0.3) == pytest.approx([0.0])
+    assert dc.law.bipotential_gap([[0.3, 0, 1]], [0], [[-0.01, 0]], 0.3) == pytest.approx([0.0])
 
 
 def test_friction_in_per_cent_is_told(scene):

@@ -85,14 +85,14 @@ def press(folder: Path) -> NDArray[np.float64]:
 
 
 def arrays(reaction: NDArray[np.float64]) -> float:
-    inside = dc.project_cone(reaction, 0.3)
-    gaps = dc.bipotential_gap(inside, np.zeros(len(inside)), np.zeros((len(inside), 2)), dc.Friction(0.3))  # fmt: skip
+    inside = dc.law.project_cone(reaction, 0.3)
+    gaps = dc.law.bipotential_gap(inside, np.zeros(len(inside)), np.zeros((len(inside), 2)), dc.Friction(0.3))  # fmt: skip
     try:
         found = dc.solve_condensed(np.eye(6) + 0.1, [[0.02, 0, -0.1], [0, 0.3, -0.1]], dc.Friction(0.3), tol=1e-10)  # fmt: skip
     except dc.CondensedNotConverged as failure:
         found = failure.best
     print(found.branch, found.error, found.reaction.shape, [attempt.branch for attempt in found.tried])  # fmt: skip
-    return float(gaps.max(initial=0.0) + dc.load_function(inside, 0.3).max(initial=0.0))
+    return float(gaps.max(initial=0.0) + dc.law.load_function(inside, 0.3).max(initial=0.0))
 
 
 if __name__ == "__main__":
