@@ -380,7 +380,7 @@ C = dict(mu=(0.3, 0.15), p=(0.05, 0.20))
 # Where body or surface turns little is pressed: stresses of a linear body do not turn, an error of their part of E.
 TURNS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 4e-6), Leg((0, 0, -4e-5), 2e-5))
 TILTS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 0.0, 5e-6), Leg((2e-5, 0, -4e-5), 0.0, 5e-6))
-WEIGHTS = (Leg((0, 0, -1e-3)), Leg((1.5e-4, 1e-4, -1e-3)), Leg((-5e-5, 1e-4, -7e-4)))
+WEIGHTS = (Leg((0, 0, -1e-3)), Leg((1e-4, 5e-5, -1e-3)), Leg((-5e-5, 5e-5, -7e-4)))
 FINE = dict(cells=(8, 8, 3))
 SCENES = {
     "plane": Way(**C),
@@ -436,9 +436,10 @@ def _flat_or_round(name, way):
     return way.support == "held" and way.texture != "body"
 
 
+# Where nodes land on curved surfaces their slip is an estimate, see docs/surfaces.md.
 VARIANTS = [
-    Variant("the surface moves", dict(moves=1.0), _flat_or_round, 2e-4),
-    Variant("both move", dict(moves=0.4), _flat_or_round, 2e-4),
+    Variant("the surface moves", dict(moves=1.0), _flat_or_round, 5e-4),
+    Variant("both move", dict(moves=0.4), _flat_or_round, 5e-4),
     Variant("stiff springs", dict(support="spring"), _held, 1e-5),
     Variant("turned frame, 3-D", dict(frame=TURNED), lambda name, way: way.d == 3),
     Variant("turned frame, 2-D", dict(frame=SPUN), lambda name, way: way.d == 2),
@@ -463,7 +464,7 @@ VARIANTS = [
     Variant("ball as function", dict(surface="ball as function"), lambda name, way: way.surface == "ball", 2e-4),
     Variant("roll as function", dict(surface="roll as function"), lambda name, way: way.surface == "roll", 2e-4),
     Variant("in steps", dict(steps=3), lambda name, way: way.mu[0] == 0.0, 1e-5),
-    Variant("driven by its force", lambda played: dict(driven=tuple(played.pressing)), lambda name, way: way.support == "held" and "tilted" not in name and way.texture is None, 1e-5),
+    Variant("driven by its force", lambda played: dict(driven=tuple(played.pressing)), lambda name, way: way.support == "held" and "tilted" not in name and way.texture is None, 5e-4),
     Variant("thin slab", dict(d=3, cells=(8, 8, 4), part="slab"), lambda name, way: name in ("plane, 2-D", "plane, tilted, 2-D")),
     Variant("thin slab on a roll", dict(d=3, cells=(16, 16, 6), part="slab", surface="roll", mu=(0.3, 0.3)), lambda name, way: name == "circle", 1e-5),
 ]  # fmt: skip

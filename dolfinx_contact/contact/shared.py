@@ -112,7 +112,7 @@ class SharedNodes:
 
     def __init__(self, contacts, stiffness, fixed: np.ndarray, nodes, alike, shares):
         self._contacts, dim = contacts, contacts[0].points.dim
-        self._dofs = dim * nodes[:, None] + np.arange(dim)
+        self._dofs = contacts[0].displacements.dofs(nodes)
         m, n = nodes.size, len(contacts)
         self._shape = m, n, dim
         self._frames, springs = np.zeros((m, n, dim, dim)), np.zeros((m, n))

@@ -28,7 +28,7 @@ def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
     Returns:
         The largest change of friction over the reactions; above ``tol`` the step has to be solved again.
     """
-    lands = [(c.last.gap > c.gap_rounding(x)) & (c.reaction[:, -1] > 0.0) for c in contacts]
+    lands = [_opened(c, x) & (c.reaction[:, -1] > 0.0) for c in contacts]
     new = [at & ~c.counts_from.any(axis=1) for c, at in zip(contacts, lands)]
     slips = [contact.slip_increment for contact in contacts]
     if _felt(body, contacts, step, slips, new) <= tol:
@@ -42,6 +42,12 @@ def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
         for contact, slip in zip(contacts, before):
             contact.count_from(contact.counts_from + slip)
     return late
+
+
+def _opened(contact, x: np.ndarray) -> np.ndarray:
+    """Nodes that were open at the start of a step, ``shape=(n,)``, booleans: what is left of gaps under reactions is none."""
+    last = contact.last
+    return (last.gap > contact.gap_rounding(x)) & (last.reaction[:, -1] == 0.0)
 
 
 def _felt(body, contacts, step, slips, at) -> float:
