@@ -40,13 +40,13 @@ test: .venv/ready
 	tools/mpitest .venv 2 -m "not slow" --once $(CORE) $(ARGS)
 	tools/ctest example
 
-# what .ci/run has beside it: the other parameters of these tests; all that are marked ranks on 2 ranks; the newest
+# what .ci/run has beside it: the other parameters of these tests; those that are marked ranks on 2 ranks; the newest
 # DOLFINx on PyPI
 test-rest: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --rest
 
 test-ranks: .venv/ready
-	tools/mpitest .venv 2 $(RANKS)
+	tools/mpitest .venv 2 $(filter-out $(CORE),$(RANKS)) --once
 
 test-wheel: .venv-wheel/ready
 	tools/mpitest .venv-wheel 1 -m "not slow" --once
