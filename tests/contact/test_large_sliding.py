@@ -159,10 +159,9 @@ def test_checkpoints_and_rewind(tmp_path):
 @pytest.mark.parametrize("cell, degree, press", [("quadrilateral", 1, 0.1), *[pytest.param(*case, marks=pytest.mark.slow) for case in (("triangle", 2, 0.1), ("quadrilateral", 1, 0.3))]])  # fmt: skip
 def test_rubber_is_ironed(cell, degree, press):
     """Bodies pressed by a tenth of their height: rows that follow the strain settle, and one facet a step is as good as a fifth."""
-    coarse, scene = ironed(4, cell, degree, press=press, form=rubber)
+    coarse, _ = ironed(4, cell, degree, press=press, form=rubber)
     fine, _ = ironed(20, cell, degree, press=press, form=rubber)
     assert np.abs(coarse - fine).max() <= 0.01 * np.abs(fine).max()
-    assert scene.contact.reaction[:, 1].max() > 0.0
 
 
 @pytest.mark.parametrize("cell, degree", [("quadrilateral", 1), *[pytest.param(*case, marks=pytest.mark.slow) for case in (("triangle", 2), ("hexahedron", 2))]])  # fmt: skip
