@@ -20,6 +20,7 @@ __all__: list[str] = [
     "Law2D",
     "Law3D",
     "clip",
+    "common_integrals",
     "instruction_sets",
     "make_law",
 ]
@@ -369,6 +370,26 @@ def clip(
 ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int32]]:
     """
     The common parts of pairs of convex polygons, corners in order, shape (n, k, 2) with k at most 4: (corners of shape (n, k + m, 2), how many of them count of shape (n,)), zero where there is no area.
+    """
+
+def common_integrals(
+    one: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    one_local: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    one_shapes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    one_degree: typing.SupportsInt | typing.SupportsIndex,
+    other: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    other_local: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    other_shapes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    other_degree: typing.SupportsInt | typing.SupportsIndex,
+    at: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> tuple[
+    numpy.typing.NDArray[numpy.float64],
+    numpy.typing.NDArray[numpy.float64],
+    numpy.typing.NDArray[numpy.float64],
+]:
+    """
+    Integrals over the common parts of n pairs of pieces: of shape functions N of the one side, shape (n, k), of products of them, (n, k, k), and with those of the other side, (n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where these are on the reference facet; shape functions are monomials times coefficients, shape (k, k); at and weights are a rule on the unit interval.
     """
 
 def instruction_sets() -> list[str]:

@@ -27,11 +27,11 @@ from dolfinx_contact import _kernel
 from dolfinx_contact.contact.shapes import monomials
 
 # Points of Gauss's rule in each direction of a triangle or interval: products of quadratic functions are integrated exactly;
-# and where quadrilaterals are no parallelograms, whose inverse maps are no polynomials, to ten digits.
+# and at most where quadrilaterals are no parallelograms, whose inverse maps are no polynomials, to ten digits.
 POINTS, MORE = 4, 10
 
 # Facets of the slave side at a time.
-BLOCK = 128
+BLOCK = 4096
 
 # Part of a node's area that has to be covered: of less the coefficients are rounding.
 COVERED = 0.05
@@ -76,10 +76,10 @@ class Side(NamedTuple):
         side = np.sign((before * self.outwards).sum(axis=1, keepdims=True))
         return self._replace(x=x, outwards=side * now)
 
-    def shapes(self, local: np.ndarray) -> np.ndarray:
-        """Shape functions at points of the reference facet, ``shape=(..., k)``."""
-        inverse = np.linalg.inv(monomials(self.local, len(self.corners), self.degree))
-        return monomials(local, len(self.corners), self.degree) @ inverse
+    @property
+    def inverse(self) -> np.ndarray:
+        """Coefficients of the shape functions, a row for each monomial, ``shape=(k, k)``."""
+        return np.linalg.inv(monomials(self.local, len(self.corners), self.degree))
 
 
 class Pieces(NamedTuple):
@@ -151,34 +151,33 @@ def _coupled(side: Side, pieces: Pieces, opposite: list, count: int) -> tuple:
     D, M = np.zeros((m, k)), np.zeros((m, k, k))
     for other, others in opposite:
         a, b = candidates(pieces, others)
-        pair, weight, here, there = _common_points(pieces, others, a, b)
-        facet, N = pieces.facet[a[pair]], side.shapes(here)
-        np.add.at(D, facet, weight[:, None] * N)
-        np.add.at(M, facet, (weight[:, None] * N)[:, :, None] * N[:, None, :])
-        met.append((facet, weight, N, other.nodes[others.facet[b[pair]]], other.shapes(there)))
+        of_piece, products, mixed = _integrals(side, pieces, other, others, a, b)
+        facet = pieces.facet[a]
+        D += _by_facets(facet, of_piece, m)
+        M += _by_facets(facet, products, m)
+        met.append((facet, mixed, other.nodes[others.facet[b]]))
     dual = D[:, :, None] * np.linalg.pinv(M, 1e-13, hermitian=True)
     coupling = sparse.csr_matrix((m * k, count))
-    for facet, weight, N, columns, there in met:
-        psi = weight[:, None] * np.einsum("qij,qj->qi", dual[facet], N)
-        rows = k * facet[:, None] + np.arange(k)
-        both = (_by_points(psi, rows, m * k), _by_points(there, columns, count))
-        coupling = coupling + both[0].T @ both[1]
+    for facet, mixed, columns in met:
+        values = dual[facet] @ mixed
+        rows = (k * facet[:, None] + np.arange(k))[:, :, None]
+        at = [np.broadcast_to(index, values.shape).ravel() for index in (rows, columns[:, None])]
+        coupling = coupling + sparse.csr_matrix((values.ravel(), tuple(at)), coupling.shape)
     return D, coupling
 
 
-def _by_points(values: np.ndarray, columns: np.ndarray, count: int) -> sparse.csr_matrix:
-    """Values, ``shape=(q, k)``, in the columns of their nodes: a row a point."""
-    starts = np.arange(0, values.size + 1, values.shape[1])
-    return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), (len(values), count))
+def _by_facets(facet: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Sums over the pairs of each facet, ``shape=(count, ...)``."""
+    pairs = len(facet)
+    sums = sparse.csr_matrix((np.ones(pairs), (facet, np.arange(pairs))), (count, pairs))
+    return (sums @ values.reshape(pairs, -1)).reshape(count, *values.shape[1:])
 
 
 def _own_integrals(side: Side, pieces: Pieces) -> np.ndarray:
     """Integrals of the shape functions over facets, ``shape=(m, k)``."""
     every = np.arange(len(pieces.x))
-    piece, weight, at, _ = _common_points(pieces, pieces, every, every)
-    D = np.zeros(side.nodes.shape)
-    np.add.at(D, pieces.facet[piece], weight[:, None] * side.shapes(at))
-    return D
+    whole, *_ = _integrals(side, pieces, side, pieces, every, every)
+    return _by_facets(pieces.facet, whole, len(side.nodes))
 
 
 # -- pieces of facets --------------------------------------------------------------------------
@@ -255,26 +254,29 @@ def candidates(pieces: Pieces, others: Pieces) -> tuple[np.ndarray, np.ndarray]:
     return a[facing], b[facing]
 
 
-# -- points of common parts --------------------------------------------------------------------
+# -- integrals over common parts ---------------------------------------------------------------
 
 
-def _common_points(pieces: Pieces, others: Pieces, a, b) -> tuple:
-    """Points on common parts of pairs of pieces: pair, weight, local coordinates on both facets."""
+def _integrals(side: Side, pieces: Pieces, other: Side, others: Pieces, a, b) -> tuple:
+    """Integrals over the common parts of pairs of pieces, in the plane of the first: of shape functions, of products, and with the other side's."""
     axes, origin = _axes(pieces.normal)[a], pieces.middle[a][:, None]
-    one, other = (np.einsum("pij,pcj->pci", axes, x - origin) for x in (pieces.x[a], others.x[b]))
-    common = _common_intervals if one.shape[2] == 1 else _common_triangles
-    points = POINTS if _affine(one) and _affine(other) else MORE
-    pair, at, weight = common(one, other, points)
-    here = _on_facet(one[pair], pieces.local[a[pair]], at)
-    return pair, weight, here, _on_facet(other[pair], others.local[b[pair]], at)
+    axes = axes.transpose(0, 2, 1)
+    one, two = ((x - origin) @ axes for x in (pieces.x[a], others.x[b]))
+    at, weight = _gauss(max(_points(one), _points(two)))
+    here = one, pieces.local[a], side.inverse, side.degree
+    there = two, others.local[b], other.inverse, other.degree
+    return _kernel.common_integrals(*here, *there, at, weight)
 
 
-def _affine(corners: np.ndarray) -> bool:
-    """Whether all pieces are intervals, triangles or parallelograms."""
-    if corners.shape[1] < 4:
-        return True
-    bent = corners[:, 0] - corners[:, 1] + corners[:, 2] - corners[:, 3]
-    return np.abs(bent).max(initial=0.0) <= STRAIGHT * np.abs(corners).max(initial=0.0)
+def _points(corners: np.ndarray) -> int:
+    """Points of a rule for pieces with these corners: the less they are parallelograms the more, for twelve digits."""
+    if corners.shape[1] < 4 or not len(corners):
+        return POINTS
+    bent = np.abs(corners[:, 0] - corners[:, 1] + corners[:, 2] - corners[:, 3]).max(axis=1)
+    bent = (bent / np.ptp(corners, axis=1).max(axis=1)).max()
+    if bent <= STRAIGHT:
+        return POINTS
+    return int(np.clip(np.ceil(2.5 + 6 / np.log10(1 / min(bent, 0.5))), POINTS, MORE))
 
 
 def _axes(normal: np.ndarray) -> np.ndarray:
@@ -287,70 +289,6 @@ def _axes(normal: np.ndarray) -> np.ndarray:
     return np.stack((first, np.cross(normal, first)), axis=1)
 
 
-def _common_intervals(one: np.ndarray, other: np.ndarray, points: int) -> tuple:
-    """Points and weights on the common parts of intervals, and whose they are."""
-    one, other = one[..., 0], other[..., 0]
-    low = np.maximum(one.min(axis=1), other.min(axis=1))
-    length = np.minimum(one.max(axis=1), other.max(axis=1)) - low
-    pair = np.flatnonzero(length > 0.0)
-    at, weight = _gauss(points)
-    x = low[pair, None] + length[pair, None] * at
-    return np.repeat(pair, points), x.reshape(-1, 1), (length[pair, None] * weight).ravel()
-
-
-def _common_triangles(one: np.ndarray, other: np.ndarray, points: int) -> tuple:
-    """Points and weights on the common parts of polygons in the plane, and whose they are."""
-    corners, counts = _kernel.clip(one, other)
-    fans, pair = [], []
-    for k in range(1, corners.shape[1] - 1):
-        some = np.flatnonzero(counts > k + 1)
-        fans.append(corners[some][:, [0, k, k + 1]])
-        pair.append(some)
-    triangles, pair = np.concatenate(fans), np.concatenate(pair)
-    edges = triangles[:, 1:] - triangles[:, :1]
-    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-    # The unit square collapsed on the triangle: its Jacobian is one degree more.
-    at, weight = _gauss(points)
-    s, t = np.meshgrid(at, at, indexing="ij")
-    w = np.outer(weight * at, weight).ravel()
-    local = np.stack((s * (1 - t), s * t), axis=-1).reshape(-1, 2)
-    x = triangles[:, :1] + local @ edges
-    return np.repeat(pair, w.size), x.reshape(-1, 2), (twice[:, None] * w).ravel()
-
-
 def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
     at, weight = np.polynomial.legendre.leggauss(points)
     return 0.5 + 0.5 * at, 0.5 * weight
-
-
-def _on_facet(corners: np.ndarray, local: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Local coordinates of points, ``shape=(q, dim)``, on pieces with these corners in the plane and on the reference facet."""
-    if corners.shape[2] == 1:
-        start, end = corners[:, 0], corners[:, 1]
-        s = (at - start) / (end - start)
-        return local[:, 0] + s * (local[:, 1] - local[:, 0])
-    if corners.shape[1] == 3:
-        edges = corners[:, 1:] - corners[:, :1]
-        s = np.linalg.solve(edges.transpose(0, 2, 1), (at - corners[:, 0])[..., None])[..., 0]
-        return local[:, 0] + np.einsum("qi,qij->qj", s, local[:, 1:] - local[:, :1])
-    s = _on_square(corners, at)
-    weights = np.stack(
-        ((1 - s[:, 0]) * (1 - s[:, 1]), s[:, 0] * (1 - s[:, 1]), s[:, 0] * s[:, 1], (1 - s[:, 0]) * s[:, 1]),
-        axis=1,
-    )  # fmt: skip
-    return np.einsum("qc,qcj->qj", weights, local)
-
-
-def _on_square(corners: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Where on the unit square points are that a quadrilateral's bilinear map takes to ``at``: Newton's method."""
-    a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    d = corners[:, 2] - corners[:, 1] - c
-    s = np.full(at.shape, 0.5)
-    for _ in range(20):
-        left = a + b * s[:, :1] + c * s[:, 1:] + d * s[:, :1] * s[:, 1:] - at
-        slope = np.stack((b + d * s[:, 1:], c + d * s[:, :1]), axis=2)
-        step = np.linalg.solve(slope, left[..., None])[..., 0]
-        s -= step
-        if not (np.abs(step) > 1e-15).any():
-            break
-    return s

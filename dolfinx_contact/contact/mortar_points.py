@@ -9,6 +9,7 @@ PETSc matrix: the opposite nodes may belong to other ranks.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -237,7 +238,6 @@ class MortarPoints(ContactPoints):
         self.share = frozen(np.where(rows.covered, part, 0.0))
         turned = block_diagonal(frames)
         mine = (self.first + dofs).ravel()
-        self._S = self._petsc(turned.indptr, mine[turned.indices], turned.data)
         away = (turned @ sparse.kron(self._m, sparse.eye(self.dim), "csr")).tocoo()
         own = turned.tocoo()
         columns = (mine[own.col], opposite.ravel()[away.col])
@@ -245,7 +245,6 @@ class MortarPoints(ContactPoints):
         B = sparse.coo_matrix((np.append(own.data, -away.data), parts), (dofs.size, self._whole))
         B = B.tocsr()
         self._B = self._petsc(B.indptr, B.indices, B.data)
-        self._sizes = self._petsc(B.indptr, B.indices, np.abs(B.data))
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
@@ -253,6 +252,20 @@ class MortarPoints(ContactPoints):
         csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ravel(values))
         size = ((self.dofs.size, None), (self.size, self._whole))
         return PETSc.Mat().createAIJ(size, csr=csr, comm=self._comm)
+
+    @cached_property
+    def _S(self) -> PETSc.Mat:
+        """Local components of forces on the slave nodes.  Collective."""
+        turned = block_diagonal(self.frames)
+        return self._petsc(
+            turned.indptr, (self.first + self.dofs).ravel()[turned.indices], turned.data
+        )
+
+    @cached_property
+    def _sizes(self) -> PETSc.Mat:
+        """Magnitudes of ``B``.  Collective."""
+        starts, columns, values = self._B.getValuesCSR()
+        return self._petsc(starts, columns, np.abs(values))
 
     def hold(self, held, closed, guided=None, fixed=None) -> None:
         """See ``ContactPoints``; nodes opposite nothing never touch, either."""
