@@ -28,6 +28,7 @@ from dolfinx import fem, mesh
 
 from benchmarks.tables import table
 from dolfinx_contact.compat import functionspace, mixed_functionspace
+from dolfinx_contact.surfaces.surface import rotation_between
 from mechanics.material import elasticity
 from mechanics.scenes import rotation
 
@@ -68,6 +69,8 @@ class Way:
         frame: Orthogonal matrix, the scene's axes as columns.
         part: "whole", "half" of it, or "slab", as thin in the second direction as a cell, and plane.
         form: "linear", "finite", StVenant-Kirchhoff's, or "mixed" with a pressure.
+        free: Motions of the surface that ``at`` drives, forces then, over modulus and area; those that turn with a moment.
+        posed: Whether the surface is made at the origin and moved to its place before anything else.
         driven: Forces that drive the surface along the normal, one for each step; None prescribes it.
         twice: Whether each step is taken back once and made again.
         texture: None, "body" or "surface": axes turned from place to place.
@@ -98,6 +101,8 @@ class Way:
     part: str = "whole"
     form: str = "linear"
     solver: str | None = None
+    free: tuple = ()
+    posed: bool = False
     driven: tuple | None = None
     twice: bool = False
 
@@ -249,7 +254,17 @@ class Played:
             form += stiff * ufl.inner(moved - self.held, test) * ds
         else:
             form -= ufl.inner(self.force, test) * ufl.dx
-        self.surface, self.x = SURFACES[way.surface](way), space.tabulate_dof_coordinates()[:, :d]
+        self.x = space.tabulate_dof_coordinates()[:, :d]
+        self.surface = SURFACES[way.surface](replace(way, frame=np.eye(3)) if way.posed else way)
+        if way.posed:
+            vector = Rotation.from_matrix(way.frame).as_rotvec()
+            self.surface.rotation = vector if d == 3 else vector[2]
+            self.surface.displacement = F @ self.surface.point - self.surface.point
+        self.home, self.pose = self.surface.displacement, self.surface.rotation
+        if way.free:
+            self.surface.free = way.free
+        if way.free and way.surface != "plane":
+            self.surface.guides = F.T
         options = {} if way.weight is None else {"weight": way.weight}
         wear = None if way.wear is None else dc.Wear(way.wear / way.E)
         self.contacts = [dc.Contact(V, side, self.surface, way.mu[0], wear=wear, **options) for side in sides]  # fmt: skip
@@ -276,7 +291,7 @@ class Played:
         if way.d == 2:
             mu = p = mu[0]
         if way.texture is not None:
-            F, L = self.F, way.length
+            F, L = np.eye(3) if way.posed and way.texture == "surface" else self.F, way.length
 
             def grooves(y):
                 x = (F.T @ y[: way.d])[0] / L
@@ -310,7 +325,17 @@ class Played:
                 along[0], along[1] = along[0] - leg.turn * x[:, 1], leg.turn * x[:, 0]
             turned = np.column_stack(along) @ F.T
         held = self.held.x.array
-        held[:] = (body * (L * F @ at + turned)).ravel()[: held.size]
+        if not way.free:
+            held[:] = (body * (L * F @ at + turned)).ravel()[: held.size]
+        if way.free:
+            self.surface.force = way.E * L ** (d - 1) * F @ at
+            if self.surface.spins:
+                arm = L * np.array([0.15, 0.1, 0.0])[:d]
+                if d == 3:
+                    self.surface.moment = way.E * L**2 * sign * F @ np.cross(arm, at)
+                else:
+                    self.surface.moment = way.E * L * sign * arm[0] * at[1]
+            return
         if way.support == "loose" or not way.moves and way.driven is None:
             return
         if way.moves and (leg.turn or leg.tilt):
@@ -320,19 +345,21 @@ class Played:
             body * L * F @ at - L * self._axes().T @ at
         )  # so that the body's motion beside it is the whole one
         if way.driven is not None:
-            moved = moved + (self.surface.displacement - moved) @ F[:, -1] * F[:, -1]
-        self.surface.displacement = moved
+            moved = moved + (self.surface.displacement - self.home - moved) @ F[:, -1] * F[:, -1]
+        self.surface.displacement = self.home + moved
 
     def _axes(self) -> np.ndarray:
         """The scene's axes as rows, those of the surface."""
         turned = self.surface.rotation
-        if not turned.any():
+        if self.way.posed or self.way.free or not turned.any():
             return self.F.T
         angle = turned.copy() if self.way.d == 3 else np.array([0.0, 0.0, turned[0]])
         return self.F.T @ Rotation.from_rotvec(angle).as_matrix()[: self.way.d, : self.way.d].T
 
     def _play(self) -> dict:
         way, found, before = self.way, dict(forces=[], work=[], worn=[]), Leg((0.0, 0.0, 0.0))
+        if way.free:
+            found |= dict(moved=[], turned=[])
         unit = way.E * way.length**2
         share = {"whole": 1.0, "half": 2.0, "slab": float(way.cells[0])}[way.part]
         scale = share / (unit if way.d == 3 else way.E * way.length)
@@ -358,6 +385,13 @@ class Played:
             work, worn = scale / way.length * np.sum(sums, axis=0)
             found["work"].append(work)
             found["worn"].append(worn * way.E)
+            if way.free:
+                sign = np.linalg.det(way.frame)
+                turned = rotation_between(self.pose, self.surface.rotation)
+                found["moved"].append(
+                    self.F.T @ (self.surface.displacement - self.home) / way.length
+                )
+                found["turned"].append(sign * (self.F.T @ turned if way.d == 3 else turned))
         return found
 
 
@@ -382,6 +416,7 @@ TURNS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 4e-6), Leg((0, 0, -4e-5), 2e-5))
 TILTS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 0.0, 5e-6), Leg((2e-5, 0, -4e-5), 0.0, 5e-6))
 WEIGHTS = (Leg((0, 0, -1e-3)), Leg((1e-4, 5e-5, -1e-3)), Leg((-5e-5, 5e-5, -7e-4)))
 FINE = dict(cells=(8, 8, 3))
+LOADS = (Leg((0, 0, 4e-3)), Leg((4e-4, 1e-4, 4e-3)), Leg((-2e-4, 2e-4, 3e-3)))
 SCENES = {
     "plane": Way(**C),
     "plane, 2-D": Way(d=2, cells=(8, 4), legs=ALONG),
@@ -397,6 +432,10 @@ SCENES = {
     "plane, tilted, 2-D": Way(legs=TILTS, d=2, cells=(8, 4)),
     "plane, loose": Way(legs=WEIGHTS, cells=(3, 3, 2), support="loose", **C),
     "plane, loose, 2-D": Way(legs=WEIGHTS, d=2, cells=(6, 3), support="loose"),
+    "platen": Way(legs=LOADS, free=("n", "r1", "r2"), **C),
+    "platen, sheared": Way(legs=LOADS, free=("t1", "t2", "n"), **C),
+    "platen, 2-D": Way(legs=LOADS, free=("t", "n", "r"), d=2, cells=(8, 4)),
+    "ball pressed by force": Way(legs=LOADS, free=("x", "y", "z"), surface="ball", **FINE, **C),
     "wavy": Way(surface="wavy", **C),
     "ball": Way(surface="ball", **FINE, **C),
     "ball, smooth": Way(surface="ball", **FINE, mu=(0.0, 0.0)),
@@ -429,11 +468,11 @@ class Variant(NamedTuple):
 
 
 def _held(name, way):
-    return way.support == "held"
+    return way.support == "held" and not way.free
 
 
 def _flat_or_round(name, way):
-    return way.support == "held" and way.texture != "body"
+    return _held(name, way) and way.texture != "body"
 
 
 # Where nodes land on curved surfaces their slip is an estimate, see docs/surfaces.md.
@@ -445,6 +484,8 @@ VARIANTS = [
     Variant("turned frame, 2-D", dict(frame=SPUN), lambda name, way: way.d == 2),
     Variant("axes permuted", dict(frame=PERMUTED), lambda name, way: way.d == 3),
     Variant("axes swapped, 2-D", dict(frame=SWAPPED), lambda name, way: way.d == 2),
+    Variant("put into place, 3-D", dict(frame=TURNED, posed=True), lambda name, way: way.d == 3 and "tilted" not in name and way.surface != "wavy" and "turned" not in name),
+    Variant("put into place, 2-D", dict(frame=SPUN, posed=True), lambda name, way: way.d == 2 and "tilted" not in name),
     Variant("mirrored", dict(frame=MIRRORED), lambda name, way: way.texture is None),
     Variant("mm instead of m", dict(length=1e3, E=2e-4)),
     Variant("tiny", dict(length=1e-6, E=2e11)),
@@ -459,12 +500,12 @@ VARIANTS = [
     Variant("FixedPoint", dict(solver="FixedPoint")),
     Variant("CondensedNewton", dict(solver="CondensedNewton"), lambda name, way: way.form != "finite"),
     Variant("SparseNewton", dict(solver="SparseNewton"), _held),
-    Variant("plane as level set", dict(surface="level set"), lambda name, way: way.surface == "plane" and way.support == "held", 2e-4),
-    Variant("plane as huge ball", dict(surface="ball", radius=1e5), lambda name, way: way.surface == "plane" and way.support == "held" and "turned" not in name and "tilted" not in name, 5e-3),
+    Variant("plane as level set", dict(surface="level set"), lambda name, way: way.surface == "plane" and _held(name, way), 2e-4),
+    Variant("plane as huge ball", dict(surface="ball", radius=1e5), lambda name, way: way.surface == "plane" and _held(name, way) and "turned" not in name and "tilted" not in name, 5e-3),
     Variant("ball as function", dict(surface="ball as function"), lambda name, way: way.surface == "ball", 2e-4),
     Variant("roll as function", dict(surface="roll as function"), lambda name, way: way.surface == "roll", 2e-4),
     Variant("in steps", dict(steps=3), lambda name, way: way.mu[0] == 0.0, 1e-5),
-    Variant("driven by its force", lambda played: dict(driven=tuple(played.pressing)), lambda name, way: way.support == "held" and "tilted" not in name and way.texture is None, 5e-4),
+    Variant("driven by its force", lambda played: dict(driven=tuple(played.pressing)), lambda name, way: _held(name, way) and "tilted" not in name and way.texture is None, 5e-4),
     Variant("thin slab", dict(d=3, cells=(8, 8, 4), part="slab"), lambda name, way: name in ("plane, 2-D", "plane, tilted, 2-D")),
     Variant("thin slab on a roll", dict(d=3, cells=(16, 16, 6), part="slab", surface="roll", mu=(0.3, 0.3)), lambda name, way: name == "circle", 1e-5),
 ]  # fmt: skip

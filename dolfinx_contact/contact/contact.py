@@ -46,6 +46,10 @@ if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # before 0.6 it has another name
 
 
+# Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
+TILTED = 0.01
+
+
 class Contact(Guarded):
     """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
 
@@ -570,6 +574,7 @@ class Contact(Guarded):
             self.take(displacement=self._placement.turned_past(self.displacement))
         self._history.settle(law, work.sum(axis=1), path, depth, kept)
         self._placement.end()
+        self._renew_area()
         self._settle_here()
 
     @property
@@ -763,8 +768,17 @@ class Contact(Guarded):
         do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
         """
         if self._area is None:
-            self._area = frozen(fields.facing_areas(self, self._weight))
+            self._area, self._area_of = frozen(fields.facing_areas(self, self._weight)), self.surface.rotation  # fmt: skip
         return frozen(self._area * self.covered) if self.surface.deformable else self._area
+
+    def _renew_area(self) -> None:
+        """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""
+        if self._area is None or self.surface.curved or self.surface.deformable:
+            return
+        turned = self.surface.rotation
+        if np.abs(turned - self._area_of).max() > TILTED:
+            self._area = None
+            _ = self.area
 
     @property
     def opposite(self) -> np.ndarray:

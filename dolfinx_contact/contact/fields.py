@@ -83,7 +83,7 @@ def facing_areas(contact, weight) -> np.ndarray:
     towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
     at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)
     x = V.tabulate_dof_coordinates()[at, :dim]
-    frames = surface.frames(surface.relative(x) if surface.curved else x)
+    frames = surface.turned(surface.frames(surface.relative(x) if surface.curved else x))
     towards.x.array.reshape(-1, dim)[at] = frames[..., -1, :]
     density = -ufl.inner(n_f, v) if not surface.curved else v[0]
     faces = ufl.conditional(ufl.lt(ufl.inner(n_f, towards), 0.0), density, 0.0)

@@ -20,7 +20,7 @@ SAMPLE = [("plane, 2-D", said) for name, said in ALL if name == "plane, 2-D"]
 def agrees(name, said):
     way, change, tol = ALL[name, said]
     outcome, off, why = judged(Played(way), change, tol)
-    assert outcome == "agrees", (off, why)
+    assert outcome in ("agrees", "told"), (off, why)
 
 
 @pytest.mark.parametrize("name, said", MENDED)

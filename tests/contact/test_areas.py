@@ -258,3 +258,37 @@ def test_two_contacts_on_one_face_are_one_with_the_mean_at_their_edge(solver, di
         assert sum(apart) == pytest.approx(whole[0], rel=1e-6, abs=1e-6)
     (friction, *_, normal), (other, *_, rest) = found[2]  # all slides
     assert (-friction, -other) == pytest.approx((0.3 * normal, 0.1 * rest), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["plane", "ball"])
+def test_a_surface_that_was_turned_into_place_sees_the_same_areas(kind):
+    """A plane made upright and laid down, a ball upside down: areas, pressures and worn depths as of one made in place."""
+    found = []
+    for turned in (False, True):
+        if kind == "plane":
+            surface = dc.RigidPlane((0, 0, 0), (1, 0, 0) if turned else (0, 0, 1), (0, 1, 0))
+            angle = (0, -np.pi / 2, 0)
+        else:
+            surface = dc.RigidSphere((0.5, 0.5, -3), 3.0)
+            angle = (np.pi, 0, 0)
+        if turned:
+            surface.rotation = angle
+        problem, contact, held = cube(surface=surface, wear=dc.Wear(1e-4))
+        for way in (0.0, 0.1):
+            held.value = (0, way, -0.01)
+            problem.solve()
+        sums = contact.area.sum(), contact.pressure.sum(), contact.wear_depth.sum()
+        found.append(COMM.allreduce(np.array(sums)))
+    assert (found[0] > 0.0).all()
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+def test_a_plane_that_tilts_sees_less_of_a_face():
+    """By 0.3 radians after areas were asked for: the cosine of it is left."""
+    problem, contact, held = cube()
+    held.value = (0, 0, 0.2)
+    problem.solve()
+    before = COMM.allreduce(contact.area.sum())
+    contact.surface.rotation = (0, 0.3, 0)
+    problem.solve()
+    assert COMM.allreduce(contact.area.sum()) == pytest.approx(before * np.cos(0.3), rel=1e-9)
