@@ -62,7 +62,7 @@ class ElasticBody(OverRanks):
         self.options = default if options is None else dict(options)
         self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest, self._load_digest = None, None
-        self._assemblies = 0
+        self.assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
         self.closed = self._said = False
@@ -90,7 +90,7 @@ class ElasticBody(OverRanks):
         # That of all ranks' parts: whether it is another one is the same on all.
         digest = digest_of((), *self.comm.allgather(digest_of(self._parameters, self.fixed)))
         if digest == self._digest:
-            return self._assemblies
+            return self.assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
         self._assemble()
         with raised_together(self.comm):
@@ -99,7 +99,7 @@ class ElasticBody(OverRanks):
         self._hold()
         self.soft, self.loose = rigid_motion.soft_motions(self)
         self._digest = digest
-        return self._assemblies
+        return self.assemblies
 
     def _assemble(self) -> None:
         """The stiffness, nothing held yet.  Collective."""
@@ -121,7 +121,7 @@ class ElasticBody(OverRanks):
         entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
         self._row_size = np.sqrt(entries) * diagonal
         self._right, self._left = self.K.createVecs()
-        self._assemblies += 1
+        self.assemblies += 1
 
     def _hold(self) -> None:
         """Keep the forces of boundary values; then rows and columns of fixed dofs become the identity's."""

@@ -119,7 +119,7 @@ class NonlinearBody(ElasticBody):
                         "Dirichlet conditions, or add a soft spring to F."
                     )
                 self.soft = soft
-        return self._assemblies
+        return self.assemblies
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:
         """Boundary values of this step, and the external forces ``-F(0)``.

@@ -142,6 +142,11 @@ class ContactPoints:
             (kept.ravel(), columns.ravel(), starts), (len(starts) - 1, self._whole)
         )
 
+    @property
+    def reach(self) -> np.ndarray:
+        """Global numbers of all degrees of freedom that rows may have, now or when bodies have slid, ``shape=(k,)``."""
+        return (self.dofs + self.first).ravel()
+
     def free_of(self, fixed: np.ndarray) -> np.ndarray:
         """Length of what boundary conditions leave of each local direction, ``shape=(n, gdim)``: 1, 0 or a part."""
         free = ~np.isin(self.dofs, fixed)

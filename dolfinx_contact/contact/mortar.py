@@ -17,6 +17,7 @@ the dual shape functions, which are biorthogonal and sum up to one whatever part
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -289,6 +290,7 @@ def _axes(normal: np.ndarray) -> np.ndarray:
     return np.stack((first, np.cross(normal, first)), axis=1)
 
 
+@lru_cache
 def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
     at, weight = np.polynomial.legendre.leggauss(points)
     return 0.5 + 0.5 * at, 0.5 * weight

@@ -343,6 +343,11 @@ class MortarPoints(ContactPoints):
         own = np.where(out, 0.0, 1.0).ravel()
         return (sparse.diags(own) @ turned @ B).tocsr()
 
+    @property
+    def reach(self) -> np.ndarray:
+        """See ``ContactPoints``."""
+        return np.append(super().reach, self._opposite)
+
     def stiffness(self, K) -> NodalStiffness:
         """See ``ContactPoints``: of springs in series, ``1/k = 1/k_a + sum_b m_ab^2 / k_b``, as matrices along slip.  Collective."""
         alone = super().stiffness(K)

@@ -242,3 +242,22 @@ def test_what_makes_no_sense_is_refused():
     scene = blocks("quadrilateral", 1, ((2, 2), (3, 2)))
     with pytest.raises(ValueError, match="sliding must be one of large, small, got 'huge'"):
         dc.DeformableSurface(scene.V, scene.contact.surface.facets, sliding="huge")
+
+
+def test_compliance_from_columns_kept():
+    """After slides W, made of columns that earlier rows needed too, is the motion of the nodes by unit reactions."""
+    scene = blocks("hexahedron", 1, ((2, 2, 1), (6, 6, 1)), size=(1.0, 2.0), sliding="large", solver=dc.CondensedNewton(), tol=1e-8)  # fmt: skip
+    for k in range(4):
+        scene.way.value[:] = (0.2 * k, 0.1 * k, -0.01)
+        scene.problem.solve()
+    W, points, body = scene.problem.bound().compliance(), scene.contact.points, scene.problem.body
+    assert W.shape[0] == (27 if COMM.rank == 0 else 0)
+    if COMM.size > 1:  # units of a rank's nodes would be units of all ranks'
+        return
+    moved = []
+    for unit in np.eye(27):
+        forces = np.zeros(points.size)
+        points.add_forces(unit.reshape(9, 3), forces)
+        forces[body.fixed] = 0.0
+        moved.append(points.motion(body.solve(forces)).ravel())
+    assert np.abs(W - moved).max() <= 1e-12 * W.max()

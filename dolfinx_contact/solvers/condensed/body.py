@@ -15,7 +15,9 @@ from scipy import sparse
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
+    Responses,
     Rows,
+    available_first,
     bytes_needed,
     check_memory,
     compliance,
@@ -60,6 +62,7 @@ class CondensedBody:
 
     def __init__(self, options, body, contacts, stiffness, memory):
         self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
+        self._memory = memory
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
         self._held_by, self._shared = body.anchors or body, self._any_shared()
@@ -256,7 +259,22 @@ class CondensedBody:
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
+        slides = any(c.surface.deformable and c.changes for c in self._contacts)
+        if slides and not self._body.nonlinear:
+            kept = self._responses()
+            if 2 * kept.bytes_needed(self._parts) <= available_first(self.comm):
+                return kept.compliance(self._held_by, self._parts)
         return compliance(self._held_by, self._parts)
+
+    def _responses(self) -> Responses:
+        """Columns of ``K^-1`` that rows of surfaces on which bodies slide have needed so far, of the present stiffness.  Collective."""
+        made, kept = self._memory.get("responses", (None, None))
+        if made != self._body.assemblies:
+            reach = [contact.points.reach for contact in self._contacts]
+            anchored = self._parts[1].all.indices
+            kept = Responses(np.unique(np.concatenate([*self.comm.allgather(np.concatenate(reach)), anchored])))  # fmt: skip
+            self._memory["responses"] = self._body.assemblies, kept
+        return kept
 
     def _rows(self) -> Rows:
         """One row per local direction of a node: its global components, none at fixed dofs."""

@@ -13,6 +13,7 @@ from dolfinx_contact.support.checks import free_memory
 
 UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
+_COLUMNS = 60  # of A^-1 at a time, of whole nodes in two and three dimensions
 _MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
 
 
@@ -76,6 +77,64 @@ def compliance(solver, rows: list[Rows]) -> np.ndarray:
     return W
 
 
+class Responses:
+    """``A^-1`` between the degrees of freedom that rows may ever have, solved for a block of columns at a time when rows need it.
+
+    Rows of deformable surfaces change as bodies slide; ``A`` stays.  Blocks do not depend on who asked first, so that W does not.
+
+    Args:
+        dofs: Global numbers, sorted, the same on all ranks, ``shape=(m,)``.
+    """
+
+    def __init__(self, dofs: np.ndarray):
+        self.dofs, self._solved = dofs, set()
+        self._blocks: dict[int, np.ndarray] = {}  # on rank 0, (m, columns)
+
+    def needed(self, rows: list[Rows]) -> list[int]:
+        """Blocks that these rows need."""
+        dofs = np.concatenate([part.all.indices for part in rows])
+        return np.unique(np.searchsorted(self.dofs, dofs) // _COLUMNS).tolist()
+
+    def bytes_needed(self, rows: list[Rows]) -> int:
+        """Bytes of the blocks with those of these rows."""
+        return 8 * self.dofs.size * _COLUMNS * len(self._solved.union(self.needed(rows)))
+
+    def compliance(self, solver, rows: list[Rows]) -> np.ndarray:
+        """As the function of this name."""
+        comm, needed = rows[0].comm, self.needed(rows)
+        self._solve(solver, comm, [k for k in needed if k not in self._solved])
+        if comm.rank > 0:
+            return np.zeros((0, 0))
+        loads = sparse.vstack([part.all for part in rows]).tocsr()
+        shape = loads.shape[0], self.dofs.size
+        at = np.searchsorted(self.dofs, loads.indices)
+        R = sparse.csc_matrix(sparse.csr_matrix((loads.data, at, loads.indptr), shape))
+        moved = np.zeros(shape)
+        for k in needed:
+            part = slice(k * _COLUMNS, (k + 1) * _COLUMNS)
+            moved += R[:, part] @ self._blocks[k].T
+        W = R.tocsr() @ moved.T
+        return (W + W.T) / 2
+
+    def _solve(self, solver, comm, blocks: list[int]) -> None:
+        """Add blocks of columns.  Collective."""
+        A = solver.ksp.getOperators()[0]
+        first, last = A.getOwnershipRange()
+        mine = (self.dofs >= first) & (self.dofs < last)
+        solve = block_solver(solver.ksp) if blocks else None
+        for k in blocks:
+            columns = self.dofs[k * _COLUMNS : (k + 1) * _COLUMNS]
+            count = columns.size
+            units = (np.ones(count), columns, np.arange(count + 1))
+            answer = solve(sparse.csr_matrix(units, (count, A.getSize()[0])))
+            part = np.zeros((self.dofs.size, count))
+            part[mine] = answer[self.dofs[mine] - first]
+            found = comm.reduce(part, root=0)
+            if comm.rank == 0:
+                self._blocks[k] = found
+            self._solved.add(k)
+
+
 def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
     """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
 
@@ -101,18 +160,18 @@ def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
     return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
 
 
-def _available_first(comm) -> float:
+def available_first(comm) -> float:
     """What rank 0 has free, which holds W, on all ranks.  Collective."""
     return comm.bcast(free_memory() if comm.rank == 0 else None)
 
 
 def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
     """Whether W would fit into half of the memory that rank 0 has free."""
-    return 2 * bytes_needed(nodes, dim, unknowns) <= _available_first(comm)
+    return 2 * bytes_needed(nodes, dim, unknowns) <= available_first(comm)
 
 
 def check_memory(comm, needed: int) -> None:
-    available = _available_first(comm)
+    available = available_first(comm)
     if needed > available:
         raise MemoryError(
             f"the condensed operator needs about {needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are "
