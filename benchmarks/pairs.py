@@ -28,6 +28,7 @@ from dolfinx import fem, mesh
 
 from benchmarks.tables import table
 from dolfinx_contact.compat import functionspace, mixed_functionspace
+from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.surfaces.surface import rotation_between
 from mechanics.material import elasticity
 from mechanics.scenes import rotation
@@ -70,6 +71,9 @@ class Way:
         part: "whole", "half" of it, or "slab", as thin in the second direction as a cell, and plane.
         form: "linear", "finite", StVenant-Kirchhoff's, or "mixed" with a pressure.
         free: Motions of the surface that ``at`` drives, forces then, over modulus and area; those that turn with a moment.
+        away: How far from the origin of coordinates the scene is, over its edge.
+        guess: Whether ``u`` holds nonsense when a step begins.
+        petsc: Options of the linear solver.
         posed: Whether the surface is made at the origin and moved to its place before anything else.
         driven: Forces that drive the surface along the normal, one for each step; None prescribes it.
         twice: Whether each step is taken back once and made again.
@@ -103,8 +107,16 @@ class Way:
     solver: str | None = None
     free: tuple = ()
     posed: bool = False
+    away: float = 0.0
+    guess: bool = False
+    petsc: dict | None = None
     driven: tuple | None = None
     twice: bool = False
+
+    @property
+    def base(self) -> np.ndarray:
+        """The middle of the foot, ``shape=(d,)``."""
+        return self.away * self.length * np.array([1.0, -0.7, 0.4])[: self.d]
 
 
 # -- surfaces, the scene's axes and lengths -----------------------------------------------------
@@ -113,7 +125,7 @@ class Way:
 def _round(way, function=False, inside=False):
     d, R = way.d, way.radius * way.length
     F = way.frame[:d, :d]
-    centre = F @ np.eye(d)[-1] * (R if inside else -R)
+    centre = way.base + F @ np.eye(d)[-1] * (R if inside else -R)
     axis = None if d == 2 else F[:, 0]
     if not function:
         return dc.RigidSphere(centre, R, axis=axis, inside=inside)
@@ -127,28 +139,27 @@ def _round(way, function=False, inside=False):
 def _roll(way, function=False):
     F, R = way.frame, way.radius * way.length
     if not function:
-        return dc.RigidCylinder(-R * F[:, 2], F[:, 1], R)
-    middle = np.zeros(3)
+        return dc.RigidCylinder(way.base - R * F[:, 2], F[:, 1], R)
 
     def distance(y):
-        x, _, z = F.T @ y
+        x, _, z = F.T @ (y - way.base[:, None])
         return np.hypot(x, z + R) - R
 
-    return dc.RigidSurface(distance, point=middle - R * F[:, 2], axis=F[:, 1])
+    return dc.RigidSurface(distance, point=way.base - R * F[:, 2], axis=F[:, 1])
 
 
 def _plane(way, height=None):
     d = way.d
     F = way.frame[:d, :d]
     axis = None if d == 2 else F[:, 0]
-    return dc.RigidPlane(np.zeros(d), F[:, -1], axis, height=height)
+    return dc.RigidPlane(way.base, F[:, -1], axis, height=height)
 
 
 def _wavy(way, function=False):
     F, L = way.frame[: way.d, : way.d], way.length
 
     def height(y):
-        return 1e-3 * L * (np.cos(2 * np.pi * (F.T @ y)[0] / L) - 1.0)
+        return 1e-3 * L * (np.cos(2 * np.pi * (F.T @ (y - way.base[:, None]))[0] / L) - 1.0)
 
     return _plane(way, height)
 
@@ -156,7 +167,11 @@ def _wavy(way, function=False):
 def _flat(way):
     F = way.frame[: way.d, : way.d]
     axis = None if way.d == 2 else F[:, 0]
-    return dc.RigidSurface(lambda y: 7.0 * (F.T @ y)[-1], point=np.zeros(way.d), axis=axis)
+
+    def height(y):
+        return 7.0 * (F.T @ (y - way.base[:, None]))[-1]
+
+    return dc.RigidSurface(height, point=way.base, axis=axis)
 
 
 SURFACES = {
@@ -235,7 +250,7 @@ class Played:
             last = d - 1
             first = mesh.locate_entities_boundary(domain, last, lambda x: np.isclose(x[last], 0) & (x[0] < 1e-9))  # fmt: skip
             sides = [first, np.setdiff1d(foot, first)]
-        domain.geometry.x[:, :d] = way.length * domain.geometry.x[:, :d] @ F.T
+        domain.geometry.x[:, :d] = way.base + way.length * domain.geometry.x[:, :d] @ F.T
         lagrange, mixed = ("Lagrange", way.order, (d,)), way.form == "mixed"
         V = mixed_functionspace(domain, [lagrange, ("Lagrange", 1)]) if mixed else functionspace(domain, lagrange)  # fmt: skip
         part = V.sub(0) if mixed else V
@@ -259,7 +274,8 @@ class Played:
         if way.posed:
             vector = Rotation.from_matrix(way.frame).as_rotvec()
             self.surface.rotation = vector if d == 3 else vector[2]
-            self.surface.displacement = F @ self.surface.point - self.surface.point
+            arm = self.surface.point - way.base
+            self.surface.displacement = F @ arm - arm
         self.home, self.pose = self.surface.displacement, self.surface.rotation
         if way.free:
             self.surface.free = way.free
@@ -271,7 +287,7 @@ class Played:
         for contact in self.contacts:
             contact.friction = self._friction(contact, space)
         solver = None if way.solver is None else getattr(dc, way.solver)()
-        self.problem = dc.ContactProblem(form, u, self.contacts, bcs=bcs, solver=solver, tol=1e-10, geometry_tol=1e-6)  # fmt: skip
+        self.problem = dc.ContactProblem(form, u, self.contacts, bcs=bcs, solver=solver, tol=1e-10, geometry_tol=1e-6, petsc_options=way.petsc)  # fmt: skip
 
     def _symmetry(self, V, domain, facets):
         way, zero, found = self.way, fem.Constant(domain, 0.0), []
@@ -294,7 +310,7 @@ class Played:
             F, L = np.eye(3) if way.posed and way.texture == "surface" else self.F, way.length
 
             def grooves(y):
-                x = (F.T @ y[: way.d])[0] / L
+                x = (F.T @ (y[: way.d] - way.base[:, None]))[0] / L
                 return np.array([np.cos(0.3 + x), np.sin(0.3 + x)])
 
             axes = dict(axes=grooves, of=way.texture)
@@ -319,11 +335,14 @@ class Played:
             self.force.value[:] = way.E / (0.6 * L) * F @ at
         turned = np.zeros_like(self.x)
         if leg.turn or leg.tilt:  # the scene's axes
-            x = self.x @ F
+            x = (self.x - way.base) @ F
             along = [-leg.tilt * x[:, -1], *([0 * x[:, 0]] * (d - 2)), leg.tilt * x[:, 0]]
             if d == 3:
                 along[0], along[1] = along[0] - leg.turn * x[:, 1], leg.turn * x[:, 0]
-            turned = np.column_stack(along) @ F.T
+            if way.form == "finite":
+                c, s = np.cos(body * leg.turn) - 1.0, np.sin(body * leg.turn)
+                along[0], along[1] = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
+            turned = np.column_stack(along) @ F.T / (body if way.form == "finite" and body else 1.0)
         held = self.held.x.array
         if not way.free:
             held[:] = (body * (L * F @ at + turned)).ravel()[: held.size]
@@ -370,6 +389,9 @@ class Played:
                 if way.driven is not None:
                     self.surface.free = ("n",) if way.surface in ("plane", "wavy") else ("zyx"[3 - way.d],)  # fmt: skip
                     self.surface.force = next(driven) / scale * self.F[:, -1]
+                if way.guess:
+                    u = self.problem.u.x.array
+                    u[:] = 0.01 * way.length * np.random.default_rng(1).normal(size=u.size)
                 self.problem.solve()
                 if way.twice:
                     self.problem.rewind()
@@ -414,6 +436,8 @@ C = dict(mu=(0.3, 0.15), p=(0.05, 0.20))
 # Where body or surface turns little is pressed: stresses of a linear body do not turn, an error of their part of E.
 TURNS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 4e-6), Leg((0, 0, -4e-5), 2e-5))
 TILTS = (Leg((0, 0, -4e-5)), Leg((0, 0, -4e-5), 0.0, 5e-6), Leg((2e-5, 0, -4e-5), 0.0, 5e-6))
+FAR = (Leg((0, 0, -0.004)), Leg((0, 0, -0.004), 0.15), Leg((0.1, 0.05, -0.004), 0.3))
+TURNED_BALL = (Leg((0, 0, -4e-3)), Leg((0, 0, -4e-3), 4e-4), Leg((0, 0, -4e-3), 2e-3))
 WEIGHTS = (Leg((0, 0, -1e-3)), Leg((1e-4, 5e-5, -1e-3)), Leg((-5e-5, 5e-5, -7e-4)))
 FINE = dict(cells=(8, 8, 3))
 LOADS = (Leg((0, 0, 4e-3)), Leg((4e-4, 1e-4, 4e-3)), Leg((-2e-4, 2e-4, 3e-3)))
@@ -427,6 +451,8 @@ SCENES = {
     "plane, worn": Way(wear=0.5, **C),
     "plane, textured body": Way(texture="body", **C),
     "plane, textured surface": Way(texture="surface", **C),
+    "plane, finite strain, turned far": Way(cells=(3, 3, 2), form="finite", legs=FAR, steps=4, **C),
+    "ball, turned": Way(surface="ball", legs=TURNED_BALL, **FINE, **C),
     "plane, turned": Way(legs=TURNS, **C),
     "plane, tilted": Way(legs=TILTS, **C),
     "plane, tilted, 2-D": Way(legs=TILTS, d=2, cells=(8, 4)),
@@ -472,7 +498,7 @@ def _held(name, way):
 
 
 def _flat_or_round(name, way):
-    return _held(name, way) and way.texture != "body"
+    return _held(name, way) and way.texture != "body" and name not in ROUGHLY
 
 
 # Where nodes land on curved surfaces their slip is an estimate, see docs/surfaces.md.
@@ -497,6 +523,9 @@ VARIANTS = [
     Variant("exponent of friction", dict(given="k"), lambda name, way: way.d == 3 and len(set(way.mu)) > 1),
     Variant("weight one", dict(weight=1.0)),
     Variant("taken back and made again", dict(twice=True)),
+    Variant("far from the origin", dict(away=1e4), tol=1e-5),
+    Variant("from a nonsensical guess", dict(guess=True), lambda name, way: way.form != "finite"),
+    Variant("by multigrid", dict(petsc=MULTIGRID, solver="FixedPoint"), lambda name, way: way.form != "mixed"),
     Variant("FixedPoint", dict(solver="FixedPoint")),
     Variant("CondensedNewton", dict(solver="CondensedNewton"), lambda name, way: way.form != "finite"),
     Variant("SparseNewton", dict(solver="SparseNewton"), _held),
@@ -510,7 +539,10 @@ VARIANTS = [
     Variant("thin slab on a roll", dict(d=3, cells=(16, 16, 6), part="slab", surface="roll", mu=(0.3, 0.3)), lambda name, way: name == "circle", 1e-5),
 ]  # fmt: skip
 # Scenes apart: halves, orders, small strains.
+# What goes round within a step has friction along its chord or at its end; stresses of the ball's block do not turn.
+ROUGHLY = {"plane, finite strain, turned far": 0.05, "ball, turned": 0.01}
 APART = [
+    *((name, SCENES[name], "the surface moves", dict(moves=1.0), tol) for name, tol in ROUGHLY.items()),
     ("ball, half", Way(legs=DOWN, surface="ball", **FINE, **C), "half", dict(part="half"), 1e-6),
     ("circle, half", Way(legs=DOWN, surface="ball", d=2, cells=(16, 6)), "half", dict(part="half"), 1e-6),
     ("plane, half", Way(legs=DOWN, **C), "half", dict(part="half"), 1e-6),
