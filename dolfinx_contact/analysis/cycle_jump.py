@@ -108,6 +108,14 @@ def cycle_jump(
     Raises:
         NotConverged: a step of cycles simulated one by one did not converge; after any error the problem is at the end of the last jump.
         ValueError: no contact wears, numbers that make no sense, a folder of another programme.
+
+    Example:
+        >>> def cycle(done):
+        ...     for way in (0.002, 0.0):
+        ...         held.value = (way, 0, -0.01)
+        ...         problem.solve()
+        >>> dc.cycle_jump(problem, cycle, 4).table[-1]["cycle"]
+        4
     """
     comm = problem.body.comm
     with raised_together(comm):
