@@ -15,8 +15,8 @@
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad x_n = \frac{x^2}{2R} + u_n + w \ge 0, \quad p \ge 0, \quad x_n\, p = 0,
 #    \quad |q| \le \mu p, \qquad \dot w = -k\, q\, \dot u_t , $$
 #
-# the last being Archard's law with $k = K / \mu H$, which `dc.Wear` takes after every step: what a step wears opens
-# the gap of the next. The rig keeps the load: after every step the approach of the far boundary is corrected by what
+# the last being Archard's law with $k = K / \mu H$, which `dc.Wear(k, explicit=True)` takes after every step: what a step
+# wears opens the gap of the next, and the volume is that of the work $D$. The rig keeps the load: after every step the approach of the far boundary is corrected by what
 # is missing in $P$ over the stiffness of the contact.
 #
 # ## What must come out
@@ -117,7 +117,7 @@ def main() -> list[dict]:
     assert abs(found[1] / found[0] - 1) < 1e-3
     assert 0 < 3 * lacking[1] < lacking[0] < 0.06  # towards a quarter
 
-    history, load, profiles = fret(4, dc.Wear(COEFFICIENT))
+    history, load, profiles = fret(4, dc.Wear(COEFFICIENT, explicit=True))
     dissipated = history.column("contact0_dissipation")
     volume = history.column("contact0_worn_volume")
     assert (np.abs(volume / (COEFFICIENT * dissipated) - 1) < 1e-12).all()

@@ -383,14 +383,14 @@ class ContactProblem(Guarded):
 
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """The step that has judged what the solver takes for the solution, and that."""
-        step, found = self._with_friction(self.load_step())
+        step, found = self._worn(self.load_step())
         if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
             for contact in self.contacts:
                 contact.restore()
             step = self.load_step(step.holding)
             if step.holding.beyond:
                 return step, unmoved(self.body, step, self._states.last)
-            step, found = self._with_friction(step)
+            step, found = self._worn(step)
         return step, found
 
     def _at_its_end(self, step, found) -> tuple[LoadStep, SolverResult, float, str]:
@@ -438,7 +438,33 @@ class ContactProblem(Guarded):
         step = self.load_step(step.holding, end)
         for contact, before in zip(self.contacts, placed):
             contact.placement.count_as(before)
-        return self._with_friction(step)
+        return self._worn(step)
+
+    def _worn(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+        """What is found with the depths that the step itself wears.  Collective."""
+        worn = [both for both in zip(self.contacts, step.stiffness) if both[0].wears_within]
+        if not worn:
+            return self._with_friction(step)
+        from dolfinx_contact.step import wearing
+
+        contacts, stiffness = map(list, zip(*worn))
+        depths = wearing.Wearing(self.body, contacts, stiffness, self.geometry_tol)
+        rounds, iterations, known = 0, 0, None
+        while True:
+            step, found = self._with_friction(step)
+            known = self._keep_one_start(known)
+            rounds, iterations = rounds + 1, iterations + found.iterations
+            if not step.errors.within(step.tol) or depths.settled(step.scale):
+                break
+            if rounds == wearing.MOST:
+                found = found._replace(forward_error=np.inf)
+                break
+            step = step.with_laws_of(found.x)
+        if rounds > 1:
+            said = f"{rounds} times with the depth that the step wears"
+            reason = f"{found.reason}; {said}" if found.reason else said
+            found = found._replace(iterations=iterations, reason=reason)
+        return step, found
 
     def _with_friction(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
         """What is found with friction that belongs to the state found.  Collective.

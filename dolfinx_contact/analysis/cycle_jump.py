@@ -28,6 +28,9 @@ SHORTEST = 2
 # Jumps aim at this part of the accuracy; from one to the next they grow and shrink by these factors at most.
 SAFETY, GROW, SHRINK = 0.7, 4.0, 0.1
 
+# Part of all that is worn, of which a jump may have the accuracy as its own error, however little it wears itself.
+SHARE = 0.05
+
 RECORD = "record.json"
 
 ERRORS = ("volume_error", "depth_error", "profile_error")
@@ -87,9 +90,9 @@ def cycle_jump(
 
     In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  Two
     runs go side by side: a coarse one with a simulated cycle for each jump, and a fine one with two, each for half of it.  The fine
-    one is the result, their difference its estimated error: of a method of first order, half of the coarse one's.  A jump whose
-    error exceeds ``accuracy`` at its end, or in which a step does not converge, is made again, shorter; lengths are chosen so that
-    the profile that a jump wears has that error.  The halves of the shortest jump are two cycles simulated one by one, so programmes
+    one is the result, their difference its estimated error: of a method of first order, half of the coarse one's.  Lengths are
+    chosen so that what a jump adds to this is ``accuracy`` of what it wears, or a twentieth of that of all that is worn; a jump that adds more,
+    or in which a step does not converge, is made again, shorter.  The halves of the shortest jump are two cycles simulated one by one, so programmes
     begin with these: as long as stick and slip have not settled, twice the first is not the first and the second.
 
     Args:
@@ -214,8 +217,8 @@ class _Run:
         coarse = fine and self._through(self.coarse, [length], plain and not exact)
         volume, depth, errors, local = self._compared(fine, coarse)
         coarse, errors = (fine, [0.0] * len(ERRORS)) if exact else (coarse, errors)
-        accepted = plain or max(errors) <= self._accuracy
-        over = max(local, *errors) / (SAFETY * self._accuracy)
+        accepted = plain or local <= self._accuracy
+        over = local / (SAFETY * self._accuracy)
         factor = min(max(1.0 / over, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
         self.record["next"] = max(factor * length, float(SHORTEST))
         if not accepted:
@@ -252,7 +255,7 @@ class _Run:
             contact.repeats = times
 
     def _compared(self, fine, coarse) -> tuple[float, float, list[float], float]:
-        """Volume and largest depth of a jump, their errors with that of the profile, and the latter's part that this jump has made.
+        """Volume and largest depth at the end of a jump, the errors, and those that this jump has made, over what it wears.
 
         All reduced over the ranks.  Errors are infinite where a run did not converge.
         """
@@ -260,19 +263,16 @@ class _Run:
             return 0.0, 0.0, [np.inf] * len(ERRORS), np.inf
         body, area = self.problem.body, self._area
         other = fine if coarse is None else coarse
-        off = fine[1] - other[1]
-        before = self.fine[1] - self.coarse[1]
-        integrals = (fine[1], fine[1] - self.fine[1], off, np.abs(off), np.abs(off - before))
-        volume, worn, missing, profile, local = map(
-            float, body.total([area @ of for of in integrals])
+        worn, off = fine[1] - self.fine[1], fine[1] - other[1]
+        made = off - (self.fine[1] - self.coarse[1])
+        integrals = [area @ of for of in (fine[1], worn, off, np.abs(off), np.abs(made))]
+        volume, more, missing, profile, new = map(float, body.total(integrals))
+        depth, deeper, most, highest = (
+            body.largest(np.abs(of)) for of in (fine[1], worn, off, made)
         )
-        depth, most = body.largest(fine[1]), body.largest(np.abs(off))
-        errors = [
-            _part(abs(missing), volume),
-            _part(most, depth),
-            _part(profile, volume),
-        ]
-        return volume, depth, errors, np.inf if coarse is None else _part(local, worn)
+        errors = [_part(abs(missing), volume), _part(most, depth), _part(profile, volume)]
+        local = max(_part(new, more + SHARE * volume), _part(highest, deeper + SHARE * depth))
+        return volume, depth, errors, np.inf if coarse is None else local
 
 
 def _part(of: float, whole: float) -> float:

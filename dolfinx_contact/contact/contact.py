@@ -115,7 +115,7 @@ class Contact(Guarded):
         self.nodes, self.left_out = map(frozen, nodes)
         self.x = frozen(self.displacements.x[self.nodes])
         self._area: np.ndarray | None = None
-        self._repeats = 1.0
+        self._repeats, self._wearing = 1.0, None
         self._axial: bool | None = None
         self._dragged: np.ndarray | None = None
         self._forget_supported()
@@ -548,7 +548,7 @@ class Contact(Guarded):
     def _settle_here(self) -> None:
         """The last state of the history is that of the last converged step, in the present frames."""
         self._placement.settle()
-        self._settled = self._history.last
+        self._settled, self._wearing = self._history.last, None
         self._forget_supported()
 
     def advance(self) -> None:
@@ -568,7 +568,10 @@ class Contact(Guarded):
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(slip, axis=1)
         work, path = self.repeats * work, self.repeats * path
-        depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
+        if self._wearing is not None:
+            depth = self._wearing
+        else:
+            depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
         if self.surface.spin is not None:
             self.take(displacement=self._placement.turned_past(self.displacement))
@@ -576,6 +579,31 @@ class Contact(Guarded):
         self._placement.end()
         self._renew_area()
         self._settle_here()
+
+    # -- wear within the step ------------------------------------------------------------------
+
+    @property
+    def wears_within(self) -> bool:
+        """Whether what a step wears opens gaps in the same step; the same on all ranks but for friction per node."""
+        return self.wear is not None and not self.wear.explicit
+
+    @property
+    def wearing(self) -> np.ndarray:
+        """What the step at hand wears, ``shape=(n,)``, length; nothing until a solution is looked for with it."""
+        return np.zeros(self.nodes.size) if self._wearing is None else self._wearing
+
+    def let_wear(self, depth: np.ndarray) -> None:
+        """Let the step at hand wear by so much, ``shape=(n,)``, length."""
+        self._wearing = frozen(depth)
+
+    def wear_compliance(self, state: State) -> np.ndarray:
+        """Depth that the slip of a state wears per normal force, ``shape=(n,)``, length per force; none of nodes that stick."""
+        slip = self.slip_kept + state.slip_increment
+        slips = state.status != int(Status.STICK)
+        none, unit = np.zeros_like(self.reaction), np.zeros_like(self.reaction)
+        unit[:, -1] = 2.0 * self.repeats * slips  # the work has half of the force at the end
+        work = work_of_friction(self.friction, none, slips, unit, slip)
+        return self.wear.depth(work, self.area)
 
     @property
     def law_before(self) -> Friction | None:
@@ -591,7 +619,7 @@ class Contact(Guarded):
     def restore(self) -> None:
         """Return to the last converged state, its frames and, where friction is a field, its law."""
         self._placement.restore()
-        self._history.last = self._settled
+        self._history.last, self._wearing = self._settled, None
         self._history.restore()
         self._laws.restore(self)
         self._forget_supported()
@@ -696,7 +724,8 @@ class Contact(Guarded):
     @property
     def wear_depth(self) -> np.ndarray:
         """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
-        return self._history.sums["wear_depth"]
+        worn = self._history.sums["wear_depth"]
+        return worn if self._wearing is None else worn + self._wearing
 
     @property
     def slip_kept(self) -> np.ndarray:

@@ -125,6 +125,10 @@ class LoadStep:
         said = said or self._no_state() or "Smaller load steps help most often"
         if any(contact.follows_pressure for contact in self.contacts):
             said += "; friction follows the pressure, and was that of the last iterate"
+        if any(contact.wears_within for contact in self.contacts):
+            said += (
+                "; the depth that the step wears is part of it, and was that of the last iterate"
+            )
         return said
 
     def _no_state(self) -> str:

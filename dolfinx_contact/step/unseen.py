@@ -136,7 +136,12 @@ class Unseen:
     def _check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
         """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
         for contact, of in zip(contacts, stiffness):
-            if not self._leaps or contact.wear is None or contact.repeats > 1.0:
+            if (
+                not self._leaps
+                or contact.wear is None
+                or contact.wears_within
+                or contact.repeats > 1.0
+            ):
                 continue
             times, depth, where = contact.worn_in_a_leap(of)
             if times > 1.0:

@@ -44,7 +44,6 @@ def test_estimates_are_the_errors_of_jumps(coefficient, stroke):
     assert (slips > 0) == (stroke < 0.01)
     assert found.cycles == 40 and found.reached and found.simulated < 40
     assert found.volume == pytest.approx(total(scene, scene.contact.wear_depth), rel=1e-12)
-    assert found.volume == pytest.approx(coefficient * COMM.allreduce(scene.contact.dissipation.sum()), rel=1e-9)  # fmt: skip
     expected = truth.contact.wear_depth
     off = scene.contact.wear_depth - expected
     volume, largest = total(truth, expected), truth.problem.body.largest
@@ -71,19 +70,19 @@ def test_a_million_cycles_of_gross_slip():
 def test_a_killed_programme_goes_on(tmp_path):
     """A programme that is ended and started again in the same folder makes the jumps of one that was not; so does one rank alone."""
     path = COMM.bcast(tmp_path, root=0) / "programme"
-    scene, cycle = pad(1e-5, 0.2)
-    straight = dc.cycle_jump(scene.problem, cycle, 500)
+    scene, cycle = pad(1e-6, 0.2)
+    straight = dc.cycle_jump(scene.problem, cycle, 100)
 
     def killed(row):
-        if row["cycle"] > 40:
+        if row["cycle"] > 9:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        dc.cycle_jump(*pad_of(1e-5, 0.2), 500, path=path, monitor=killed)
+        dc.cycle_jump(*pad_of(1e-6, 0.2), 100, path=path, monitor=killed)
     assert COMM.bcast(len(list(path.iterdir())) if COMM.rank == 0 else None, root=0) == 3
-    again, cycle = pad(1e-5, 0.2)
-    resumed = dc.cycle_jump(again.problem, cycle, 500, path=path)
-    alone = dc.cycle_jump(*pad_of(1e-5, 0.2, scenes.MPI.COMM_SELF), 500)
+    again, cycle = pad(1e-6, 0.2)
+    resumed = dc.cycle_jump(again.problem, cycle, 100, path=path)
+    alone = dc.cycle_jump(*pad_of(1e-6, 0.2, scenes.MPI.COMM_SELF), 100)
     for other in (resumed, alone):
         assert [row["jump"] for row in other.table] == [row["jump"] for row in straight.table]
         assert other.volume == pytest.approx(straight.volume, rel=1e-7)
@@ -91,14 +90,14 @@ def test_a_killed_programme_goes_on(tmp_path):
     if COMM.size == 1:
         assert resumed == straight
         assert np.array_equal(again.contact.reaction, scene.contact.reaction)
-    with pytest.raises(ValueError, match="500 cycles on, further than cycles = 10"):
+    with pytest.raises(ValueError, match="100 cycles on, further than cycles = 10"):
         dc.cycle_jump(again.problem, cycle, 10, path=path)
     COMM.barrier()
     if COMM.rank == 0:
         (path / "record.json").write_text("{}")
     COMM.barrier()
     with pytest.raises(ValueError, match="no record of cycle_jump"):
-        dc.cycle_jump(again.problem, cycle, 500, path=path)
+        dc.cycle_jump(again.problem, cycle, 100, path=path)
 
 
 def pad_of(*given):

@@ -89,7 +89,7 @@ def test_nodal_areas_fill_the_surface():
 @pytest.mark.parametrize("coefficient", [1e-6, (2e-6, 1e-7)])
 def test_worn_depth_opens_the_gap_and_conserves_volume(coefficient):
     """Volume worn is coefficient times work, in each direction; the gap of the next step has it."""
-    scene = scenes.block(mu=0.3, p=None, wear=dc.Wear(coefficient))
+    scene = scenes.block(mu=0.3, p=None, wear=dc.Wear(coefficient, explicit=True))
     c = scene.contact
     drag(scene, [0.5])
     volume = COMM.allreduce(c.wear_depth @ c.area)
@@ -128,7 +128,7 @@ def test_without_wear_nothing_is_computed_for_it(monkeypatch):
 def test_wear_of_a_dragged_block_follows_archard():
     """With Archard's K and hardness H: volume = K N s / H for a normal force N and a sliding path s."""
     K, H, mu = 1e-6, 1e3, 0.3
-    scene = scenes.block(mu=mu, p=None, wear=dc.Wear(K / (mu * H)))
+    scene = scenes.block(mu=mu, p=None, wear=dc.Wear(K / (mu * H), explicit=True))
     drag(scene, [1.0])
     c = scene.contact
     before, normal = COMM.allreduce(c.wear_depth @ c.area), c.force()[2]

@@ -185,11 +185,11 @@ def test_straight_cells_are_good_enough_where_much_is_pressed_in():
     flat.step(0, -1e-9)
 
 
-def worn(parts, d):
+def worn(parts, d, **options):
     """A column pressed by 0.01 and rubbed by half its height in some steps: depths worn, over the approach."""
     plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
     scene = block(plane, 0.1, cells=[1] * d)
-    scene.contact.wear = dc.Wear(2 / (1000 * 0.1 * 0.5))  # E k mu s / height = 2
+    scene.contact.wear = dc.Wear(2 / (1000 * 0.1 * 0.5), **options)  # E k mu s / height = 2
     scene.step(*np.zeros(d - 1), -0.01)
     for k in range(parts):
         plane.displacement = (k + 1) / parts * 0.5 * np.eye(d)[0]
@@ -200,10 +200,13 @@ def worn(parts, d):
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_wear_in_leaps_is_told_with_the_number_of_steps(d):
-    """Rubbed in one step more is worn off than was pressed in; in many steps it is 1 - exp(-2) of it, Archard's law."""
+    """Explicit wear in one step takes more off than was pressed in, in many steps 1 - exp(-2) of it, Archard's law; else a step is that of
+    Euler's implicit method."""
     with pytest.warns(UserWarning, match="times its reaction.*Divide steps like this one into 2 or more"):  # fmt: skip
-        assert worn(1, d) > 1.9
-    assert worn(16, d) == pytest.approx(1 - np.exp(-2), rel=0.05)
+        assert worn(1, d, explicit=True) > 1.9
+    assert worn(16, d, explicit=True) == pytest.approx(1 - np.exp(-2), rel=0.05)
+    for parts in (1, 2, 16):
+        assert worn(parts, d) == pytest.approx(1 - (1 + 2 / parts) ** -parts, rel=0.01)
 
 
 @pytest.mark.parametrize("d", [2, 3])

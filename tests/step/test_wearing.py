@@ -1,0 +1,95 @@
+"""Wear within the step: depth by the pressure at its end, whatever the coefficient, by any solver."""
+
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
+
+# isort: split
+import numpy as np
+import pytest
+import scenes
+
+pytestmark = pytest.mark.ranks
+COMM = scenes.COMM
+MU, MODULUS, APPROACH = 0.3, 1000.0, 0.01
+NATURAL = 1.0 / MODULUS  # so that a way of the body's size wears off what was pressed in, about
+
+
+def rubbed(coefficient, ways, cells=(4, 4, 2), solver=None, **options):
+    """A block pressed by an approach, or by ``weight``, and rubbed along x: the scene, after each step told to ``look``."""
+    weight, look = options.pop("weight", None), options.pop("look", lambda scene: None)
+    wear = dc.Wear(coefficient, **options)
+    scene = scenes.block(cells=cells, mu=MU, p=None, E=MODULUS, tol=1e-8, solver=solver, wear=wear)
+    gdim = len(cells)
+    if weight:
+        scene.surface.free, scene.surface.force = ("n",), (0,) * (gdim - 1) + (weight,)
+    else:
+        scene.move_top(*[0] * (gdim - 1), -APPROACH)
+    scene.problem.solve()
+    for way in ways:
+        scene.surface.displacement = (way, *scene.surface.displacement[1:])
+        scene.problem.solve()
+        look(scene)
+    return scene
+
+
+def largest(array):
+    return scenes.MPI.COMM_WORLD.allreduce(float(np.max(array, initial=0.0)), op=scenes.MPI.MAX)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint(), dc.SparseNewton()], ids=["condensed", "fixed point", "sparse"])  # fmt: skip
+def test_depth_is_coefficient_times_work_at_the_end(solver):
+    """Where a step wears off a tenth of what was pressed in: k mu p s at every node, with the pressure at its end, to rounding."""
+    before, seen = [], []
+
+    def look(scene):
+        c, depth = scene.contact, scene.contact.wear_depth
+        if before:  # in the first step nodes begin to slip
+            slip = np.linalg.norm(c.slip_increment, axis=1)
+            work = MU * c.reaction[:, -1] * slip
+            expected = 0.1 * NATURAL * work
+            assert (depth - before[-1]) * c.area == pytest.approx(expected, rel=1e-9, abs=1e-15)
+            seen.append(largest(slip))
+        before.append(depth)
+
+    scene = rubbed(0.1 * NATURAL, (1.0, 2.0, 3.0), solver=solver, look=look)
+    assert 0.99 < seen[-1] < 1.01
+    assert 0.01 * APPROACH < largest(scene.contact.wear_depth) < APPROACH
+
+
+@pytest.mark.parametrize("power", [-12, -6, -3, 0, 1, 3, 6])
+def test_any_coefficient(power):
+    """No more is worn off than was pressed in, but for what corners stand out; never less than by a smaller coefficient; nothing alternates."""
+    forces = []
+    scene = rubbed(10.0**power * NATURAL, (1.0, 2.0, 3.0), (4, 2), look=lambda s: forces.append(s.contact.force()[-1]))  # fmt: skip
+    pressed = rubbed(0.0, (1.0,), (4, 2)).contact.force()[-1]
+    c = scene.contact
+    mean = COMM.allreduce(float(c.wear_depth @ c.area))  # of a foot of length one
+    assert 0.0 < mean < 1.001 * APPROACH
+    assert (np.diff([pressed, *forces]) <= 1e-3 * pressed).all() and min(forces) >= 0.0
+    if power >= 3:
+        assert mean == pytest.approx(APPROACH, rel=0.02)
+    if power <= -6:
+        work = COMM.allreduce(float(c.dissipation.sum()))
+        assert mean == pytest.approx(10.0**power * NATURAL * work, rel=0.01)
+
+
+@pytest.mark.parametrize("power", [-3, 0, 2])
+def test_under_dead_weight_volume_is_archards(power):
+    """In gross slip the volume is k mu N times the way, and with much wear pressure becomes even, step by step."""
+    weight, coefficient, uneven = 1.0, 10.0**power * NATURAL, []
+
+    def look(scene):
+        p = scene.contact.pressure
+        uneven.append(largest(np.abs(p / weight - 1.0)))
+
+    scene = rubbed(coefficient, np.arange(1.0, 6.0), (6, 3), weight=weight, look=look)
+    c = scene.contact
+    volume = COMM.allreduce(float(c.wear_depth @ c.area))
+    assert volume == pytest.approx(coefficient * MU * weight * 5.0, rel=2e-3)
+    if power >= 0:
+        assert uneven[-1] < 0.6 * uneven[0] and (np.diff(uneven) < 1e-3).all()
+
+
+def test_refusals_and_options():
+    """A Wear says whether it is explicit; a checkpoint of it is the same."""
+    assert repr(dc.Wear(1e-6, explicit=True)) == "Wear(1e-06, explicit=True)"
+    assert not dc.Wear(1e-6).explicit
