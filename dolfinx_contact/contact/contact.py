@@ -349,7 +349,7 @@ class Contact(Guarded):
     @property
     def changes(self) -> bool:
         """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
-        return self._placement.changes or self._laws.textured
+        return self._placement.changes or (self._laws.textured and not self.surface.deformable)
 
     def texture_turned(self, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
         """By how much the surface's texture at other positions differs from that in use, see ``Laws.turned``."""

@@ -69,13 +69,15 @@ class MortarPlacement(Placement):
             rows = _sorted_rows(mine, masters, self._mine)
             normals = _without(self._supported, _mean_normals(mine, self._mine))
             frames = frames_along(normals, self.surface.axis)
-        flat = ((self.x - rows.m @ self._master.x) * frames[:, -1]).sum(axis=1)
+        # What presses on a node, in the undeformed state; textures of the other side are asked for there.
+        home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
+        flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
         flat[~rows.covered] = self._apart  # opposite nothing: closed
         points = MortarPoints(self._dofs, frames, self._owned, rows, self._master.dofs, self._comm)
         points.met = self._supported
         still = self.surface.rotation
-        frames, flat, at = frozen(frames), frozen(flat), frozen(u.view())
-        found = Placed(self.x, still, frames, frames, flat, points, None, None, still, at=at)
+        home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
+        found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
         self._projected = u, found
         return found
 
@@ -117,7 +119,7 @@ class MortarPlacement(Placement):
         there.points.add_forces(reaction, forces)
         now.points.add_forces(-state.reaction, forces)
         gap = there.flat + there.points.motion(u)[:, -1]
-        return Ended(gap, missed[:, :-1], forces)
+        return Ended(gap, missed[:, :-1], forces, there.home, there.frame)
 
     @property
     def changes(self) -> bool:
@@ -162,6 +164,8 @@ class Ended(NamedTuple):
     gap: np.ndarray  # without wear, (n,)
     slip: np.ndarray  # less the one that was used, in its frame, (n, gdim - 1)
     forces: np.ndarray  # of the reactions on owned degrees of freedom, less those that were used
+    home: np.ndarray  # where on the undeformed surface nodes are, (n, gdim)
+    frame: np.ndarray  # (n, gdim, gdim)
 
 
 class Skin:

@@ -98,9 +98,12 @@ def _missed_by_rows(contact, stiffness: NodalStiffness, u: np.ndarray, fixed) ->
     """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
     ended = contact.placement.ended(contact.present, u)
     ended.forces[fixed] = 0.0
+    friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
+    with raised_together(contact.comm):  # the user's functions
+        turned = friction * contact.texture_turned(ended.home, ended.frame)
     return (
         _pressed(contact, stiffness, ended.gap),
-        ended.forces,
+        np.append(ended.forces, turned),
         _dragged(contact, stiffness, ended.slip),
     )
 

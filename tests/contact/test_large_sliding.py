@@ -261,3 +261,24 @@ def test_compliance_from_columns_kept():
         forces[body.fixed] = 0.0
         moved.append(points.motion(body.solve(forces)).ravel())
     assert np.abs(W - moved).max() <= 1e-12 * W.max()
+
+
+def test_a_texture_slides_with_the_other_body():
+    """Axes given on the lower body are those of what a node presses on, wherever both bodies are."""
+    turns = lambda x: np.array([np.cos(x[0]), np.sin(x[0]), 0 * x[0]])  # noqa: E731
+    domain, top, bottom, upper, lower, _ = pair("hexahedron", ((2, 2, 1), (6, 6, 1)), (1.0, 2.0))
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, ways = fem.Function(V), [fem.Constant(domain, np.zeros(3)) for _ in range(2)]
+    F = ufl.inner(stress(u, 0.0, E / 2), ufl.grad(ufl.TestFunction(V))) * ufl.dx
+    surface = dc.DeformableSurface(V, lower, axis=(1, 0, 0))
+    friction = dc.Friction((0.2, 0.1), axes=turns, of="surface")
+    contact = dc.Contact(V, upper, surface, friction)
+    bcs = [fem.dirichletbc(way, fem.locate_dofs_topological(V, 2, at), V) for way, at in zip(ways, (top, bottom))]  # fmt: skip
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
+    for slid, together in ((0.0, 0.0), (0.3, 0.0), (0.5, 1.0)):
+        ways[0].value[:], ways[1].value[:] = (slid + together, 0.0, -0.001), (together, 0.0, 0.0)
+        problem.solve()
+        at = contact.x + np.array([slid, 0.0, 0.0])
+        axes = np.einsum("nij,jn->ni", contact.frame[:, :2], turns(at.T))
+        used = contact.friction.axes
+        assert largest(axes[:, 0] * used[:, 1] - axes[:, 1] * used[:, 0]) <= 2e-3
