@@ -7,10 +7,10 @@ import from here what moved between releases, and read as present-day DOLFINx ev
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from inspect import signature
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -21,6 +21,9 @@ from dolfinx import fem, graph, la
 from dolfinx.mesh import create_interval, create_mesh
 from mpi4py import MPI
 from petsc4py import PETSc
+
+if TYPE_CHECKING:
+    pass
 
 if np.issubdtype(PETSc.ScalarType, np.complexfloating):
     raise ImportError(
@@ -111,7 +114,7 @@ def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
     ``ranks(cells, size)`` gives the rank of each of the ``cells`` that this rank hands in.
     """
 
-    def partition(comm, size, *cells):
+    def partition(comm: MPI.Comm, size: int, *cells: Any):
         # an adjacency list before 0.10 (0.5 gives a ghost mode after it), a list of flat arrays since
         cells = next(c for c in reversed(cells) if isinstance(c, list) or hasattr(c, "num_nodes"))
         count = cells[0].size // nodes_per_cell if isinstance(cells, list) else cells.num_nodes
@@ -128,11 +131,11 @@ def _cpp(wrapped: Any) -> Any:
     return getattr(wrapped, "_cpp_object", wrapped)
 
 
-def is_function_space(V) -> bool:
+def is_function_space(V: object) -> bool:
     return isinstance(V, fem.FunctionSpace if hasattr(fem, "FunctionSpace") else ())
 
 
-def lagrange_degree(V) -> int | None:
+def lagrange_degree(V: fem.FunctionSpace) -> int | None:
     """Degree of a continuous Lagrange space, blocked or not; None for any other element."""
     element = V.ufl_element()
     if callable(getattr(element, "family", None)):  # legacy UFL elements, DOLFINx < 0.7
@@ -141,7 +144,7 @@ def lagrange_degree(V) -> int | None:
     return element.degree if element.family_name == "P" and continuous else None
 
 
-def value_size(V) -> int:
+def value_size(V: fem.FunctionSpace) -> int:
     """Number of components of a function of the space."""
     element = V.ufl_element()
     if hasattr(element, "value_size"):  # legacy UFL elements
@@ -149,17 +152,17 @@ def value_size(V) -> int:
     return int(np.prod(element.reference_value_shape, dtype=int))
 
 
-def is_part(V) -> bool:
+def is_part(V: fem.FunctionSpace) -> bool:
     """Whether it is a sub-space, ``V.sub(i)``."""
     return len(_cpp(V).component()) > 0
 
 
-def is_within(part, V) -> bool:
+def is_within(part: fem.FunctionSpace, V: fem.FunctionSpace) -> bool:
     """Whether a space is another one or a part of it."""
     return _cpp(V).contains(_cpp(part))
 
 
-def cell_nodes(V):
+def cell_nodes(V: fem.FunctionSpace):
     """Local node indices of each cell, ``shape=(cells, nodes)``: an adjacency list before 0.8."""
     nodes = V.dofmap.list
     if hasattr(nodes, "array"):
@@ -167,14 +170,14 @@ def cell_nodes(V):
     return nodes
 
 
-def cell_dofs(V):
+def cell_dofs(V: fem.FunctionSpace):
     """Local degrees of freedom of each cell, components unrolled, ``shape=(cells, dofs)``."""
     bs = V.dofmap.index_map_bs
     cells = cell_nodes(V)
     return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), bs * cells.shape[1])
 
 
-def read_cells(mesh):
+def read_cells(mesh: dolfinx.mesh.Mesh):
     """Index of each cell in the mesh that was read or made; empty where DOLFINx does not know it, as of submeshes."""
     try:
         return mesh.topology.original_cell_index
@@ -182,7 +185,7 @@ def read_cells(mesh):
         return []
 
 
-def cell_points(mesh):
+def cell_points(mesh: dolfinx.mesh.Mesh):
     """Points of the geometry of each cell, ``shape=(cells, points)``: one array for each type of cells since 0.8."""
     points = getattr(mesh.geometry, "dofmaps", None)
     points = (
@@ -193,18 +196,18 @@ def cell_points(mesh):
     return points
 
 
-def bc_dofs(bc, size: int):
+def bc_dofs(bc: Any, size: int):
     """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
     dofs = np.asarray(_cpp(bc).dof_indices()[0])
     return dofs[dofs < size]
 
 
-def bc_constants(bcs) -> list:
+def bc_constants(bcs: Iterable[Any]) -> list:
     """The values of conditions that are constants, each with a ``value``; those that are Functions have none."""
     return [bc.g for bc in bcs if hasattr(bc.g, "value") and not hasattr(bc.g, "x")]
 
 
-def set_bc_values(array, bcs) -> None:
+def set_bc_values(array: np.ndarray, bcs: Iterable[Any]) -> None:
     """Write boundary values into a local array, ghosts included: ``bc.set`` in DOLFINx >= 0.9."""
     for bc in bcs:
         if hasattr(bc, "set"):
@@ -259,17 +262,17 @@ def tagged(tags: Any, mesh: Any) -> bool:
     return topology is _cpp(mesh).topology
 
 
-def is_condition(bc) -> bool:
+def is_condition(bc: object) -> bool:
     """Whether it is what ``dirichletbc`` returns."""
     return hasattr(_cpp(bc), "dof_indices")
 
 
-def condition_lives_on(bc, V) -> bool:
+def condition_lives_on(bc: Any, V: fem.FunctionSpace) -> bool:
     """Whether a boundary condition is one on ``V`` or a part of it."""
     return is_within(bc.function_space, V)
 
 
-def free_garbage(comm) -> None:
+def free_garbage(comm: MPI.Comm) -> None:
     """Free what Python's collector left to PETSc since 3.18: it can free parallel objects on all ranks at once only.
 
     Collective.
@@ -278,7 +281,7 @@ def free_garbage(comm) -> None:
         PETSc.garbage_cleanup(comm)
 
 
-def may_free_alone(comm) -> bool:
+def may_free_alone(comm: MPI.Comm) -> bool:
     """Whether this rank may free PETSc objects without the others: it has none, and PETSc still runs."""
     return not PETSc.Sys.isFinalized() and comm.size == 1
 

@@ -393,7 +393,9 @@ class ContactProblem(Guarded):
             step, found = self._worn(step)
         return step, found
 
-    def _at_its_end(self, step, found) -> tuple[LoadStep, SolverResult, float, str]:
+    def _at_its_end(
+        self, step: LoadStep, found: SolverResult
+    ) -> tuple[LoadStep, SolverResult, float, str]:
         """The step repeated with the geometry of its end and slip from touching on, what is missed, and why it is refused.  Collective."""
         from dolfinx_contact.step.geometry import Ends, undivided
         from dolfinx_contact.step.touching import landing
@@ -417,7 +419,7 @@ class ContactProblem(Guarded):
             found = again._replace(iterations=found.iterations + again.iterations)
         return step, found, missed, said
 
-    def _geometry(self, step, found, repeated: int) -> tuple[float, str]:
+    def _geometry(self, step: LoadStep, found: SolverResult, repeated: int) -> tuple[float, str]:
         """The error of the geometry, and whether the way of the step is too long, in words.  Collective."""
         from dolfinx_contact.step.geometry import geometry_error, too_long
 
@@ -428,7 +430,7 @@ class ContactProblem(Guarded):
         said = "" if repeated else too_long(self.body, contacts, found.x)
         return geometry_error(self.body, contacts, stiffness, found.x, step.carried), said
 
-    def _repeated(self, step, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
+    def _repeated(self, step: LoadStep, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
         """The step with the geometry of a displacement at its end.  Collective."""
         for surface in {id(c.surface): c.surface for c in self.contacts}.values():
             surface.end_step()
@@ -496,7 +498,7 @@ class ContactProblem(Guarded):
         reason = f"{found.reason}; {said}" if found.reason else said
         return step.within(goal), found._replace(iterations=iterations, reason=reason)
 
-    def _keep_one_start(self, before):
+    def _keep_one_start(self, before: Any):
         """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""
         past = self._states.memory["past"]
         if before is not None and len(past) > 1 and past[-2] is before:

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from itertools import count
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ufl.classes import Indexed, Product, SpatialCoordinate
@@ -16,6 +18,14 @@ from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, from_first, raised_together
+
+if TYPE_CHECKING:
+    import ufl
+    from dolfinx import fem
+    from mpi4py import MPI
+
+    from dolfinx_contact.problem import ContactProblem
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 STRAINED = 0.5  # mean strain above which linear elasticity says nothing
@@ -35,7 +45,7 @@ NUMBERS = count(
 )  # of problems as they are made, and of times at which surfaces are driven: each larger than the last
 
 
-def checked_contacts(contacts, u) -> tuple[Contact, ...]:
+def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
     """The contacts, each on the space of ``u``, all with the same displacements."""
     if isinstance(contacts, Contact):
         contacts = [contacts]
@@ -64,7 +74,7 @@ def checked_contacts(contacts, u) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
-def check_sides(contacts) -> None:
+def check_sides(contacts: Sequence[ContactLike]) -> None:
     """Raise a ``ValueError`` if a node that carries unknowns of one contact is opposite to another one's.  On this rank alone."""
     for contact in contacts:
         if not contact.surface.deformable:
@@ -81,7 +91,7 @@ def check_sides(contacts) -> None:
                 )
 
 
-def check_mesh(contact: Contact) -> None:
+def check_mesh(contact: ContactLike) -> None:
     """Raise a ``ValueError`` if the mesh is no longer where it was when the contact was made."""
     if contact.mesh_has_moved():
         raise ValueError(
@@ -90,7 +100,7 @@ def check_mesh(contact: Contact) -> None:
         )
 
 
-def checked_conditions(bcs, V) -> list:
+def checked_conditions(bcs: Any, V: fem.FunctionSpace) -> list:
     """The boundary conditions, each on ``V`` or a part of it."""
     if compat.is_condition(bcs):
         raise ValueError(f"bcs must be a list of boundary conditions: write bcs=[bc], not {bcs!r}.")
@@ -107,7 +117,7 @@ def checked_conditions(bcs, V) -> list:
     return list(bcs)
 
 
-def checked_solver(solver):
+def checked_solver(solver: Any):
     """A solver, or the automatic choice for None."""
     if isinstance(solver, type):
         raise ValueError(f"solver {solver.__name__} is a class: write solver={solver.__name__}().")
@@ -118,7 +128,7 @@ def checked_solver(solver):
     return Automatic() if solver is None else solver
 
 
-def checked_tolerance(tol) -> float:
+def checked_tolerance(tol: Any) -> float:
     """A tolerance that rounding allows to reach."""
     try:
         value = positive("tol", tol, finite=True)
@@ -131,14 +141,14 @@ def checked_tolerance(tol) -> float:
     return value
 
 
-def checked_undetermined(choice) -> str:
+def checked_undetermined(choice: Any) -> str:
     """One of ``UNDETERMINED``."""
     if choice not in UNDETERMINED:
         raise ValueError(f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}.")
     return choice
 
 
-def checked_internal(internal):
+def checked_internal(internal: Any):
     """``InternalVariables`` with a history of this problem's own, None where there are none."""
     if internal is None:
         return None
@@ -151,7 +161,7 @@ def checked_internal(internal):
     return internal.begun()
 
 
-def checked_options(name: str, options) -> dict | None:
+def checked_options(name: str, options: Any) -> dict | None:
     """Options of PETSc or of compilation, a dictionary."""
     if options is not None and not isinstance(options, dict):
         example = EXAMPLES[name]
@@ -159,7 +169,7 @@ def checked_options(name: str, options) -> dict | None:
     return options
 
 
-def hold(contacts, body, level: int = 3) -> None:
+def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3) -> None:
     """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
 
     Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
@@ -197,7 +207,7 @@ def hold(contacts, body, level: int = 3) -> None:
     )
 
 
-def support(body, contacts, bcs) -> None:
+def support(body: BodyLike, contacts: Sequence[ContactLike], bcs: Any) -> None:
     """Give a body other Dirichlet conditions, and let contacts know.  Collective.
 
     Raises:
@@ -218,7 +228,7 @@ def support(body, contacts, bcs) -> None:
         raise
 
 
-def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
+def _held_directions(contact: ContactLike, fixed: np.ndarray) -> tuple:
     """What boundary conditions fix, as ``ContactPoints.hold`` takes it."""
     left = contact.points.free_of(fixed)
     closed = left[:, -1] < 1e-12
@@ -240,7 +250,9 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
     return held, closed, guided, np.isin(contact.points.dofs, fixed)
 
 
-def follow(contacts, body, u: np.ndarray, start: np.ndarray, known: list) -> bool:
+def follow(
+    contacts: Sequence[ContactLike], body: BodyLike, u: np.ndarray, start: np.ndarray, known: list
+) -> bool:
     """Let frames and gaps of contacts follow their nodes and surfaces; whether frames changed.  Collective.
 
     Args:
@@ -260,7 +272,7 @@ def follow(contacts, body, u: np.ndarray, start: np.ndarray, known: list) -> boo
     return bool(changed)
 
 
-def check_surfaces(contacts, body) -> None:
+def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
         if contact.surface.deformable:
@@ -280,7 +292,7 @@ def check_surfaces(contacts, body) -> None:
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
 
 
-def check_weights(F, contacts) -> None:
+def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
     """Warn of a volume form that is multiplied by the radius while contacts have no weight: areas are those of plane strain."""
     if not contacts or contacts[0].points.dim == 3 or all(c.weighted for c in contacts):
         return
@@ -294,7 +306,7 @@ def check_weights(F, contacts) -> None:
         )
 
 
-def _has_radius(integrand) -> bool:
+def _has_radius(integrand: Any) -> bool:
     """Whether a factor of an integrand is the first coordinate itself."""
     factors = [integrand]
     for factor in factors:
@@ -304,7 +316,7 @@ def _has_radius(integrand) -> bool:
     return any(isinstance(a, SpatialCoordinate) and int(i[0]) == 0 for a, i in of)
 
 
-def check_axial(contacts) -> None:
+def check_axial(contacts: Sequence[ContactLike]) -> None:
     """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
     for contact in contacts:
         if not contact.axial:
@@ -321,7 +333,7 @@ def check_axial(contacts) -> None:
             )
 
 
-def take_contacts(problem, contacts) -> None:
+def take_contacts(problem: ContactProblem, contacts: Sequence[ContactLike]) -> None:
     """From now on a problem makes the history of its contacts; warns where another one has begun it."""
     begun = [contact for contact in contacts if contact.has_history]
     if begun:
@@ -334,7 +346,7 @@ def take_contacts(problem, contacts) -> None:
         contact.belong_to(problem)
 
 
-def check_alive(problem, body, contacts) -> None:
+def check_alive(problem: ContactProblem, body: BodyLike, contacts: Sequence[ContactLike]) -> None:
     """Raise a ``ValueError`` if a problem can no longer go on."""
     if body.closed:
         raise ValueError("this ContactProblem has been closed: make a new one.")
@@ -348,7 +360,7 @@ def check_alive(problem, body, contacts) -> None:
             surface.driver.take(problem.number, next(NUMBERS))
 
 
-def check_step(u, comm, contacts) -> None:
+def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[ContactLike]) -> None:
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
     check_axial(contacts)
     first = from_first(comm, [contact.described() for contact in contacts])
@@ -366,7 +378,7 @@ def check_step(u, comm, contacts) -> None:
             driver.check()
 
 
-def check_size(body, x: np.ndarray, u: np.ndarray) -> bool:
+def check_size(body: BodyLike, x: np.ndarray, u: np.ndarray) -> bool:
     """Warn of a displacement far larger than the body, or of strains that are not small; whether it did.  Collective.
 
     Args:

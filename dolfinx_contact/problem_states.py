@@ -5,13 +5,18 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dolfinx_contact.results import checkpoint
 from dolfinx_contact.solvers.base import KEPT
+
+if TYPE_CHECKING:
+    from dolfinx_contact.bodies.internal_variables import InternalVariables
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 
 class Kept(NamedTuple):
@@ -39,9 +44,11 @@ class ProblemStates:
         memory: Of solvers, see ``Solver.bind``.
     """
 
-    def __init__(self, body, contacts, variables) -> None:
+    def __init__(
+        self, body: BodyLike, contacts: Sequence[ContactLike], variables: InternalVariables | None
+    ) -> None:
         self._body, self._contacts, self._variables = body, contacts, variables
-        self._parts = [*contacts, *filter(None, [variables])]  # what has a history
+        self._parts: list[Any] = [*contacts, *filter(None, [variables])]  # what has a history
         self._stood, self.memory, self._mine = self.places(), {}, object()
         self._begin()
 
@@ -63,7 +70,7 @@ class ProblemStates:
         )
         self._before = before
 
-    def _remember(self, past) -> None:
+    def _remember(self, past: Sequence[tuple]) -> None:
         """Starts for the condensed solver, which has the same deque."""
         kept = self.memory.setdefault("past", deque(maxlen=KEPT))
         kept.clear()
@@ -127,7 +134,7 @@ class ProblemStates:
         self._put_surfaces(kept.surfaces)
         self._take(kept.past)
 
-    def _take(self, past) -> None:
+    def _take(self, past: Sequence[tuple]) -> None:
         """Go on from a state that was put in place, with starts for the condensed solver."""
         self._remember(past)
         self.restore()

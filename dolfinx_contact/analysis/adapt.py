@@ -17,6 +17,8 @@ from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx.mesh import Mesh
+
     from dolfinx_contact.problem import ContactProblem
 
 # Squares that differ by less, as of cells that symmetry makes equal, are divided together.
@@ -140,7 +142,7 @@ def _is_on(mesh: Any, problem: Any) -> bool:
     return hasattr(problem, "contacts") and problem.body.V.mesh is mesh
 
 
-def _check(mesh, share: float, quantity: str, quantities: Mapping, meshes: int) -> None:
+def _check(mesh: Mesh, share: float, quantity: str, quantities: Mapping, meshes: int) -> None:
     if mesh.topology.cell_name() not in ("triangle", "tetrahedron"):
         raise ValueError(
             f"mesh must have triangles or tetrahedra, got {mesh.topology.cell_name()}s: DOLFINx divides no other cells. "
@@ -154,7 +156,7 @@ def _check(mesh, share: float, quantity: str, quantities: Mapping, meshes: int) 
         raise ValueError(f"meshes must be at least 1, got {meshes!r}.")
 
 
-def _cell_map(mesh):
+def _cell_map(mesh: Any):
     return mesh.topology.index_map(mesh.topology.dim)
 
 

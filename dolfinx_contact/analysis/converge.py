@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -66,8 +66,7 @@ def converge(
 
     Increments are halved first on the coarser meshes, where this is cheap.  The estimates, which are not bounds:
 
-    - increments: twice the change caused by halving them on the previous mesh, which is their error if convergence is of first
-    order;
+    - increments: twice the change caused by halving them on the previous mesh, their error if convergence is of first order;
     - mesh: the change from the mesh before, over ``s - 1``, where ``s`` is the factor by which changes shrank last, but 2 at
       least and 4 at most.  With cells of half the size ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226
       (1927) 299).  With two meshes s = 2.  From mesh to mesh the estimate falls to an eighth at most, since two values may agree by chance.
@@ -130,7 +129,7 @@ def _halve(
     return 0, 0.0
 
 
-def _value(compute, tried: dict[tuple, float], key: tuple, comm) -> float:
+def _value(compute: Callable, tried: dict[tuple, float], key: tuple, comm: MPI.Comm) -> float:
     """Of a run, which is made once."""
     if key not in tried:
         with raised_together(comm):
@@ -146,7 +145,7 @@ def _value(compute, tried: dict[tuple, float], key: tuple, comm) -> float:
     return tried[key]
 
 
-def _checked(compute, accuracy, meshes, halvings) -> float:
+def _checked(compute: object, accuracy: Any, meshes: Any, halvings: Any) -> float:
     """The accuracy, if all makes sense."""
     accuracy = positive("accuracy", accuracy, finite=True)
     if not callable(compute):

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -145,7 +146,7 @@ def cycle_jump(
     return run.found()
 
 
-def _check(problem, cycle, monitor) -> None:
+def _check(problem: Any, cycle: object, monitor: object) -> None:
     if not any(contact.wear is not None for contact in problem.contacts):
         raise ValueError(
             "no contact of the problem has a law of wear: contact.wear = dc.Wear(...)."
@@ -166,7 +167,7 @@ class _Run:
             ``next`` one, and the ``table``.
     """
 
-    def __init__(self, problem, cycle, accuracy: float, longest: float):
+    def __init__(self, problem: ContactProblem, cycle: Callable, accuracy: float, longest: float):
         self.problem, self._cycle = problem, cycle
         self._accuracy, self._longest = accuracy, longest
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
@@ -233,7 +234,7 @@ class _Run:
             "simulated": self.record["simulated"],
         }
 
-    def _through(self, state, parts: list[int], must: bool) -> tuple | None:
+    def _through(self, state: Any, parts: list[int], must: bool) -> tuple | None:
         """The state after a cycle for each of ``parts`` that counts so many times; None where it does not converge, unless it must."""
         self.problem.restore(state[0])
         done = self.record["done"]
@@ -254,7 +255,7 @@ class _Run:
         for contact in self.problem.contacts:
             contact.repeats = times
 
-    def _compared(self, fine, coarse) -> tuple[float, float, list[float], float]:
+    def _compared(self, fine: Any, coarse: Any) -> tuple[float, float, list[float], float]:
         """Volume and largest depth at the end of a jump, the errors, and those that this jump has made, over what it wears.
 
         All reduced over the ranks.  Errors are infinite where a run did not converge.
@@ -286,7 +287,7 @@ class _Folder:
     Whenever the machine stops, the record and what it names are whole.
     """
 
-    def __init__(self, path, run: _Run):
+    def __init__(self, path: str | PathLike[str], run: _Run):
         self._path, self._run, self._comm = Path(path), run, run.problem.body.comm
         self._written: list[str] = []
 

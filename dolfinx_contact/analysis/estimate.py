@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -22,6 +22,7 @@ from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 
 class Estimated(NamedTuple):
@@ -63,11 +64,11 @@ class Estimate:
         return self.quantities[name]
 
 
-def _sum(problem, of) -> float:
+def _sum(problem: ContactProblem, of: Callable) -> float:
     return sum(problem.body.comm.allreduce(float(of(contact))) for contact in problem.contacts)
 
 
-def _peak(problem) -> float:
+def _peak(problem: ContactProblem) -> float:
     tops = [contact.pressure.max(initial=0.0) for contact in problem.contacts]
     return max(problem.body.comm.allgather(float(max(tops))))
 
@@ -184,7 +185,7 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
     return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
 
 
-def interpolated(contact, better) -> np.ndarray:
+def interpolated(contact: ContactLike, better: Any) -> np.ndarray:
     """Nodal tractions of a contact at the nodes of another, local frame.  Collective.
 
     On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.
@@ -214,7 +215,7 @@ def largest(numbers: ArrayLike) -> float:
     return float(numbers[np.abs(numbers).argmax()])
 
 
-def _check_pair(problem, reference) -> None:
+def _check_pair(problem: ContactProblem, reference: ContactProblem) -> None:
     if reference is problem or not hasattr(reference, "contacts"):
         raise ValueError(
             "reference must be another ContactProblem: the same body with a space of higher order or a finer mesh."
@@ -241,7 +242,7 @@ def _check_pair(problem, reference) -> None:
         )
 
 
-def _numbers(name: str, *of) -> list[np.ndarray]:
+def _numbers(name: str, *of: Any) -> list[np.ndarray]:
     value, better = found = [np.ravel(finite(f"quantity {name!r}", numbers)) for numbers in of]
     if value.size == 0:
         raise ValueError(f"quantity {name!r} must be a finite number or several, got {of[0]!r}.")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.support.progress import progress_bar
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
     from dolfinx_contact.problem import ContactProblem
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -81,7 +83,9 @@ def advance(
     return history
 
 
-def _checked(comm, programme, points, start, smallest, monitor) -> tuple[list, float, float]:
+def _checked(
+    comm: MPI.Comm, programme: object, points: Any, start: Any, smallest: Any, monitor: object
+) -> tuple[list, float, float]:
     """Points, start and smallest increment as numbers, the same on all ranks.  Collective."""
     with raised_together(comm):
         start, ends = number("start", start), np.atleast_1d(finite("points", points))
@@ -98,7 +102,14 @@ def _checked(comm, programme, points, start, smallest, monitor) -> tuple[list, f
     return ends.tolist(), start, smallest
 
 
-def _in_increments(problem, programme, now: float, end: float, smallest: float, accepted) -> None:
+def _in_increments(
+    problem: ContactProblem,
+    programme: Callable,
+    now: float,
+    end: float,
+    smallest: float,
+    accepted: Callable,
+) -> None:
     """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
     whole, begun = end - now, now
     # Increments are the whole over ``parts``, of which so many are done.

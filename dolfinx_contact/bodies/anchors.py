@@ -4,8 +4,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike
 
 
 class Anchors:
@@ -26,7 +31,7 @@ class Anchors:
         solver: Its ``LinearSolver``.
     """
 
-    def __init__(self, body):
+    def __init__(self, body: BodyLike):
         self._body, self.dofs = body, _pivots(body.soft, body.comm)
         self.count = body.soft.shape[1]
         diagonal = body.K.getDiagonal().array_r
@@ -65,7 +70,7 @@ class Anchors:
         self.A.destroy()
 
 
-def _pivots(modes: np.ndarray, comm) -> np.ndarray:
+def _pivots(modes: np.ndarray, comm: MPI.Comm) -> np.ndarray:
     """Owned degrees of freedom whose values tell the modes apart: rows chosen by their length, one after another."""
     left, chosen = modes.copy(), []
     for _ in range(modes.shape[1]):

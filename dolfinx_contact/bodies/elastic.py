@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import count
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -18,6 +20,11 @@ from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
 from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
 from dolfinx_contact.support.collective import OverRanks, raised_together
+
+if TYPE_CHECKING:
+    import ufl
+
+    from dolfinx_contact.step.loose import LooseMotions
 
 _instances = count()
 
@@ -39,12 +46,22 @@ class ElasticBody(OverRanks):
         form_options: Of the forms' compilation, see ``compat.compiled``.
     """
 
+    K: Any  # the PETSc matrix, None before the first step
+    soft: np.ndarray
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
-    loose = None  # ``LooseMotions``, where rigid motions cost nothing
+    loose: LooseMotions | None = None  # where rigid motions cost nothing
     scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
     def __init__(
-        self, F, u, bcs, derivative, options=None, prefix=None, of=None, form_options=None
+        self,
+        F: ufl.Form,
+        u: fem.Function,
+        bcs: Sequence[Any],
+        derivative: ufl.Form,
+        options: dict[str, Any] | None = None,
+        prefix: str | None = None,
+        of: Displacements | None = None,
+        form_options: dict[str, Any] | None = None,
     ):
         self.u, self.V = u, u.function_space
         self.comm = self.V.mesh.comm
@@ -70,13 +87,13 @@ class ElasticBody(OverRanks):
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
         self.parts = rigid_motion.connected_parts(self.displacements)
 
-    def support(self, bcs) -> None:
+    def support(self, bcs: Sequence[Any]) -> None:
         """From now on these are the Dirichlet conditions; ``refresh`` sets everything up for them."""
         self.bcs = list(bcs)
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
 
-    def refresh(self, x=None) -> int:
+    def refresh(self, x: np.ndarray | None = None) -> int:
         """Assemble the stiffness if a constant or coefficient in it changed, or what is fixed.
 
         Args:
@@ -261,7 +278,9 @@ class ElasticBody(OverRanks):
 
     # -- solves --------------------------------------------------------------------------------
 
-    def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
+    def solve(
+        self, b: np.ndarray, rough: bool = False, start: np.ndarray | None = None
+    ) -> np.ndarray:
         """K^-1 b, with anchors where the body is loose; the solver is set up at the first call and kept while K stands."""
         return self._own_solver().solve(b, rough, start)
 
@@ -320,11 +339,11 @@ class ElasticBody(OverRanks):
         """Whether solves are exact and cheap, as with a factorisation.  Collective at first."""
         return self.ksp.getType() == "preonly"
 
-    def solver(self, A) -> LinearSolver:
+    def solver(self, A: PETSc.Mat) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
         return LinearSolver(A, self.options, self.prefix, self.rigid_modes)
 
-    def stiffened(self, A, S, how):
+    def stiffened(self, A: PETSc.Mat, S: PETSc.Mat, how: PETSc.Mat.Structure):
         """What applies the preconditioner of ``A = K + S``, springs ``S``; GAMG's levels are those of K.
 
         ``how`` the entries of S lie to those of K: a PETSc ``Mat.Structure``.

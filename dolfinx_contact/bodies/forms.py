@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -12,8 +14,11 @@ from dolfinx import fem
 
 from dolfinx_contact import compat
 
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.displacements import Displacements
 
-def derivative_of(F, u, J, moving: bool = False):
+
+def derivative_of(F: Any, u: fem.Function, J: Any, moving: bool = False):
     """The bilinear form of the tangent, and whether F is linear in u.
 
     Args:
@@ -52,7 +57,7 @@ def derivative_of(F, u, J, moving: bool = False):
     return derivative, linear
 
 
-def check_meshes(form, u, entity_maps) -> None:
+def check_meshes(form: ufl.Form, u: fem.Function, entity_maps: Any) -> None:
     """Raise a ``ValueError`` if a form has integrals or Functions on another mesh, and nothing says how they lie in each other.
 
     Args:
@@ -71,12 +76,12 @@ def check_meshes(form, u, entity_maps) -> None:
         )
 
 
-def depends_on(form, u) -> bool:
+def depends_on(form: ufl.Form, u: fem.Function) -> bool:
     """Whether ``u`` is among the coefficients of a form."""
     return any(c is u for c in form.coefficients())
 
 
-def digest_of(parameters, *more) -> bytes:
+def digest_of(parameters: Iterable[Any], *more: Any) -> bytes:
     """A number that changes with the values of constants and coefficients, and with more bytes or arrays."""
     digest = hashlib.blake2b()
     for part in more:
@@ -87,7 +92,7 @@ def digest_of(parameters, *more) -> bytes:
     return digest.digest()
 
 
-def times_volume(of, modes: np.ndarray) -> np.ndarray:
+def times_volume(of: Displacements, modes: np.ndarray) -> np.ndarray:
     """Integrals of displacements times each shape function over the body's volume, ``shape=(owned dofs, m)``.  Collective.
 
     Args:

@@ -18,7 +18,7 @@ class FreeState(NamedTuple):
     displacement: np.ndarray
     exact: bool  # or to three digits
 
-    def scaled(self, b: np.ndarray, fixed: np.ndarray, comm) -> np.ndarray | None:
+    def scaled(self, b: np.ndarray, fixed: np.ndarray, comm: MPI.Comm) -> np.ndarray | None:
         """The displacement under ``b``, if that is the load times a factor.  Collective.
 
         Args:

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from dolfinx_contact import compat
@@ -14,9 +17,23 @@ from dolfinx_contact.bodies.stiffness_checks import agree_on_values, check_diago
 from dolfinx_contact.petsc.linear_solver import preconditioner
 from dolfinx_contact.support.collective import raised_together
 
+if TYPE_CHECKING:
+    import ufl
+    from dolfinx import fem
+
+    from dolfinx_contact.contact.displacements import Displacements
+
 
 def body_of(
-    F, u, bcs, J=None, options=None, prefix=None, before_residual=None, of=None, form_options=None
+    F: Any,
+    u: fem.Function,
+    bcs: Sequence[Any],
+    J: Any = None,
+    options: dict[str, Any] | None = None,
+    prefix: str | None = None,
+    before_residual: Callable | None = None,
+    of: Displacements | None = None,
+    form_options: dict[str, Any] | None = None,
 ) -> ElasticBody:
     """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
 
@@ -52,7 +69,7 @@ class NonlinearBody(ElasticBody):
 
     nonlinear = True
 
-    def __init__(self, F, u, bcs, derivative, options=None, prefix=None, before=None, of=None, form_options=None):  # fmt: skip
+    def __init__(self, F: ufl.Form, u: fem.Function, bcs: Sequence[Any], derivative: ufl.Form, options: dict[str, Any] | None=None, prefix: str | None=None, before: Callable | None=None, of: Displacements | None=None, form_options: dict[str, Any] | None=None):  # fmt: skip
         super().__init__(F, u, bcs, derivative, options, prefix, of, form_options)
         self._before = before
         self._given = [*self._parameters, *self._load_parameters]
@@ -90,12 +107,12 @@ class NonlinearBody(ElasticBody):
 
     # -- a step --------------------------------------------------------------------------------
 
-    def support(self, bcs) -> None:
+    def support(self, bcs: Sequence[Any]) -> None:
         """See ``ElasticBody``."""
         super().support(bcs)
         self._place = self.soft = None  # where K stands, and motions that are soft: not known
 
-    def refresh(self, x=None) -> int:
+    def refresh(self, x: np.ndarray | None = None) -> int:
         """Agree on what is given, and linearise at the last converged displacement.
 
         Args:

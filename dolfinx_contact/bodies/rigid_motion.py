@@ -11,6 +11,8 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.solvers.protocols import BodyLike
     from dolfinx_contact.step.loose import LooseMotions
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
@@ -23,7 +25,7 @@ SOFT = 1e-4
 SAMPLED = 2000
 
 
-def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
+def soft_motions(body: BodyLike) -> tuple[np.ndarray, LooseMotions | None]:
     """Rigid motions of a part of the body, of its ``parts``, that cost next to no energy.
 
     Every connected part of the mesh is tried: a spring in F gives energy to the rigid motions that the boundary
@@ -67,7 +69,7 @@ def soft_motions(body) -> tuple[np.ndarray, LooseMotions | None]:
     return np.concatenate(soft, axis=1), LooseMotions([LoosePart(*part) for part in loose])
 
 
-def box(x: np.ndarray, here: np.ndarray, comm) -> tuple[np.ndarray, float]:
+def box(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> tuple[np.ndarray, float]:
     """Middle and largest edge of the box around the nodes ``here``.  Collective."""
     low = x[here].min(axis=0, initial=np.inf)
     high = x[here].max(axis=0, initial=-np.inf)
@@ -76,7 +78,7 @@ def box(x: np.ndarray, here: np.ndarray, comm) -> tuple[np.ndarray, float]:
     return (low + high) / 2, (high - low).max()
 
 
-def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
+def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
     """Translations, and rotations about the middle in units of the size, of the nodes ``here``.
 
     ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.
@@ -93,7 +95,7 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm) -> np.ndarray:
     return modes.reshape(gdim * n, modes.shape[2])
 
 
-def free_modes(body) -> np.ndarray:
+def free_modes(body: BodyLike) -> np.ndarray:
     """Orthonormal rigid motions that vanish at fixed degrees of freedom.  Collective."""
     of = body.displacements
     x = of.x[: of.count, : of.dim]
@@ -107,7 +109,7 @@ def free_modes(body) -> np.ndarray:
     return np.linalg.solve(np.linalg.cholesky(products), modes.T).T
 
 
-def extents(displacements) -> tuple[float, float]:
+def extents(displacements: Displacements) -> tuple[float, float]:
     """Largest and smallest edge of the box around the body.  Collective."""
     x, comm = displacements.x, displacements.V.mesh.comm
     edges = np.concatenate((x.max(axis=0, initial=-np.inf), (-x).max(axis=0, initial=-np.inf)))
@@ -116,7 +118,7 @@ def extents(displacements) -> tuple[float, float]:
     return float(edges.max()), float(edges[: displacements.dim].min())
 
 
-def mean_strain(displacements, u: np.ndarray) -> float:
+def mean_strain(displacements: Displacements, u: np.ndarray) -> float:
     """Root mean square of the largest principal strain, of either sign, over some thousand cells of each rank.  Collective.
 
     Args:
@@ -138,7 +140,7 @@ def mean_strain(displacements, u: np.ndarray) -> float:
     return float(np.sqrt(parts[0] / parts[1]))
 
 
-def connected_parts(displacements) -> tuple[np.ndarray, int]:
+def connected_parts(displacements: Displacements) -> tuple[np.ndarray, int]:
     """Number of the connected part of the mesh that each owned node is in, and how many there are.  Collective."""
     V = displacements.V
     comm = V.mesh.comm

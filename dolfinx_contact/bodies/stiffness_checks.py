@@ -5,13 +5,21 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dolfinx_contact.support.collective import from_first, raised_together
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
-def check_diagonal(diagonal: np.ndarray, displacements) -> None:
+    from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.solvers.protocols import BodyLike
+
+
+def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
     """Raise a ``ValueError`` if an entry is not finite, or one of a displacement is not positive."""
     if not np.isfinite(diagonal).all():
         raise ValueError(
@@ -27,7 +35,7 @@ def check_diagonal(diagonal: np.ndarray, displacements) -> None:
         )
 
 
-def check_dilation(body) -> None:
+def check_dilation(body: BodyLike) -> None:
     """Raise a ``ValueError`` if the body gains energy by growing, as with Poisson's ratio above 0.5.  Collective.
 
     Args:
@@ -47,7 +55,7 @@ def check_dilation(body) -> None:
         )
 
 
-def agree_on_values(parameters, comm) -> None:
+def agree_on_values(parameters: Iterable[Any], comm: MPI.Comm) -> None:
     """Raise a ``ValueError`` if a constant of forms or conditions differs between ranks: different problems.
 
     Of Functions the values of the ranks that own them count: ghosts are brought up to date.  Collective.
@@ -77,7 +85,7 @@ def warn_of_unread(options: list[str]) -> None:
         )
 
 
-def check_finite(arrays: dict, comm) -> None:
+def check_finite(arrays: dict, comm: MPI.Comm) -> None:
     """Raise a ``ValueError`` on all ranks if one of the arrays, by their names, is not finite.  Collective."""
     with raised_together(comm):
         for name, values in arrays.items():

@@ -9,14 +9,19 @@ units of those unknowns do not matter.  ``D`` is that of the first stiffness, an
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact.support.collective import raised_together
 
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.displacements import Displacements
 
-def scaled(K, displacements, D: np.ndarray | None = None) -> np.ndarray:
+
+def scaled(K: PETSc.Mat, displacements: Displacements, D: np.ndarray | None = None) -> np.ndarray:
     """Make ``D K D`` of an assembled stiffness, in place.  Collective.
 
     Args:
@@ -34,7 +39,7 @@ def scaled(K, displacements, D: np.ndarray | None = None) -> np.ndarray:
     return D
 
 
-def row_sizes(K, displacements) -> np.ndarray:
+def row_sizes(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
     """Size of the entries in each row: the diagonal one, of unknowns besides displacements the norm of all."""
     diagonal = K.getDiagonal()
     values = np.abs(diagonal.array_r)
@@ -43,7 +48,7 @@ def row_sizes(K, displacements) -> np.ndarray:
     return np.where(displacements.are, values, norms)
 
 
-def scales(K, displacements) -> np.ndarray:
+def scales(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
     """``D`` of a stiffness: what makes a residual of other unknowns a force, ``shape=(owned dofs,)``.
 
     A residual ``c`` in the equation of an unknown ``q`` that acts on displacements is removed by its change ``c / s``,
@@ -83,20 +88,20 @@ def scales(K, displacements) -> np.ndarray:
     return D
 
 
-def _rows(K) -> sparse.csr_matrix:
+def _rows(K: PETSc.Mat) -> sparse.csr_matrix:
     """Owned rows of an assembled matrix."""
     indptr, indices, values = K.getValuesCSR()
     return sparse.csr_matrix((values, indices, indptr), (len(indptr) - 1, K.getSize()[1]))
 
 
-def _matrix(K, rows):
+def _matrix(K: PETSc.Mat, rows: sparse.csr_matrix):
     """A PETSc matrix of owned rows, shared among ranks as ``K``."""
     rows = rows.tocsr()
     csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
     return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
 
 
-def _product(A, values: np.ndarray) -> np.ndarray:
+def _product(A: PETSc.Mat, values: np.ndarray) -> np.ndarray:
     """``A x``, owned entries."""
     right, left = A.createVecs()
     right.array_w[:] = values

@@ -45,6 +45,8 @@ from dolfinx_contact.surfaces.surface import Surface
 if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # before 0.6 it has another name
 
+    from dolfinx_contact.solvers.protocols import MapLike
+
 
 # Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
 TILTED = 0.01
@@ -149,11 +151,11 @@ class Contact(Guarded):
         friction = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         return f"<Contact of {self.nodes.size} nodes on this rank, {self.surface!r}, {friction}, wear={self.wear!r}>"
 
-    def belong_to(self, problem) -> None:
+    def belong_to(self, problem: object) -> None:
         """From now on ``problem`` makes this contact's history."""
         self._owner = weakref.ref(problem)
 
-    def belongs_to(self, problem) -> bool:
+    def belongs_to(self, problem: object) -> bool:
         """Whether no later problem has taken this contact."""
         return self._owner is not None and self._owner() is problem
 
@@ -238,7 +240,13 @@ class Contact(Guarded):
 
     # -- nodes that supports hold --------------------------------------------------------------
 
-    def hold(self, held, closed, guided=None, fixed=None) -> None:
+    def hold(
+        self,
+        held: np.ndarray,
+        closed: np.ndarray,
+        guided: tuple | None = None,
+        fixed: np.ndarray | None = None,
+    ) -> None:
         """Take note of what boundary conditions fix, see ``ContactPoints.hold``."""
         self.points.hold(held, closed, guided, fixed)
         self._forget_supported()
@@ -283,7 +291,7 @@ class Contact(Guarded):
             self._free_friction = found
         return self._free_friction
 
-    def law_of(self, law, nodes=slice(None)) -> Any:
+    def law_of(self, law: Any, nodes: Any = slice(None)) -> Any:
         """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
 
         Args:
@@ -496,13 +504,15 @@ class Contact(Guarded):
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         return BipotentialMap(self.rho) if name == "bipotential" else ReturnMap(self.rho, self.rho)
 
-    def respond(self, u, map) -> None:
+    def respond(self, u: fem.Function | np.ndarray, map: MapLike) -> None:
         """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
         self.move(u)
         reaction, status = map(self.law_of(self.law), self.reaction, self.gap, self.slip_increment)
         self.take(reaction=reaction, status=status)
 
-    def respond_with_derivatives(self, u, map) -> tuple[np.ndarray, np.ndarray]:
+    def respond_with_derivatives(
+        self, u: fem.Function | np.ndarray, map: MapLike
+    ) -> tuple[np.ndarray, np.ndarray]:
         """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
 
         Returns:

@@ -5,13 +5,17 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dolfinx_contact import compat
 
+if TYPE_CHECKING:
+    from dolfinx import fem
 
-def displacement_part(V):
+
+def displacement_part(V: fem.FunctionSpace):
     """The sub-space of a mixed space that holds displacements; None of any other space.
 
     Args:
@@ -60,7 +64,7 @@ class Displacements:
         degree: Of their shape functions.
     """
 
-    def __init__(self, V):
+    def __init__(self, V: fem.FunctionSpace):
         part, self.V, self._dofs = displacement_part(V), V, None
         self.mixed = part is not None
         index_map, bs = V.dofmap.index_map, V.dofmap.index_map_bs

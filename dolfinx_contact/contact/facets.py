@@ -8,13 +8,16 @@ nodes, and a rigid surface may be nearer or farther than its gaps at the nodes t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.shapes import monomials
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.displacements import Displacements
 
 # Points per direction of a facet: those of Gauss's rule, which no wave has at the same phase.
 POINTS = 5
@@ -79,7 +82,7 @@ class Facets(NamedTuple):
         return 0.25 * ((hats @ self.bend) * hats).sum(axis=-1)
 
 
-def facets_of(displacements, facets: np.ndarray) -> list[Facets]:
+def facets_of(displacements: Displacements, facets: np.ndarray) -> list[Facets]:
     """Facets, local indices, of which those that this rank owns count, those of each shape together.  Collective."""
     V, topology = displacements.V, displacements.V.mesh.topology
     fdim = topology.dim - 1
@@ -110,7 +113,7 @@ def facets_of(displacements, facets: np.ndarray) -> list[Facets]:
     return _with_normals(V, x, groups, fdim)
 
 
-def _with_normals(V, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
+def _with_normals(V: fem.FunctionSpace, x: np.ndarray, groups: list, fdim: int) -> list[Facets]:
     normals, total = [], fem.Function(V)
     sums = total.x.array.reshape(-1, fdim + 1)
     for corners, _, nodes, middle in groups:

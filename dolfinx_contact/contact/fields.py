@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -16,6 +17,11 @@ from dolfinx_contact import compat
 from dolfinx_contact.support.checks import finite
 from dolfinx_contact.support.collective import raised_together
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from dolfinx_contact.solvers.protocols import ContactLike
+
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
 ZERO = 1e-10
 
@@ -26,7 +32,7 @@ SQUARE = 1e-10
 UNEVEN = 0.01
 
 
-def weight_on(V, weight):
+def weight_on(V: fem.FunctionSpace, weight: Any):
     """The weight of the surface measure as UFL takes it: a number, an expression, or a callable of ``x``, interpolated.  Collective."""
     if weight is None or isinstance(weight, ufl.core.expr.Expr):
         return weight
@@ -39,7 +45,7 @@ def weight_on(V, weight):
     return values
 
 
-def _assembled(density, V, facets: np.ndarray, weight) -> np.ndarray:
+def _assembled(density: Any, V: fem.FunctionSpace, facets: np.ndarray, weight: Any) -> np.ndarray:
     """A density with a test function of ``V``, integrated over facets with a weight.  Collective."""
     mesh, fdim = V.mesh, V.mesh.topology.dim - 1
     mine = np.unique(facets[facets < mesh.topology.index_map(fdim).size_local])
@@ -50,7 +56,9 @@ def _assembled(density, V, facets: np.ndarray, weight) -> np.ndarray:
     return work.x.array.copy()
 
 
-def areas(V, facets: np.ndarray, reference: bool = False, weight=None) -> np.ndarray:
+def areas(
+    V: fem.FunctionSpace, facets: np.ndarray, reference: bool = False, weight: Any = None
+) -> np.ndarray:
     """Integral of each shape function over facets, in the first component of an array on ``V``.  Collective.
 
     Args:
@@ -65,7 +73,7 @@ def areas(V, facets: np.ndarray, reference: bool = False, weight=None) -> np.nda
     return _assembled(shape, V, facets, weight)
 
 
-def facing_areas(contact, weight) -> np.ndarray:
+def facing_areas(contact: ContactLike, weight: Any) -> np.ndarray:
     r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
 
     On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that an even pressure p makes the
@@ -107,7 +115,7 @@ def per_area(forces: np.ndarray, area: np.ndarray) -> np.ndarray:
     return np.divide(forces, area, out=np.zeros_like(forces), where=area > 0.0)
 
 
-def grows_with_radius(V, weight) -> bool:
+def grows_with_radius(V: fem.FunctionSpace, weight: Any) -> bool:
     """Whether a weight is in proportion to the first coordinate all over the mesh, as in axial symmetry.  Collective."""
     r = ufl.SpatialCoordinate(V.mesh)[0]
     terms = (weight * weight, weight * r, r * r)
@@ -116,7 +124,9 @@ def grows_with_radius(V, weight) -> bool:
     return bool(squares[1] ** 2 >= (1 - SQUARE) * squares[0] * squares[2] > 0.0)
 
 
-def contact_nodes(V, facets: np.ndarray, weight=None) -> tuple[np.ndarray, np.ndarray]:
+def contact_nodes(
+    V: fem.FunctionSpace, facets: np.ndarray, weight: Any = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Owned nodes of facets that carry a part of an even pressure, and the others.  Collective.
 
     An even pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
@@ -149,7 +159,7 @@ def contact_nodes(V, facets: np.ndarray, weight=None) -> tuple[np.ndarray, np.nd
 
 
 def _warn_of_curved_edges(
-    V, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray, weight
+    V: fem.FunctionSpace, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray, weight: Any
 ) -> None:
     """Tell that an even pressure acts on nodes that are left out.  Collective."""
     comm, dim = V.mesh.comm, V.mesh.geometry.dim
@@ -167,7 +177,7 @@ def _warn_of_curved_edges(
         )
 
 
-def scalar(V, nodes: np.ndarray, values, name: str, elsewhere: float):
+def scalar(V: fem.FunctionSpace, nodes: np.ndarray, values: ArrayLike, name: str, elsewhere: float):
     """Values at some nodes of ``V`` as a scalar Function.  Collective."""
     scalars, parent = V.sub(0).collapse()
     node = np.ravel(parent) // V.dofmap.index_map_bs

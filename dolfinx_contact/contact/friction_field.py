@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from inspect import signature
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -12,6 +14,9 @@ from dolfinx import fem
 from dolfinx_contact import compat
 from dolfinx_contact.law.friction import Friction, is_field, rough
 from dolfinx_contact.support.checks import finite
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -29,7 +34,9 @@ def followed(friction: Friction) -> list[str]:
     return [name for name in STATE if name in asked]
 
 
-def on_nodes(contact, friction: Friction, state: dict[str, np.ndarray], axes=None) -> Friction:
+def on_nodes(
+    contact: ContactLike, friction: Friction, state: dict[str, np.ndarray], axes: Any = None
+) -> Friction:
     """The law with coefficients and axes for each owned node of a contact, as its frames are at present.
 
     Args:
@@ -75,7 +82,7 @@ def directed(friction: Friction, gdim: int) -> bool:
     return friction.field and gdim == 3 and is_field(friction.given()["axes"])
 
 
-def _arguments(given) -> list[str]:
+def _arguments(given: Callable) -> list[str]:
     """Arrays of the contact that a field has as arguments; one whose arguments Python does not know has none."""
     if not callable(given) or hasattr(given, "function_space"):
         return []
@@ -85,7 +92,7 @@ def _arguments(given) -> list[str]:
         return []
 
 
-def _coefficients(contact, name: str, given, state):
+def _coefficients(contact: ContactLike, name: str, given: Any, state: dict[str, np.ndarray]):
     if not is_field(given):
         return given
     state = {key: state[key].copy() for key in _arguments(given)}
@@ -98,13 +105,13 @@ def _coefficients(contact, name: str, given, state):
     return np.broadcast_to(values, (2, n)).T.copy()
 
 
-def directions(contact, friction: Friction) -> np.ndarray:
+def directions(contact: ContactLike, friction: Friction) -> np.ndarray:
     """Directions of a field of axes at the reference positions of the nodes, ``shape=(n, 2)`` or ``(n, 3)``: the same in every state."""
     values = _values(contact, "axes", friction.given()["axes"], {})
     return (values / np.linalg.norm(values, axis=0)).T.copy()
 
 
-def _axes(contact, friction: Friction):
+def _axes(contact: ContactLike, friction: Friction):
     if not is_field(given := friction.given()["axes"]):
         return given
     if friction.of == "surface":
@@ -112,7 +119,9 @@ def _axes(contact, friction: Friction):
     return axes_at(contact, given, None, contact.frame)
 
 
-def axes_at(contact, given, at: np.ndarray | None, frame: np.ndarray) -> np.ndarray:
+def axes_at(
+    contact: ContactLike, given: Any, at: np.ndarray | None, frame: np.ndarray
+) -> np.ndarray:
     """Axes at positions of the nodes in frames there, ``shape=(n, 2)``; None is the reference positions.
 
     Raises:
@@ -140,7 +149,13 @@ def axes_at(contact, given, at: np.ndarray | None, frame: np.ndarray) -> np.ndar
     return (along / length).T.copy()
 
 
-def _values(contact, name: str, given, state, at=None) -> np.ndarray:
+def _values(
+    contact: ContactLike,
+    name: str,
+    given: Any,
+    state: dict[str, np.ndarray],
+    at: np.ndarray | None = None,
+) -> np.ndarray:
     """Values at the nodes, ``shape=(n,)`` or ``(components, n)``; of a callable also ``at`` other positions, ``shape=(n, 3)``."""
     if hasattr(given, "function_space"):
         return _of_function(contact, name, given)
@@ -152,7 +167,7 @@ def _values(contact, name: str, given, state, at=None) -> np.ndarray:
     return np.zeros((2, 0)) if n == 0 else values
 
 
-def _of_function(contact, name: str, function) -> np.ndarray:
+def _of_function(contact: ContactLike, name: str, function: fem.Function) -> np.ndarray:
     V = function.function_space
     if V.mesh is not contact.V.mesh or compat.lagrange_degree(V) is None:
         raise ValueError(

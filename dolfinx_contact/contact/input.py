@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +16,15 @@ from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
+if TYPE_CHECKING:
+    from dolfinx.mesh import Mesh
+    from numpy.typing import ArrayLike
+
 # Coefficients of friction between these are hardly meant.
 PERCENT = 10.0, 1000.0
 
 
-def check_space(V) -> None:
+def check_space(V: Any) -> None:
     mesh = V.mesh
     gdim, tdim = mesh.geometry.dim, mesh.topology.dim
     part = displacement_part(V)
@@ -38,7 +43,7 @@ def check_space(V) -> None:
         raise ValueError(f"V must be continuous Lagrange, got {V.ufl_element()}.")
 
 
-def given_facets(facets, mesh) -> np.ndarray:
+def given_facets(facets: Any, mesh: Mesh) -> np.ndarray:
     """Facets as an array, also where ``(facet_tags, tag)`` says which.  Collective."""
     fdim, found, tags = mesh.topology.dim - 1, None, None
     with raised_together(mesh.comm):
@@ -63,7 +68,7 @@ def given_facets(facets, mesh) -> np.ndarray:
     return found.indices[np.isin(found.values, tags)]
 
 
-def checked_facets(facets, index_map, boundary) -> np.ndarray:
+def checked_facets(facets: ArrayLike, index_map: Any, boundary: np.ndarray) -> np.ndarray:
     array = np.asarray(facets)
     if hasattr(facets, "indices") or (array.ndim == 0 and np.issubdtype(array.dtype, np.integer)):
         given = "facet tags" if hasattr(facets, "indices") else f"the number {facets}"
@@ -92,7 +97,9 @@ def checked_facets(facets, index_map, boundary) -> np.ndarray:
     return array.astype(np.int32)
 
 
-def check_law(surface, friction, gdim: int, directed: bool = False) -> None:
+def check_law(
+    surface: object, friction: Friction | float, gdim: int, directed: bool = False
+) -> None:
     """``directed``: directions of friction are given in space."""
     if not isinstance(surface, Surface):
         raise ValueError(
@@ -114,7 +121,7 @@ def check_law(surface, friction, gdim: int, directed: bool = False) -> None:
         )
 
 
-def warn_of_percent(friction) -> None:
+def warn_of_percent(friction: Friction | float) -> None:
     """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
     largest = friction.mu.max() if friction.mu.ndim == 1 else 0.0  # not per node
     if PERCENT[0] < largest < PERCENT[1]:
@@ -125,7 +132,7 @@ def warn_of_percent(friction) -> None:
         )
 
 
-def check_coefficients(friction, n: int) -> None:
+def check_coefficients(friction: Friction, n: int) -> None:
     for name in ("mu", "p", "axes"):
         shape = np.shape(getattr(friction, name))
         if len(shape) == 2 and shape[0] != n:
@@ -134,6 +141,6 @@ def check_coefficients(friction, n: int) -> None:
             )
 
 
-def check_wear(wear) -> None:
+def check_wear(wear: object) -> None:
     if not (wear is None or isinstance(wear, Wear)):
         raise ValueError(f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}.")

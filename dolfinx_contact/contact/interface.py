@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
@@ -48,7 +50,11 @@ class ContactPoints:
         )
 
     def hold(
-        self, held: np.ndarray, closed: np.ndarray, guided: tuple | None = None, fixed=None
+        self,
+        held: np.ndarray,
+        closed: np.ndarray,
+        guided: tuple | None = None,
+        fixed: np.ndarray | None = None,
     ) -> None:
         """Take note of what boundary conditions fix: directions ``held``, points ``closed``, others ``guided``.
 
@@ -70,7 +76,7 @@ class ContactPoints:
             carried -= self.along[:, :, None] * (self.along[:, None, :] @ carried)
             self._given = np.where(np.abs(carried) < FREE, 0.0, carried)
 
-    def known(self, motion: np.ndarray, terms) -> np.ndarray | None:
+    def known(self, motion: np.ndarray, terms: Iterable[np.ndarray]) -> np.ndarray | None:
         """Tangential part of a motion that boundary conditions prescribe, ``shape=(n, gdim - 1)``; None if it is rounding.
 
         Args:
@@ -157,7 +163,7 @@ class ContactPoints:
         free = self.frames[:, :-1] * ~np.isin(self.dofs, fixed)[:, None, :]
         return free @ free.transpose(0, 2, 1)
 
-    def stiffness(self, K) -> NodalStiffness:
+    def stiffness(self, K: PETSc.Mat) -> NodalStiffness:
         """Normal and tangential blocks of an assembled PETSc matrix at the points, local frame.  Collective.
 
         Along directions that boundary conditions hold, where the matrix has their rows, it is that along the normal.
@@ -180,7 +186,7 @@ def block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
     return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * dim,) * 2).tocsr()
 
 
-def nodal_blocks(K, dofs: np.ndarray) -> np.ndarray:
+def nodal_blocks(K: PETSc.Mat, dofs: np.ndarray) -> np.ndarray:
     """Blocks of an assembled PETSc matrix at nodes, ``shape=(n, gdim, gdim)``.  Collective.
 
     Args:
@@ -205,7 +211,7 @@ def nodal_blocks(K, dofs: np.ndarray) -> np.ndarray:
     return blocks
 
 
-def responses(K, points, derivatives) -> tuple:
+def responses(K: PETSc.Mat, points: Sequence[ContactPoints], derivatives: Sequence[tuple]) -> tuple:
     """``B^T R_r S`` and ``B^T R_u B`` of all contacts, sparse: owned rows, columns in global numbers.  Collective.
 
     Args:
@@ -219,7 +225,9 @@ def responses(K, points, derivatives) -> tuple:
     return tuple(sums)
 
 
-def response(points, derivatives, forces: np.ndarray, x: np.ndarray) -> np.ndarray:
+def response(
+    points: Sequence[ContactPoints], derivatives: Sequence[tuple], forces: np.ndarray, x: np.ndarray
+) -> np.ndarray:
     """``B^T (R_r S f + R_u B x)`` of all contacts, on owned degrees of freedom."""
     change = np.zeros_like(forces)
     for of, (R_r, R_u) in zip(points, derivatives):
@@ -229,20 +237,20 @@ def response(points, derivatives, forces: np.ndarray, x: np.ndarray) -> np.ndarr
     return change
 
 
-def like(K, values: sparse.csr_matrix) -> PETSc.Mat:
+def like(K: PETSc.Mat, values: sparse.csr_matrix) -> PETSc.Mat:
     """A PETSc matrix of the layout of ``K`` with these owned rows, columns in global numbers.  Collective."""
     csr = (values.indptr.astype(PETSc.IntType), values.indices.astype(PETSc.IntType), values.data)
     return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
 
 
-def structure(points) -> PETSc.Mat.Structure:
+def structure(points: Sequence[ContactPoints]) -> PETSc.Mat.Structure:
     """How the entries of what contacts add to a stiffness lie to its own."""
     kinds = PETSc.Mat.Structure
     local = all(of.local for of in points)
     return kinds.SUBSET_NONZERO_PATTERN if local else kinds.DIFFERENT_NONZERO_PATTERN
 
 
-def add_to(K, values: sparse.csr_matrix) -> None:
+def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:
     """Add a sparse matrix of owned rows, columns in global numbers, to an assembled PETSc matrix.  Collective."""
     first = K.getOwnershipRange()[0]
     for row in np.flatnonzero(np.diff(values.indptr)):

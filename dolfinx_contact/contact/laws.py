@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from dolfinx_contact.contact.input import check_law, warn_of_percent
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.collective import raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import ContactLike
+    from dolfinx_contact.surfaces.surface import Surface
 
 
 class Laws:
@@ -35,7 +39,7 @@ class Laws:
         self._field: Friction | None = None  # the law given, if anything in it is a field
         self._rested: Friction | None = None  # a field's law in the last converged state
 
-    def assign(self, contact, friction: Friction | float, empty: bool = False) -> None:
+    def assign(self, contact: ContactLike, friction: Friction | float, empty: bool = False) -> None:
         """Take another law; fields as before anything has touched if ``empty``.  Collective where there are fields."""
         friction, field = as_friction(friction), None
         if getattr(friction, "field", False):
@@ -48,7 +52,9 @@ class Laws:
         self._field, self.begun, self._rested = field, None, None
         self._take(contact, friction)
 
-    def _evaluated(self, contact, field: Friction, empty: bool = False, axes=None) -> Friction:
+    def _evaluated(
+        self, contact: ContactLike, field: Friction, empty: bool = False, axes: Any = None
+    ) -> Friction:
         """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
         state = {name: none if empty else getattr(contact, name) for name in followed(field)}
@@ -57,7 +63,7 @@ class Laws:
             check_law(contact.surface, friction, gdim, directed(field, gdim))
         return at_most_rough(friction)
 
-    def _take(self, contact, friction: Friction) -> None:
+    def _take(self, contact: ContactLike, friction: Friction) -> None:
         self.friction, self.kernel = friction, friction.law(contact.V.mesh.geometry.dim)
 
     @property
@@ -65,7 +71,7 @@ class Laws:
         """Whether axes of friction depend on where nodes are on the surface."""
         return self._field is not None and self._field.of == "surface"
 
-    def turned(self, contact, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
+    def turned(self, contact: ContactLike, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
         """Radians by which axes of the surface's texture at other positions differ from those in use, ``shape=(n,)``; 0 of others.
 
         Args:
@@ -83,7 +89,7 @@ class Laws:
         """Whether friction follows the pressure at the end of the step."""
         return self._field is not None and "pressure" in followed(self._field)
 
-    def renew(self, contact, begin: bool = False) -> None:
+    def renew(self, contact: ContactLike, begin: bool = False) -> None:
         """Let fields have their present values.  Collective.
 
         Args:
@@ -102,12 +108,12 @@ class Laws:
         if followed(self._field):
             self.begun = self.friction
 
-    def restore(self, contact) -> None:
+    def restore(self, contact: ContactLike) -> None:
         """Return to the last converged state."""
         if self._rested is not None:
             self._take(contact, self._rested)
 
-    def described(self, surface) -> dict[str, str]:
+    def described(self, surface: Surface) -> dict[str, str]:
         """Surface and laws, but coefficients per node, in words: the same on all ranks."""
         driven = surface.driver.driven() if surface.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
@@ -121,7 +127,7 @@ class Laws:
             "wear": repr(self.wear),
         }
 
-    def save(self, contact) -> dict[str, np.ndarray]:
+    def save(self, contact: ContactLike) -> dict[str, np.ndarray]:
         """Coefficients, of a law that follows the state those without one, and axes of all nodes; surface and wear.
 
         Of a field of axes the directions that were given: those in the frames change with the state.
@@ -139,7 +145,7 @@ class Laws:
             "rigid_plane": np.concatenate(parts),
         } | texture
 
-    def check_saved(self, contact, saved: Mapping[str, np.ndarray]) -> None:
+    def check_saved(self, contact: ContactLike, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if another law or surface was saved."""
         named = {"laws": "friction", "texture": "friction", "rigid_plane": "plane or wear"}
         for name, array in self.save(contact).items():
@@ -149,7 +155,7 @@ class Laws:
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
-    def load(self, contact, saved: Mapping[str, np.ndarray]) -> Friction:
+    def load(self, contact: ContactLike, saved: Mapping[str, np.ndarray]) -> Friction:
         """Let fields have the values of the state that was saved; returns the law by which its last step was settled."""
         if self._field is not None:
             self._take(contact, self._evaluated(contact, self._field))

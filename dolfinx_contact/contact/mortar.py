@@ -18,7 +18,7 @@ the dual shape functions, which are biorthogonal and sum up to one whatever part
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -66,7 +66,7 @@ class Side(NamedTuple):
     corners: np.ndarray
     degree: int
 
-    def some(self, which) -> Side:
+    def some(self, which: np.ndarray | slice) -> Side:
         """Those of the facets that a slice or a mask names."""
         rows = {name: getattr(self, name)[which] for name in ("nodes", "x", "outwards")}
         return self._replace(**rows)
@@ -212,7 +212,7 @@ def _cyclic(corners: np.ndarray) -> np.ndarray:
 def _quarters(local: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
     """Nodes of the halves of an interval, the quarters of a triangle or square, in cyclic order."""
 
-    def at(*points) -> np.ndarray:
+    def at(*points: Any) -> np.ndarray:
         return np.array([np.abs(local - point).sum(axis=1).argmin() for point in points])
 
     if local.shape[1] == 1:
@@ -258,7 +258,9 @@ def candidates(pieces: Pieces, others: Pieces) -> tuple[np.ndarray, np.ndarray]:
 # -- integrals over common parts ---------------------------------------------------------------
 
 
-def _integrals(side: Side, pieces: Pieces, other: Side, others: Pieces, a, b) -> tuple:
+def _integrals(
+    side: Side, pieces: Pieces, other: Side, others: Pieces, a: np.ndarray, b: np.ndarray
+) -> tuple:
     """Integrals over the common parts of pairs of pieces, in the plane of the first: of shape functions, of products, and with the other side's."""
     axes, origin = _axes(pieces.normal)[a], pieces.middle[a][:, None]
     axes = axes.transpose(0, 2, 1)

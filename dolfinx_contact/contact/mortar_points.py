@@ -10,7 +10,7 @@ PETSc matrix: the opposite nodes may belong to other ranks.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -26,6 +26,12 @@ from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.solvers.protocols import ContactLike
+
 STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
 AXIS = 1e-8  # part of an axis along the surface, of a direction that is none
@@ -38,7 +44,7 @@ class MortarPlacement(Placement):
     else the last one for which ``geometry_error`` was too large, see ``step/geometry.py``.
     """
 
-    def __init__(self, contact, facets: np.ndarray, owned: tuple, extent: float):
+    def __init__(self, contact: ContactLike, facets: np.ndarray, owned: tuple, extent: float):
         of, nodes, comm = contact.displacements, contact.nodes, contact.comm
         self._slave, self._master = (
             Skin(of, some, comm) for some in (facets, contact.surface.facets)
@@ -180,7 +186,7 @@ class Skin:
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
     """
 
-    def __init__(self, of, facets: np.ndarray, comm):
+    def __init__(self, of: Displacements, facets: np.ndarray, comm: MPI.Comm):
         sides, self._comm = _gathered(of, facets, comm), comm
         self.numbers = np.unique(
             np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
@@ -232,7 +238,15 @@ class MortarPoints(ContactPoints):
     local = False
     met: np.ndarray
 
-    def __init__(self, dofs, frames, owned, rows: Rows, opposite: np.ndarray, comm):
+    def __init__(
+        self,
+        dofs: np.ndarray,
+        frames: np.ndarray,
+        owned: tuple[int, int, int],
+        rows: Rows,
+        opposite: np.ndarray,
+        comm: MPI.Comm,
+    ):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
         self._m, self._opposite, self._comm = rows.m, opposite, comm
@@ -252,7 +266,7 @@ class MortarPoints(ContactPoints):
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
-    def _petsc(self, starts, columns, values) -> PETSc.Mat:
+    def _petsc(self, starts: np.ndarray, columns: np.ndarray, values: np.ndarray) -> PETSc.Mat:
         csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ravel(values))
         size = ((self.dofs.size, None), (self.size, self._whole))
         return PETSc.Mat().createAIJ(size, csr=csr, comm=self._comm)
@@ -271,7 +285,13 @@ class MortarPoints(ContactPoints):
         starts, columns, values = self._B.getValuesCSR()
         return self._petsc(starts, columns, np.abs(values))
 
-    def hold(self, held, closed, guided=None, fixed=None) -> None:
+    def hold(
+        self,
+        held: np.ndarray,
+        closed: np.ndarray,
+        guided: tuple | None = None,
+        fixed: np.ndarray | None = None,
+    ) -> None:
         """See ``ContactPoints``; nodes opposite nothing never touch, either."""
         super().hold(held, closed | self.alone, guided, fixed)
 
@@ -295,14 +315,14 @@ class MortarPoints(ContactPoints):
         """See ``ContactPoints``."""
         forces += self._columns(self._sizes, np.abs(reaction))
 
-    def _rows(self, matrix, u: np.ndarray) -> np.ndarray:
+    def _rows(self, matrix: PETSc.Mat, u: np.ndarray) -> np.ndarray:
         if u.ndim > 1:
             return np.stack([self._rows(matrix, column) for column in u.T], axis=-1)
         self._body.array_w[:] = u
         matrix.mult(self._body, self._points)
         return self._points.array_r.reshape(self.count, self.dim).copy()
 
-    def _columns(self, matrix, reaction: np.ndarray) -> np.ndarray:
+    def _columns(self, matrix: PETSc.Mat, reaction: np.ndarray) -> np.ndarray:
         self._points.array_w[:] = reaction.ravel()
         matrix.multTranspose(self._points, self._body)
         return self._body.array_r.copy()
@@ -352,7 +372,7 @@ class MortarPoints(ContactPoints):
         """See ``ContactPoints``."""
         return np.append(super().reach, self._opposite)
 
-    def stiffness(self, K) -> NodalStiffness:
+    def stiffness(self, K: PETSc.Mat) -> NodalStiffness:
         """See ``ContactPoints``: of springs in series, ``1/k = 1/k_a + sum_b m_ab^2 / k_b``, as matrices along slip.  Collective."""
         alone = super().stiffness(K)
         C = self._opposite_compliance(K)
@@ -365,7 +385,7 @@ class MortarPoints(ContactPoints):
         tangential = np.linalg.solve(eye + alone.tangential @ along, alone.tangential)
         return NodalStiffness(normal, tangential)
 
-    def _opposite_compliance(self, K) -> np.ndarray:
+    def _opposite_compliance(self, K: PETSc.Mat) -> np.ndarray:
         """Inverse nodal blocks of the opposite nodes, ``shape=(m, gdim, gdim)``; zero along fixed directions."""
         mine = ((self._opposite >= self.first) & (self._opposite < self.first + self.size)).all(axis=1)  # fmt: skip
         own = np.flatnonzero(mine)
@@ -398,7 +418,7 @@ def frames_along(normals: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     return np.stack((along, np.cross(normals, along), normals), axis=1)
 
 
-def _gathered(of, facets: np.ndarray, comm) -> list[Side]:
+def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm) -> list[Side]:
     """The facets of all ranks by shape, nodes in global numbers.  Collective."""
     mine = []
     for part in facets_of(of, facets):
@@ -416,7 +436,7 @@ def _gathered(of, facets: np.ndarray, comm) -> list[Side]:
     ]
 
 
-def _numbers(index_map, nodes: np.ndarray) -> np.ndarray:
+def _numbers(index_map: Any, nodes: np.ndarray) -> np.ndarray:
     """Global numbers of local nodes."""
     return index_map.local_to_global(nodes.astype(np.int32)).astype(np.int64)
 

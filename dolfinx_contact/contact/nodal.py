@@ -11,12 +11,15 @@ contacts, moves the node by ``(sum F^T r - p) / spring``.  Semismooth Newton, an
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.step.errors import EPSILON
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import LawLike
 
 # Newton's steps at most, those in which a residual has to halve, and sweeps over the contacts after one that does not help.
 MOST, PATIENCE, SWEEPS = 30, 8, 4
@@ -32,7 +35,7 @@ class Part(NamedTuple):
     """One of ``n`` contacts at ``k`` of ``m`` nodes."""
 
     slots: np.ndarray  # which nodes, (k,)
-    law: object  # the kernel's, of these nodes
+    law: LawLike  # the kernel's, of these nodes
     spring: np.ndarray  # (k,)
     gap: np.ndarray  # (k,)
     slip: np.ndarray  # (k, gdim - 1)
@@ -49,7 +52,14 @@ class NodalProblems:
         shares: ``s``, ``shape=(m, n)``.
     """
 
-    def __init__(self, parts: list[Part], frames: np.ndarray, force, alike, shares):
+    def __init__(
+        self,
+        parts: list[Part],
+        frames: np.ndarray,
+        force: np.ndarray,
+        alike: np.ndarray,
+        shares: np.ndarray,
+    ):
         self._parts, self._shape = parts, frames.shape[:3]
         m, n, dim = self._shape
         self.stacked = frames.reshape(m, n * dim, dim)

@@ -12,7 +12,7 @@ there.  That position is where the last step has left the node, and then, while 
 from __future__ import annotations
 
 from copy import copy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from dolfinx_contact.step.errors import EPSILON
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, composed, cross, rotation_between
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
 CLEAR = 1e-9
@@ -70,7 +73,13 @@ class Placement:
     landed_after: np.ndarray | None = None
 
     def __init__(
-        self, surface: Surface, x: np.ndarray, dofs: np.ndarray, owned: tuple, extent: float, comm
+        self,
+        surface: Surface,
+        x: np.ndarray,
+        dofs: np.ndarray,
+        owned: tuple,
+        extent: float,
+        comm: MPI.Comm,
     ):
         self.surface, self.x, self._comm = surface, x, comm
         self._dofs, self._owned, self._apart = dofs, owned, CLEAR * extent
@@ -209,7 +218,9 @@ class Placement:
         """Rotation vector, in 2-D angle, by which a surface has turned since the last step, in its axes."""
         return surface.own_axes(rotation_between(self.settled.ended, surface.rotation))
 
-    def way(self, surface: Surface, y, own, distance, last: State) -> np.ndarray:
+    def way(
+        self, surface: Surface, y: np.ndarray, own: np.ndarray, distance: np.ndarray, last: State
+    ) -> np.ndarray:
         """By what the way along the surface since the last step is more than its chord, ``shape=(n, gdim - 1)``, local frame.
 
         Relative to the surface the nearest point goes round from one normal to the other, and about the normal as the
@@ -332,7 +343,7 @@ class Placement:
         lengths = (self.x, self.surface.point, self.surface.displacement, self.now.points.motion(u))
         return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
 
-    def motion_rounding(self, u: np.ndarray, state: State, last: State, worn) -> tuple:
+    def motion_rounding(self, u: np.ndarray, state: State, last: State, worn: np.ndarray) -> tuple:
         """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
 
         That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.

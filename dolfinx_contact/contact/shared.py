@@ -9,17 +9,26 @@ what is left of it is the law of every contact.  With one contact alone it is wh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part
 from dolfinx_contact.law.friction import Friction
 
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import ContactLike
+    from dolfinx_contact.step.errors import NodalStiffness
+
 # By which the product of two unit normals may miss one for them to be the same.
 ALIKE = 1e-12
 
 
-def shared_nodes(contacts, stiffness, fixed: np.ndarray) -> SharedNodes | None:
+def shared_nodes(
+    contacts: Sequence[ContactLike], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
+) -> SharedNodes | None:
     """The nodes of this rank that belong to several contacts, None if there are none.
 
     Args:
@@ -35,7 +44,7 @@ def shared_nodes(contacts, stiffness, fixed: np.ndarray) -> SharedNodes | None:
     return SharedNodes(contacts, stiffness, fixed, nodes, alike, shares) if nodes.size else None
 
 
-def shares_of(contacts, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shares_of(contacts: Sequence[ContactLike], nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which contacts have the same normal at nodes, and the part of what presses there that each of those carries.  Collective.
 
     Two contacts on one face leave open how the reaction of a node of their common edge is shared; it is by area.
@@ -62,7 +71,7 @@ def shares_of(contacts, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return alike & ~np.eye(n, dtype=bool), shares
 
 
-def mean_laws(laws, contacts) -> list[Friction]:
+def mean_laws(laws: list[Friction], contacts: Sequence[ContactLike]) -> list[Friction]:
     """Friction of each contact with, at nodes of several contacts with the same normal, the mean of theirs by shares.  Collective.
 
     That of the node as a whole, for solvers that do not know of shares: exact where it is isotropic, along principal directions else.
@@ -91,7 +100,7 @@ def mean_laws(laws, contacts) -> list[Friction]:
     return mixed
 
 
-def any_shared(contacts) -> bool:
+def any_shared(contacts: Sequence[ContactLike]) -> bool:
     """Whether any node of any rank belongs to several contacts.  Collective."""
     if len(contacts) < 2:
         return False
@@ -110,7 +119,15 @@ class SharedNodes:
         alike, shares: As ``shares_of`` returns them.
     """
 
-    def __init__(self, contacts, stiffness, fixed: np.ndarray, nodes, alike, shares):
+    def __init__(
+        self,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        fixed: np.ndarray,
+        nodes: np.ndarray,
+        alike: np.ndarray,
+        shares: np.ndarray,
+    ):
         self._contacts, dim = contacts, contacts[0].points.dim
         self._dofs = contacts[0].displacements.dofs(nodes)
         m, n = nodes.size, len(contacts)

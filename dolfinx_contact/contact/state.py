@@ -81,7 +81,9 @@ class History:
         """Return to the last converged state."""
         self.present = self.last
 
-    def settle(self, by: Friction, work, path, depth, kept) -> None:
+    def settle(
+        self, by: Friction, work: np.ndarray, path: np.ndarray, depth: np.ndarray, kept: np.ndarray
+    ) -> None:
         """Make the present state the last converged one, and add to the sums what the step did; ``kept`` is the new ``slip_kept``."""
         added = dict(zip(SUMS, (work, path, depth)))
         self.sums = {name: frozen(self.sums[name] + added[name]) for name in SUMS}

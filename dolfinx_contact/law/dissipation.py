@@ -24,10 +24,10 @@ from dolfinx_contact.law.friction import Friction, split
 
 def work_of_friction(
     friction: Friction,
-    before,
-    slipped,
-    reaction,
-    slip_increment,
+    before: np.ndarray,
+    slipped: np.ndarray,
+    reaction: np.ndarray,
+    slip_increment: np.ndarray,
     law_before: Friction | None = None,
 ) -> np.ndarray:
     """Work of friction of one step along the principal friction directions, all entries >= 0.
@@ -62,7 +62,7 @@ def work_of_friction(
     return 0.5 * way * (N0 * per_way_before + N1 * per_way)
 
 
-def _of_force(mu, Q, force) -> tuple[np.ndarray, np.ndarray]:
+def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors ``s`` along ``-M^-1 r_t`` and ``e`` along ``-P^-2 r_t`` of tangential forces r_t."""
     slippery = mu == 0
     M, P = (np.where(slippery, 1.0, a) for a in (mu, Q * mu))

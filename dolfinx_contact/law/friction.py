@@ -31,7 +31,7 @@ _SMALLEST, _LARGEST = 1e-50, 1e50
 ROUGH = 1e3
 
 
-def rough(mu):
+def rough(mu: Any):
     """Coefficients with ``ROUGH`` where they are infinite; all others as they were given."""
     try:
         infinite = np.isposinf(mu)
@@ -59,7 +59,7 @@ def _cone(given: ArrayLike) -> np.ndarray:
     return mu
 
 
-def _coefficients(name: str, value) -> np.ndarray:
+def _coefficients(name: str, value: ArrayLike | Callable | Any) -> np.ndarray:
     """``value`` as a finite float64 array of shape (), (2,) or (n, 2), or a ``ValueError``."""
     array = finite(name, value)
     if array.size < 4 and any(isinstance(i, bool) for i in np.ravel(np.array(value, object))):
@@ -148,7 +148,7 @@ class Friction(Guarded):
             self._take(mu, p, k, axes)
         self._made = True
 
-    def _take(self, mu, p, k, axes) -> None:
+    def _take(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
         given, mu = (mu, p, k), _cone(mu)
         if k is not None:
             q = _q_from_exponent(mu, k)
@@ -318,7 +318,7 @@ def at_most_rough(friction: Friction) -> Friction:
     return Friction(mu, p, axes=friction.axes)
 
 
-def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
+def _q_from_exponent(mu: np.ndarray, k: float | str) -> np.ndarray:
     """Q = P M^-1 up to a factor for ``p_y / p_x = (mu_y / mu_x)**k``, by logarithms: the powers alone
     could overflow."""
     exponent = finite("k", k)
@@ -329,7 +329,7 @@ def _q_from_exponent(mu: np.ndarray, k) -> np.ndarray:
     return np.exp(log_q - log_q.max(axis=-1, keepdims=True))
 
 
-def _unit_vectors(axes, mu: np.ndarray) -> np.ndarray:
+def _unit_vectors(axes: ArrayLike, mu: np.ndarray) -> np.ndarray:
     given = np.asarray(axes)
     if given.dtype.kind != "f" or given.ndim != 2 or given.shape[1] != 2:
         raise ValueError(
@@ -353,7 +353,7 @@ def as_friction(friction: Any) -> Any:
     return Friction(friction) if number and not isinstance(friction, (bool, np.bool_)) else friction
 
 
-def is_field(value) -> bool:
+def is_field(value: object) -> bool:
     """Whether a value is a callable of positions or a DOLFINx Function."""
     return callable(value) or hasattr(value, "function_space")
 

@@ -16,7 +16,9 @@ from dolfinx_contact.law.friction import Friction
 HUGE, HUGE_UNIT = 1e300, 2.0**20
 
 
-def as_nodes(name: str, value, components: int | None, nodes: int | None = None) -> np.ndarray:
+def as_nodes(
+    name: str, value: ArrayLike, components: int | None, nodes: int | None = None
+) -> np.ndarray:
     """``value`` as a float64 array with one row per node, without a copy where it is one already.
 
     Raises:

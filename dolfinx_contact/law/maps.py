@@ -10,8 +10,13 @@ that a preconditioner needs at the nodes, ``shape=(n, gdim)``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from dolfinx_contact.law.friction import Friction
+    from dolfinx_contact.solvers.protocols import LawLike
 
 
 @dataclass(frozen=True)
@@ -29,13 +34,13 @@ class BipotentialMap:
         """Along the normal, as of the other map."""
         return self.rho
 
-    def __call__(self, law, reaction, gap, slip):
+    def __call__(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return law.bipotential_map(reaction, gap, slip, self.rho)
 
-    def linearised(self, law, reaction, gap, slip):
+    def linearised(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return law.bipotential_jacobian(reaction, gap, slip, self.rho)
 
-    def springs(self, friction, dim: int) -> np.ndarray:
+    def springs(self, friction: Friction, dim: int) -> np.ndarray:
         """``rho diag(Q^2, 1)``."""
         springs = np.ones((len(self.rho), dim))
         springs[:, :-1] = friction.Q[..., : dim - 1] ** 2
@@ -54,13 +59,13 @@ class ReturnMap:
     normal: np.ndarray
     tangential: np.ndarray
 
-    def __call__(self, law, reaction, gap, slip):
+    def __call__(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return law.return_map(reaction, gap, slip, self.normal, self.tangential)
 
-    def linearised(self, law, reaction, gap, slip):
+    def linearised(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return law.return_jacobian(reaction, gap, slip, self.normal, self.tangential)
 
-    def springs(self, friction, dim: int) -> np.ndarray:
+    def springs(self, friction: Friction, dim: int) -> np.ndarray:
         """The parameters themselves; none along the plane without friction."""
         springs = np.empty((len(self.normal), dim))
         springs[:, -1] = self.normal

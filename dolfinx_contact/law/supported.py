@@ -17,12 +17,17 @@ These are the law of [dSFMH07, Section 1] for all components together.  Needs Nu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dolfinx_contact.law.friction import Friction
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import LawLike
 
 # Rounding in directions and friction kept, over their size.
 ROUNDED = 32 * np.finfo(float).eps
@@ -42,7 +47,14 @@ def across(friction: Friction, along: np.ndarray) -> np.ndarray:
     return np.where(straight, along, ratio)
 
 
-def supported(law, friction: Friction, nodes, along, known, last):
+def supported(
+    law: Any,
+    friction: Friction,
+    nodes: np.ndarray,
+    along: np.ndarray,
+    known: np.ndarray,
+    last: np.ndarray,
+):
     """The kernel's law, or the one that takes its place where supports move, guide, or have moved a node.
 
     Args:
@@ -77,7 +89,7 @@ class SupportedLaw:
             of the last step that is not along the ratio.
     """
 
-    law: object
+    law: LawLike
     friction: Friction
     known: np.ndarray
     nodes: np.ndarray
@@ -94,23 +106,49 @@ class SupportedLaw:
         most = _dot(self.friction.drag(self.along), self.along)
         return moved, guided, both, self.friction.drag(self.moved), most, self.friction.at(both)
 
-    def return_map(self, reaction, gap, slip, normal, tangential):
+    def return_map(
+        self,
+        reaction: np.ndarray,
+        gap: np.ndarray,
+        slip: np.ndarray,
+        normal: np.ndarray,
+        tangential: np.ndarray,
+    ):
         found = self.law.return_map(reaction, gap, slip - self.known, normal, tangential)
         return self._replaced(found, reaction, gap, slip, normal, tangential)
 
-    def return_jacobian(self, reaction, gap, slip, normal, tangential):
+    def return_jacobian(
+        self,
+        reaction: np.ndarray,
+        gap: np.ndarray,
+        slip: np.ndarray,
+        normal: np.ndarray,
+        tangential: np.ndarray,
+    ):
         found = self.law.return_jacobian(reaction, gap, slip - self.known, normal, tangential)
         return self._replaced(found, reaction, gap, slip, normal, tangential)
 
-    def bipotential_map(self, reaction, gap, slip, rho):
+    def bipotential_map(
+        self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray
+    ):
         found = self.law.bipotential_map(reaction, gap, slip - self.known, rho)
         return self._replaced(found, reaction, gap, slip, rho, rho)
 
-    def bipotential_jacobian(self, reaction, gap, slip, rho):
+    def bipotential_jacobian(
+        self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray
+    ):
         found = self.law.bipotential_jacobian(reaction, gap, slip - self.known, rho)
         return self._replaced(found, reaction, gap, slip, rho, rho)
 
-    def _replaced(self, found, reaction, gap, slip, normal, tangential) -> tuple:
+    def _replaced(
+        self,
+        found: tuple,
+        reaction: np.ndarray,
+        gap: np.ndarray,
+        slip: np.ndarray,
+        normal: np.ndarray,
+        tangential: np.ndarray,
+    ) -> tuple:
         """What the kernel has found, with the ``k`` nodes' own."""
         nodes, f = self.nodes, self.along
         R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
@@ -150,7 +188,7 @@ class _Answer:
         self.slips = moved | (guided & slips)
         self.share = np.where(moved[:, None], -d, 0.0)
 
-    def _room(self, friction, kept, R) -> np.ndarray:
+    def _room(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Largest part of ``kept`` up to one with which ``friction`` stays within the cone, ``shape=(k, 1)``."""
         a, b = (self._law.over_radii(part) for part in (friction, kept))
         A, B, C = _dot(b, b), _dot(a, b), np.minimum(_dot(a, a) - R**2, 0.0)
@@ -158,7 +196,13 @@ class _Answer:
         part = np.divide(root, A, out=np.zeros_like(A), where=A > 0)
         return np.clip(part, 0.0, 1.0)[:, None]
 
-    def derivatives(self, found, nodes, touches, normal) -> list:
+    def derivatives(
+        self,
+        found: Sequence[np.ndarray],
+        nodes: np.ndarray,
+        touches: np.ndarray,
+        normal: np.ndarray,
+    ) -> list:
         """The kernel's derivatives with these nodes' own, by the reaction before and by the motion."""
         f, T = self._f, self._f.shape[1]
         by_reaction = np.zeros((len(nodes), T + 1, T + 1))
@@ -175,7 +219,14 @@ class _Answer:
         return replaced
 
 
-def _slipped(friction: Friction, f, rho, R, tau, known) -> tuple[np.ndarray, np.ndarray]:
+def _slipped(
+    friction: Friction,
+    f: np.ndarray,
+    rho: np.ndarray,
+    R: np.ndarray,
+    tau: np.ndarray,
+    known: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """``d(known + w f)`` and the derivative of ``f.d`` by w, where ``rho w + R f.d + tau = 0``.
 
     The left side grows with w: Newton's steps within an interval.

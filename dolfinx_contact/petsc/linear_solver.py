@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -69,20 +71,20 @@ def stage(name: str):
         log.pop()
 
 
-def preconditioner(A, options, prefix: str) -> str:
+def preconditioner(A: PETSc.Mat, options: dict[str, Any] | None, prefix: str) -> str:
     """PETSc's type of the preconditioner that a ``LinearSolver`` with these arguments has."""
     default = _options(A, options).get("pc_type", "")
     return PETSc.Options(prefix).getString("pc_type", default)
 
 
-def _options(A, options) -> dict:
+def _options(A: PETSc.Mat, options: dict[str, Any] | None) -> dict:
     """The options, or the default for a matrix of that size."""
     if options is not None:
         return options
     return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
 
 
-def _to_factorise(A):
+def _to_factorise(A: PETSc.Mat):
     """A matrix without its zeros, which factors would fill, and the options for it.  Collective.
 
     Zeros are, among others, all couplings of fixed degrees of freedom.
@@ -135,7 +137,7 @@ def of_finest(options: dict, prefix: str, levels: int) -> dict:
     return {f"mg_levels_{levels - 1}_{key}": value for key, value in own.items()}
 
 
-def _heed_signals(*_) -> None:
+def _heed_signals(*_: object) -> None:
     """A monitor of every iteration: Python answers Ctrl-C only while it runs itself."""
 
 
@@ -157,7 +159,7 @@ class LinearSolverError(RuntimeError):
     """
 
 
-def mumps_factors(ksp):
+def mumps_factors(ksp: PETSc.KSP):
     """The factors of a solver set up with MUMPS, a PETSc matrix that tells of them; None of any other solver."""
     pc = ksp.getPC()
     if pc.getType() not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
@@ -165,13 +167,13 @@ def mumps_factors(ksp):
     return pc.getFactorMatrix()
 
 
-def _mumps_answer(ksp) -> int | None:
+def _mumps_answer(ksp: PETSc.KSP) -> int | None:
     """INFOG(1) of a factorisation by MUMPS, negative if it failed; None of any other solver."""
     factors = mumps_factors(ksp)
     return None if factors is None else factors.getMumpsInfog(1)
 
 
-def check_solved(ksp, options=None) -> None:
+def check_solved(ksp: PETSc.KSP, options: dict[str, Any] | None = None) -> None:
     """Raise ``LinearSolverError`` if the last solve of a ``PETSc.KSP`` did not converge."""
     if ksp.getConvergedReason() >= 0:
         return
@@ -200,7 +202,13 @@ class LinearSolver:
         unread: Names of options that PETSc did not ask for.
     """
 
-    def __init__(self, A, options, prefix: str, near_nullspace):
+    def __init__(
+        self,
+        A: PETSc.Mat,
+        options: dict[str, Any] | None,
+        prefix: str,
+        near_nullspace: Callable[[], np.ndarray] | None,
+    ):
         given, options = options, _options(A, options)
         if given is None and options is DIRECT:
             A, options = _to_factorise(A)
@@ -223,7 +231,7 @@ class LinearSolver:
             self.ksp.setMonitor(_heed_signals)
         self._right, self._left = A.createVecs()
 
-    def _set_up(self, A, prefix: str, options: dict) -> list[str]:
+    def _set_up(self, A: PETSc.Mat, prefix: str, options: dict) -> list[str]:
         """Factorise, or set up the levels; the options that PETSc did not ask for."""
         self.ksp.setOperators(A)
         with options_given(prefix, without_finest(options)) as unread:
@@ -254,7 +262,9 @@ class LinearSolver:
         """Whether every solve is, as with a factorisation."""
         return self.ksp.getType() == "preonly"
 
-    def solve(self, b: np.ndarray, rough: bool = False, start=None) -> np.ndarray:
+    def solve(
+        self, b: np.ndarray, rough: bool = False, start: np.ndarray | None = None
+    ) -> np.ndarray:
         """A^-1 b to the tolerance of the options; arrays of owned degrees of freedom.
 
         Args:

@@ -24,7 +24,7 @@ class StiffenedMultigrid:
         pc: The PETSc PC.
     """
 
-    def __init__(self, levels, A, S, how):
+    def __init__(self, levels: PETSc.PC, A: PETSc.Mat, S: PETSc.Mat, how: PETSc.Mat.Structure):
         finest, own = levels.getMGLevels() - 1, []
         self.pc = pc = PETSc.PC().create(A.comm)
         pc.setOptionsPrefix(levels.getOptionsPrefix())
@@ -57,7 +57,7 @@ class StiffenedMultigrid:
         return self._right.array_r.copy()
 
 
-def _as(known, smoother) -> None:
+def _as(known: PETSc.KSP, smoother: PETSc.KSP) -> None:
     """Give a smoother the type, steps and preconditioner of another one, and what options say of it."""
     smoother.setType(known.getType())
     smoother.setTolerances(max_it=known.getTolerances()[3])

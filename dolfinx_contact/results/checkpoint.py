@@ -9,7 +9,10 @@ every run, so neither the ranks' shares nor their number need be those that wrot
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
+from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -21,6 +24,10 @@ from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.support.numbering import original_cells, original_nodes
 
+if TYPE_CHECKING:
+    from dolfinx_contact.bodies.internal_variables import InternalVariables
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+
 # Of what is written.  Files of before 27 November 2026 have none.
 VERSION = 1
 
@@ -31,7 +38,14 @@ NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
 ANEW = "Take another one, or write it anew with problem.save."
 
 
-def save(path, body, contacts, states, past, variables) -> None:
+def save(
+    path: str | PathLike[str],
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    states: Sequence[np.ndarray],
+    past: Sequence[tuple],
+    variables: InternalVariables | None,
+) -> None:
     """Write the history of a problem.  Collective.
 
     Args:
@@ -71,7 +85,9 @@ def save(path, body, contacts, states, past, variables) -> None:
             _write(path, file)
 
 
-def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
+def _arrays(
+    body: BodyLike, contacts: Sequence[ContactLike], states: Sequence[np.ndarray]
+) -> dict[str, np.ndarray]:
     """Displacements and histories of contacts by name; this rank's rows.  Collective."""
     mine = {name: body.displacements.rows(of) for name, of in zip(("u", "before"), states)}
     mine["fixed"] = _fixed(body)
@@ -87,14 +103,14 @@ def _arrays(body, contacts, states) -> dict[str, np.ndarray]:
     return mine
 
 
-def _fixed(body) -> np.ndarray:
+def _fixed(body: BodyLike) -> np.ndarray:
     """1 where displacements are given, else 0, ``shape=(nodes, dim)``."""
     fixed = np.zeros(body.size, dtype=np.uint8)
     fixed[body.fixed] = 1
     return body.displacements.rows(fixed)
 
 
-def _write(path, file: dict[str, np.ndarray]) -> None:
+def _write(path: str | PathLike[str], file: dict[str, np.ndarray]) -> None:
     """Replace a file in one go: whenever the machine stops, the old one or the new one is whole."""
     unfinished = f"{path}.unfinished"
     try:
@@ -115,7 +131,12 @@ def _write(path, file: dict[str, np.ndarray]) -> None:
             os.close(folder)
 
 
-def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
+def load(
+    path: str | PathLike[str],
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    variables: InternalVariables | None,
+) -> tuple[list[np.ndarray], list]:
     """Give contacts, body and internal variables the history in a file.  Collective.
 
     Returns:
@@ -165,23 +186,28 @@ def load(path, body, contacts, variables) -> tuple[list[np.ndarray], list]:
         contact.load(saved)
     if variables:
         variables.load(mine)
-    body.known = None
-    is_known = {"digest", "load"} <= mine.keys() and ("free" in mine or "rough" in mine)
-    if comm.allreduce(is_known, op=MPI.LAND):
-        exact = "free" in mine
-        free = mine["free" if exact else "rough"].ravel()
-        body.known = FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+    body.known = _free_state(mine, comm)
     if body.displacements.mixed:
         return [_of_cells(body, mine[f"mixed_{name}"]) for name in ("u", "before")], past
     return [mine["u"].ravel(), mine["before"].ravel()], past
 
 
-def _check_path(path) -> None:
+def _free_state(mine: dict[str, np.ndarray], comm: MPI.Comm) -> FreeState | None:
+    """The body's free state, None where a rank's rows say nothing of it.  Collective."""
+    exact = "free" in mine
+    is_known = {"digest", "load"} <= mine.keys() and (exact or "rough" in mine)
+    if not comm.allreduce(is_known, op=MPI.LAND):
+        return None
+    free = mine["free" if exact else "rough"].ravel()
+    return FreeState(mine["digest"], mine["load"].ravel(), free, exact)
+
+
+def _check_path(path: str | PathLike[str]) -> None:
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"path must be a file name, got {path!r}.")
 
 
-def _opened(path) -> dict[str, np.ndarray]:
+def _opened(path: str | PathLike[str]) -> dict[str, np.ndarray]:
     try:
         with open(path, "rb") as stream, np.load(stream) as opened:
             return dict(opened)
@@ -191,7 +217,7 @@ def _opened(path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path} is no checkpoint: {error}.") from None
 
 
-def _check_file(path, file, asked) -> None:
+def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: Any) -> None:
     """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
     if not {"u", "before", "nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
@@ -206,7 +232,7 @@ def _check_file(path, file, asked) -> None:
             raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
 
 
-def _check_supports(path, mine: dict[str, np.ndarray], body) -> None:
+def _check_supports(path: str | PathLike[str], mine: dict[str, np.ndarray], body: BodyLike) -> None:
     """Raise a ``ValueError`` if other displacements of this rank were given in the run that wrote the file."""
     here = _fixed(body)
     saved = mine.get("fixed", here)  # older checkpoints do not have it
@@ -219,7 +245,9 @@ def _check_supports(path, mine: dict[str, np.ndarray], body) -> None:
         )
 
 
-def _check_stiffness(path, file, stiffness: float) -> None:
+def _check_stiffness(
+    path: str | PathLike[str], file: dict[str, np.ndarray], stiffness: float
+) -> None:
     """Raise a ``ValueError`` unless the file has the same stiffness as the problem that asks."""
     saved = _number(path, file, "stiffness", stiffness)  # older checkpoints do not have it
     if not abs(saved - stiffness) <= 1e-9 * stiffness:
@@ -229,7 +257,9 @@ def _check_stiffness(path, file, stiffness: float) -> None:
         )
 
 
-def _number(path, file: dict[str, np.ndarray], name: str, otherwise: float) -> float:
+def _number(
+    path: str | PathLike[str], file: dict[str, np.ndarray], name: str, otherwise: float
+) -> float:
     """A number in the file, or what counts where it has none."""
     try:
         return number(f"checkpoint {path}: {name}", file.get(name, otherwise))
@@ -237,7 +267,9 @@ def _number(path, file: dict[str, np.ndarray], name: str, otherwise: float) -> f
         raise ValueError(f"{error} {ANEW}") from None
 
 
-def _check_arrays(path, file: dict[str, np.ndarray], like: dict[str, np.ndarray]) -> None:
+def _check_arrays(
+    path: str | PathLike[str], file: dict[str, np.ndarray], like: dict[str, np.ndarray]
+) -> None:
     """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
     older = NEWER if "version" not in file else LATELY
     missing = [name for name in like if name not in file and not name.endswith(older)]
@@ -271,7 +303,7 @@ def _nodes_of(name: str) -> str:
     return f"{prefix}_nodes" if prefix.startswith(("contact", "state", "mixed")) else "nodes"
 
 
-def _past(path, file, order: np.ndarray) -> list[tuple]:
+def _past(path: str | PathLike[str], file: dict[str, np.ndarray], order: np.ndarray) -> list[tuple]:
     """Earlier condensed steps for nodes in this order; what belongs to anchors stays behind them."""
     saved, nodes = file["past"], file.get("past_nodes", np.zeros(0))
     tied = int(_number(path, file, "past_tied", 0))
@@ -287,7 +319,7 @@ def _past(path, file, order: np.ndarray) -> list[tuple]:
     return [(q, force, tied) for q, force in ordered]
 
 
-def _nodes(body, contacts) -> dict[str, np.ndarray]:
+def _nodes(body: BodyLike, contacts: Sequence[ContactLike]) -> dict[str, np.ndarray]:
     """Original indices of this rank's nodes, of the body and of each contact.  Collective."""
     original = original_nodes(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
@@ -297,7 +329,7 @@ def _nodes(body, contacts) -> dict[str, np.ndarray]:
     return {"nodes": original} | of_contacts
 
 
-def _by_cells(body, array: np.ndarray) -> np.ndarray:
+def _by_cells(body: BodyLike, array: np.ndarray) -> np.ndarray:
     """All unknowns of a mixed space in their units, a row an owned cell.  Collective."""
     values = fem.Function(body.V)
     values.x.array[: body.size] = body.values(array)
@@ -305,20 +337,26 @@ def _by_cells(body, array: np.ndarray) -> np.ndarray:
     return values.x.array[_cells(body)]
 
 
-def _of_cells(body, rows: np.ndarray) -> np.ndarray:
+def _of_cells(body: BodyLike, rows: np.ndarray) -> np.ndarray:
     """Values of owned degrees of freedom from what ``_by_cells`` returned."""
     values = np.zeros_like(body.u.x.array)
     values[_cells(body)] = rows
     return body.taken(values)
 
 
-def _cells(body) -> np.ndarray:
+def _cells(body: BodyLike) -> np.ndarray:
     """Degrees of freedom of each owned cell."""
     topology = body.V.mesh.topology
     return compat.cell_dofs(body.V)[: topology.index_map(topology.dim).size_local]
 
 
-def _part(file, orders, nodes, rank: int, ranks: int) -> dict[str, np.ndarray]:
+def _part(
+    file: dict[str, np.ndarray],
+    orders: dict[str, np.ndarray],
+    nodes: dict[str, np.ndarray],
+    rank: int,
+    ranks: int,
+) -> dict[str, np.ndarray]:
     """The rows of one rank, which asks for ``nodes``."""
     part = {}
     for key, wanted in nodes.items():

@@ -6,6 +6,7 @@ A program of its own, with NumPy and PyVista alone.
 """
 
 import sys
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -16,7 +17,7 @@ STATUS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a"
 PIXELS, SMALLEST, LARGEST = 150.0, 4.0, 12.0
 
 
-def body(seen) -> pyvista.UnstructuredGrid:
+def body(seen: Any) -> pyvista.UnstructuredGrid:
     """The body, displaced."""
     kinds = {name: int(name[5:]) for name in seen if name.startswith("cells")}
     rows = [np.insert(seen[name], 0, seen[name].shape[1], axis=1).ravel() for name in kinds]
@@ -34,7 +35,7 @@ def surface(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
     return grid.contour([0.0], scalars="distance")
 
 
-def draw(seen, picture: str, title: str) -> None:
+def draw(seen: Any, picture: str, title: str) -> None:
     plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 750))
     grid = body(seen)
     bar = {"title": title, "vertical": True, "fmt": "%.3g", "position_y": 0.3, "color": "black"}
@@ -60,7 +61,7 @@ def draw(seen, picture: str, title: str) -> None:
     plotter.screenshot(picture)
 
 
-def look(plotter, grid, up: np.ndarray) -> None:
+def look(plotter: Any, grid: Any, up: np.ndarray) -> None:
     """The view: in the plane from before it, in space from below the contact and aside."""
     if not up.size:
         plotter.view_xy()

@@ -16,6 +16,7 @@ from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 
 class History:
@@ -115,7 +116,7 @@ class History:
             raise ValueError(f"there is no column {name!r}; there are {', '.join(self.rows[0])}.")
         return np.array([row[name] for row in self.rows])
 
-    def _totals(self, contact):
+    def _totals(self, contact: ContactLike):
         for axis, force in zip("xyz", contact.force()):
             yield f"force_{axis}", float(force)
         volume = contact.wear_depth @ contact.area if contact.wear is not None else 0.0
@@ -125,7 +126,7 @@ class History:
         names = ("tangential_reaction_sum", "dissipation", "worn_volume")
         yield from zip(names, sums.tolist())
 
-    def _state(self, node):
+    def _state(self, node: Any):
         contact = self._tracked
         directions = ("t1", "t2", "n") if contact.points.dim == 3 else ("t", "n")
         for quantity in ("reaction", "displacement"):
@@ -134,7 +135,7 @@ class History:
         for quantity in ("slip_path", "dissipation", "load_function", "gap", "status"):
             yield quantity, self._at(node, getattr(contact, quantity))
 
-    def _nearest(self, point) -> tuple[int, int]:
+    def _nearest(self, point: np.ndarray) -> tuple[int, int]:
         """Rank and index of the contact node nearest to a point; the lowest rank of equals."""
         distance = np.linalg.norm(self._tracked.x[:, : point.size] - point, axis=1)
         nearest = int(distance.argmin()) if distance.size else -1
@@ -143,7 +144,7 @@ class History:
         )
         return owner, nearest
 
-    def _at(self, node, values):
+    def _at(self, node: Any, values: Any):
         owner, index = node
         mine = values[index].tolist() if self.comm.rank == owner else None
         return self.comm.bcast(mine, root=owner)

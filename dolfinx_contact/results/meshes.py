@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
@@ -13,6 +13,12 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import per_area
 from dolfinx_contact.contact.state import Status
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 # VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
 TYPES = {
@@ -68,7 +74,7 @@ def vtk_order(points: np.ndarray, vertices: np.ndarray) -> tuple[int, np.ndarray
     return TYPES[dim, count, len(points)], apart.argmin(axis=1)
 
 
-def gathered(comm, *arrays: np.ndarray) -> list[np.ndarray]:
+def gathered(comm: MPI.Comm, *arrays: np.ndarray) -> list[np.ndarray]:
     """Rows of all ranks, in the order of ranks, on rank 0; none elsewhere.  Collective."""
     found = [comm.gather(array, root=0) for array in arrays]
     return [
@@ -97,7 +103,7 @@ class BodyMesh:
         displacements: The ``Displacements``.
     """
 
-    def __init__(self, displacements) -> None:
+    def __init__(self, displacements: Displacements) -> None:
         V = displacements.V
         self._displacements, self._V, self._comm = displacements, V, V.mesh.comm
         self._points, topology = compat.interpolation_points(V), V.mesh.topology
@@ -135,7 +141,7 @@ class BodyMesh:
         cells = {self._type: self._cells} if self._comm.rank == 0 else {}
         return Mesh(self._x, cells, at_nodes, at_cells)
 
-    def _nodal(self, field) -> np.ndarray:
+    def _nodal(self, field: fem.Function) -> np.ndarray:
         """At owned nodes, ``shape=(n, components)``."""
         cells = np.arange(len(self._local), dtype=np.int32)
         found = compat.cell_values(fem.Expression(field, self._points), self._V.mesh, cells)
@@ -145,7 +151,7 @@ class BodyMesh:
         values[self._local.ravel()] = found.reshape(-1, found.shape[2])
         return values[: self._displacements.count]
 
-    def _of_cells(self, field) -> np.ndarray:
+    def _of_cells(self, field: fem.Function) -> np.ndarray:
         """In the middle of owned cells, ``shape=(cells, components)``."""
         middle = self._points.mean(axis=0, keepdims=True)
         cells = np.arange(self._count, dtype=np.int32)
@@ -159,7 +165,7 @@ class SurfaceMesh:
         contact: The contact.
     """
 
-    def __init__(self, contact) -> None:
+    def __init__(self, contact: ContactLike) -> None:
         self._contact, self._comm = contact, contact.comm
         displacements, V = contact.displacements, contact.displacements.V
         found: dict[int, list[np.ndarray]] = {}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -20,6 +21,7 @@ from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 # Points per direction of the grid on which a rigid surface is drawn, by dimension, and how far it goes beyond the contact, over its size.
 POINTS, BEYOND = {2: 400, 3: 60}, 0.15
@@ -88,7 +90,9 @@ def _draw(path: Path, title: str, seen: dict[str, np.ndarray]) -> None:
         raise RuntimeError(f"PyVista could not draw {path}: {done.stderr[-2000:]}")
 
 
-def _seen(contacts, body: Mesh, foot: list[Mesh], factor: float) -> dict[str, np.ndarray]:
+def _seen(
+    contacts: Sequence[ContactLike], body: Mesh, foot: list[Mesh], factor: float
+) -> dict[str, np.ndarray]:
     """What ``draw.py`` draws, arrays by name."""
     seen = {"x": _standing(body, factor), "view": np.zeros(0)}
     for kind, cells in body.cells.items():
@@ -119,7 +123,7 @@ def _standing(mesh: Mesh, factor: float) -> np.ndarray:
     return mesh.x + factor * mesh.at_nodes["displacement"]
 
 
-def _distances(contact, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
+def _distances(contact: ContactLike, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
     """A grid about positions, its lowest and highest corner and number of points, ``shape=(3, 3)``; distances from the surface there."""
     dim = contact.points.dim
     inside = np.arange(3) < dim

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -108,7 +108,7 @@ def _nearest(corners: np.ndarray, point: np.ndarray) -> tuple[int, np.ndarray]:
     return k, weights[k]
 
 
-def _written(table: dict[str, np.ndarray], path) -> dict[str, np.ndarray]:
+def _written(table: dict[str, np.ndarray], path: Any) -> dict[str, np.ndarray]:
     if path is not None:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         rows, header = np.column_stack(list(table.values())), ",".join(table)

@@ -5,13 +5,19 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dolfinx_contact.step.errors import ROUNDED
 from dolfinx_contact.support.checks import RoundingWarning
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.base import SolverResult
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.step.errors import Errors
 
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3
@@ -122,13 +128,20 @@ class NotConverged(RuntimeError):
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
-def counts(body, contacts) -> Counts:
+def counts(body: BodyLike, contacts: Sequence[ContactLike]) -> Counts:
     """Contact nodes open, sticking and slipping in the present state.  Collective."""
     here = sum(np.bincount(contact.status, minlength=3) for contact in contacts)
     return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
 
 
-def record(body, contacts, errors, found, seconds: float, geometry_error: float = 0.0) -> Step:
+def record(
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    errors: Errors,
+    found: SolverResult,
+    seconds: float,
+    geometry_error: float = 0.0,
+) -> Step:
     """Record of the contacts' present state.  Collective.
 
     Args:
@@ -169,7 +182,7 @@ def record(body, contacts, errors, found, seconds: float, geometry_error: float 
     )
 
 
-def converged(errors, step: Step, tol: float) -> bool:
+def converged(errors: Errors, step: Step, tol: float) -> bool:
     """Whether all errors are at most the tolerance, or nothing is left above rounding."""
     near = step.forward_error <= tol or errors.within(0.0)
     return near and errors.within(tol)

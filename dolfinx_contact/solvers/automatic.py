@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from dolfinx_contact.solvers.base import SolverResult
@@ -13,6 +16,10 @@ from dolfinx_contact.solvers.condensed.newton import CondensedNewton
 from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
 from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 
 def most_nodes(unknowns: int, friction: bool) -> int:
@@ -33,7 +40,13 @@ class Automatic:
 
     nonlinear = True
 
-    def bind(self, body, contacts, stiffness, memory):
+    def bind(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        memory: dict[str, Any],
+    ):
         """See ``Solver``."""
         return BoundAutomatic(body, contacts, stiffness, memory)
 
@@ -41,7 +54,13 @@ class Automatic:
 class BoundAutomatic:
     """Both solvers for one body, each set up when it is first used."""
 
-    def __init__(self, body, contacts, stiffness, memory):
+    def __init__(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        memory: dict[str, Any],
+    ):
         self._arguments, self._bound = (body, contacts, stiffness, memory), {}
         if body.nonlinear:
             self._choose_nonlinear()
@@ -89,7 +108,7 @@ class BoundAutomatic:
             return True
         return components(self._arguments[1]) == self._components
 
-    def solve(self, step) -> SolverResult:
+    def solve(self, step: StepLike) -> SolverResult:
         """See ``BoundSolver``."""
         iterations, smallest, best, start, ended = 0, np.inf, None, None, []
         solvers = self._solvers

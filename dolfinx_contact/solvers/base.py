@@ -9,9 +9,15 @@ everything set up for the body's present stiffness, and is thrown away when the 
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 KEPT = 64  # earlier steps in the memory of a problem: more than a cycle has
 
@@ -57,7 +63,7 @@ class SolverResult(NamedTuple):
 class BoundSolver(Protocol):
     """A solver bound to a body and its contacts."""
 
-    def solve(self, step: Any) -> SolverResult:
+    def solve(self, step: StepLike) -> SolverResult:
         """Search a displacement whose errors are at most ``step.tol``.  Collective."""
 
     def destroy(self) -> None:
@@ -75,7 +81,13 @@ class Solver(Protocol):
     # nonlinear = True
     #     Whether it solves steps whose forces out of balance are no linear function of the displacement.
 
-    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+    def bind(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        memory: dict[str, Any],
+    ) -> BoundSolver:
         """Set up for a body with its assembled stiffness.  Collective.
 
         Args:

@@ -6,9 +6,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import MapLike, StepLike
 
 # Steps over which the fall of the errors is taken.
 WINDOW = 3
@@ -31,7 +36,7 @@ class Search:
         over: Solved, or out of time.
     """
 
-    def __init__(self, step, x: np.ndarray, max_seconds: float):
+    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float):
         self.step, self.best = step, x
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = (True, np.inf)
@@ -55,7 +60,7 @@ class Search:
         self.iterations += iterations
         self.left -= iterations
 
-    def residual(self, x: np.ndarray, maps, forces: np.ndarray) -> np.ndarray:
+    def residual(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray) -> np.ndarray:
         """Forces out of balance of ``x``, with the step's ``forces`` there; takes note of its errors."""
         residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol

@@ -28,11 +28,15 @@ the numbers are relative to the terms that cancel instead.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
+
+if TYPE_CHECKING:
+    from dolfinx_contact.law.friction import Friction
+    from dolfinx_contact.solvers.protocols import ContactLike
 
 EPSILON = np.finfo(float).eps / 2  # of one operation
 
@@ -81,7 +85,7 @@ class Errors(NamedTuple):
         return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
-def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
+def contact_defects(contact: ContactLike, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
     """Residual of the projection equation, penetration and defect of the slip rule, as forces.
 
     Args:
@@ -100,7 +104,7 @@ def contact_defects(contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...
     return state.reaction - projected, penetration, slip
 
 
-def _felt(state: State, friction) -> np.ndarray:
+def _felt(state: State, friction: Friction) -> np.ndarray:
     """Slips as the law's residual has them, ``shape=(n, gdim - 1)``: of nodes that stick over mu, where it exceeds 1.
 
     The residual has ``kappa mu |Delta u_t|``.  Where the law asks for no slip, what there is counts by the force that it makes,
@@ -113,7 +117,7 @@ def _felt(state: State, friction) -> np.ndarray:
     return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
 
 
-def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
+def at_rest(contact: ContactLike, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
     """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
 
     On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
@@ -131,7 +135,7 @@ def at_rest(contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
     return slips & (made <= unknown) & (contact.friction.mu > 0.0).any(axis=-1)
 
 
-def contact_rounding(contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
+def contact_rounding(contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
     """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
 
     Args:

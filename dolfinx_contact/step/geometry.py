@@ -10,12 +10,21 @@ bodies that those of the end would make.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.placement import Placement
+    from dolfinx_contact.contact.state import State
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.surfaces.surface import Surface
 
 # How often a step is repeated with the geometry of its end.
 REPEATED = 5
@@ -37,7 +46,7 @@ class Ends:
         most: How often a step is repeated.
     """
 
-    def __init__(self, body, contacts):
+    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
         changes = any(c.surface.deformable and c.changes for c in contacts)
         self.most, self._mix, self._at = REPEATED, None, None
         if changes:
@@ -52,7 +61,11 @@ class Ends:
 
 
 def geometry_error(
-    body, contacts, stiffness: list[NodalStiffness], u: np.ndarray, S: float
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    stiffness: list[NodalStiffness],
+    u: np.ndarray,
+    S: float,
 ) -> float:
     """Forces by which the geometry at the end of a step differs from that used, over the reactions.  Collective.
 
@@ -76,7 +89,9 @@ def geometry_error(
     return left / S if S > 0.0 else (np.inf if left > 0.0 else 0.0)
 
 
-def _missed(contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
+def _missed(
+    contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
     placement, r = contact.placement, contact.reaction
     surface, there = placement.ended_at(u)
@@ -94,7 +109,9 @@ def _missed(contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarr
     )
 
 
-def _missed_by_rows(contact, stiffness: NodalStiffness, u: np.ndarray, fixed) -> tuple:
+def _missed_by_rows(
+    contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray, fixed: np.ndarray
+) -> tuple:
     """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
     ended = contact.placement.ended(contact.present, u)
     ended.forces[fixed] = 0.0
@@ -108,7 +125,7 @@ def _missed_by_rows(contact, stiffness: NodalStiffness, u: np.ndarray, fixed) ->
     )
 
 
-def _pressed(contact, stiffness: NodalStiffness, distance: np.ndarray) -> np.ndarray:
+def _pressed(contact: ContactLike, stiffness: NodalStiffness, distance: np.ndarray) -> np.ndarray:
     """Normal forces that distances at the end of a step, ``shape=(n,)``, would make beside the gaps used."""
     exact = distance + contact.wear_depth
     presses = contact.reaction[:, -1] > 0.0
@@ -117,7 +134,7 @@ def _pressed(contact, stiffness: NodalStiffness, distance: np.ndarray) -> np.nda
     return stiffness.normal * off
 
 
-def _dragged(contact, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
+def _dragged(contact: ContactLike, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
     """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
     contact.points.without_held(missed)
     made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, missed), axis=1)
@@ -129,7 +146,7 @@ def _dragged(contact, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarr
     return np.where(friction > 0.0, np.minimum(made, turns), 0.0)
 
 
-def _moments(body, contacts, u: np.ndarray) -> list[float]:
+def _moments(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> list[float]:
     """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
     missed = []
     for surface in {id(c.surface): c.surface for c in contacts if c.surface.spins}.values():
@@ -149,7 +166,7 @@ def _moments(body, contacts, u: np.ndarray) -> list[float]:
     return missed
 
 
-def too_long(body, contacts, u: np.ndarray) -> str:
+def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> str:
     """Where the way of a step cannot be followed, in words; empty where it can.  Collective.
 
     The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
@@ -189,7 +206,7 @@ def undivided(missed: float, tol: float, repeated: int) -> str:
     )
 
 
-def _turned_on_the_way(contact, u: np.ndarray) -> np.ndarray:
+def _turned_on_the_way(contact: ContactLike, u: np.ndarray) -> np.ndarray:
     """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
     placement = contact.placement
     surface, there = placement.ended_at(u)
@@ -213,7 +230,7 @@ def _turned_on_the_way(contact, u: np.ndarray) -> np.ndarray:
     return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
 
 
-def _looked_at(surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _looked_at(surface: Surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normals and distances at positions; NaN where there are none."""
     try:
         return np.broadcast_to(surface.frames(y)[..., -1, :], y.shape), surface.distance(y)
@@ -224,7 +241,7 @@ def _looked_at(surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return tuple(map(np.concatenate, zip(*halves)))
 
 
-def _way(surface, placement, last, end: np.ndarray) -> np.ndarray:
+def _way(surface: Surface, placement: Placement, last: State, end: np.ndarray) -> np.ndarray:
     """Positions along the way, relative to the surface, in its axes, ``shape=(PLACES + 1, n, gdim)``.
 
     In space nodes go straight, and the surface moves and turns evenly.

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from copy import copy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +26,16 @@ from dolfinx_contact.step.errors import (
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import driven_surfaces
 
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
+    from dolfinx_contact.step.statics import Statics
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
+    from dolfinx_contact.surfaces.held import HeldSurfaces
 
-def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
+
+def nodal_stiffness(
+    body: BodyLike, contacts: Sequence[ContactLike]
+) -> tuple[list[NodalStiffness], float]:
     """Stiffness at the nodes of each contact, and a unit of force; contacts take their ``rho``.  Collective."""
     stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
     for contact, of in zip(contacts, stiffness):
@@ -36,7 +45,9 @@ def nodal_stiffness(body, contacts) -> tuple[list[NodalStiffness], float]:
     return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
 
 
-def _shared_nodes(contacts, stiffness, fixed):
+def _shared_nodes(
+    contacts: Sequence[ContactLike], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
+):
     """The ``SharedNodes``, None where no node belongs to several contacts.  Collective."""
     if len(contacts) < 2:
         return None
@@ -79,8 +90,22 @@ class LoadStep:
         errors: Of the state judged last.
     """
 
+    surfaces: DrivenSurfaces | None
+    statics: Statics | None
+    errors: Errors
+
     def __init__(
-        self, body, contacts, stiffness, b, external, starts, tol, unit, monitor=None, holding=None
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        b: np.ndarray,
+        external: np.ndarray,
+        starts: Sequence[np.ndarray],
+        tol: float,
+        unit: float,
+        monitor: Callable | None = None,
+        holding: HeldSurfaces | None = None,
     ):
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
@@ -96,7 +121,7 @@ class LoadStep:
         """Whether a plane, or the body, is held by contact along some direction."""
         return self.surfaces is not None or self.statics is not None
 
-    def held_by(self, statics) -> LoadStep:
+    def held_by(self, statics: Statics) -> LoadStep:
         """The step of a body that contact alone holds, with its ``Statics``."""
         return self._but(statics=statics)
 
@@ -109,7 +134,7 @@ class LoadStep:
         shared = _shared_nodes(self.contacts, self.stiffness, self.body.fixed)
         return self._but(_starts=[x], _judged=None, _shared=shared)
 
-    def _but(self, **parts) -> LoadStep:
+    def _but(self, **parts: Any) -> LoadStep:
         other = copy(self)
         vars(other).update(parts)
         return other
@@ -142,7 +167,7 @@ class LoadStep:
                 said = nothing_holds(self.contacts)
         return said
 
-    def total(self, array) -> np.ndarray:
+    def total(self, array: Any) -> np.ndarray:
         """Sum of an array over all ranks."""
         return self.body.total(array)
 
@@ -184,7 +209,9 @@ class LoadStep:
         """Norm of forces at free degrees of freedom."""
         return self.body.norm(self.free(forces))
 
-    def out_of_balance(self, x: np.ndarray, maps, forces: np.ndarray | None = None) -> np.ndarray:
+    def out_of_balance(
+        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+    ) -> np.ndarray:
         """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``.
 
         Args:
@@ -194,7 +221,9 @@ class LoadStep:
         """
         return self._left(x, self.forces(x) if forces is None else forces, maps)
 
-    def derivatives(self, x: np.ndarray, maps, forces: np.ndarray | None = None) -> list[tuple]:
+    def derivatives(
+        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+    ) -> list[tuple]:
         """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``."""
         forces = self.free(self.forces(x) if forces is None else forces)
         self._balance_surfaces(x, forces, maps)
@@ -202,7 +231,13 @@ class LoadStep:
         derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
         return derivatives if self._shared is None else self._shared.coupled(derivatives)
 
-    def along(self, x: np.ndarray, dx: np.ndarray, maps, forces: np.ndarray | None = None):
+    def along(
+        self,
+        x: np.ndarray,
+        dx: np.ndarray,
+        maps: Sequence[MapLike],
+        forces: np.ndarray | None = None,
+    ):
         """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
         forces = self.forces(x) if forces is None else forces
         change = self.body.multiply(dx)
@@ -235,7 +270,7 @@ class LoadStep:
                 contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
 
     def residual(
-        self, x: np.ndarray, maps, forces: np.ndarray | None = None
+        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
     ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state.
 
@@ -295,7 +330,7 @@ class LoadStep:
         """Whether the user wants to be told."""
         return self._monitor is not None
 
-    def tell(self, error: float, nodes) -> None:
+    def tell(self, error: float, nodes: Sequence[int]) -> None:
         """Tell the user's monitor the error of another iterate, and its nodes by status.  Collective."""
         with raised_together(self.body.comm):
             self._monitor(self._told, error, Counts(*nodes))
@@ -316,11 +351,11 @@ class LoadStep:
                 self._shared.give(k)
             yield contact
 
-    def _balance_surfaces(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+    def _balance_surfaces(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> None:
         if self.surfaces is not None:
             self.surfaces.balance(x, maps, lambda: self._asked(x, forces))
 
-    def _respond(self, x: np.ndarray, forces: np.ndarray, maps) -> None:
+    def _respond(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> None:
         """Give contacts the reactions that maps make of those which balance the forces."""
         self._balance_surfaces(x, forces, maps)
         for contact, map in zip(self._asked(x, forces), maps):
@@ -328,7 +363,7 @@ class LoadStep:
         if self.holding is not None:
             self.holding.share()
 
-    def _left(self, x: np.ndarray, forces: np.ndarray, maps) -> np.ndarray:
+    def _left(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> np.ndarray:
         forces = self.free(forces)
         self._respond(x, forces, maps)
         return self.with_reactions(forces)

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
 
@@ -14,6 +17,10 @@ from dolfinx_contact.solvers.condensed.input import principal_axes
 from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
 from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
 ROUNDING, BALANCED, RAYS = 1e-12, 1e-7, 400
@@ -57,7 +64,9 @@ class Statics:
         ValueError: on all ranks, if no contact node is on a part of the body that nothing holds.
     """
 
-    def __init__(self, body, contacts, step, last: np.ndarray):
+    def __init__(
+        self, body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, last: np.ndarray
+    ):
         self._body, self._contacts, self._modes = body, contacts, body.loose.modes
         m, self._dim = self._modes.shape[1], body.V.mesh.geometry.dim
         parts, coefficients = [np.zeros((0, self._dim, m))], [np.zeros((0, self._dim - 1))]
@@ -92,7 +101,7 @@ class Statics:
                 "hold: no static state exists"
             )
 
-    def _with_surfaces(self, surfaces) -> tuple[np.ndarray, np.ndarray]:
+    def _with_surfaces(self, surfaces: DrivenSurfaces) -> tuple[np.ndarray, np.ndarray]:
         """Motions of the contact nodes with those of planes under dead loads behind the body's, and what drives both.
 
         Of such planes reactions are in balance with their forces: ``D^T r = F``, what they press with is known.
@@ -109,7 +118,9 @@ class Statics:
             self.loads, driving / sizes
         )
 
-    def _escape(self, motion, loads) -> tuple[np.ndarray | None, np.ndarray]:
+    def _escape(
+        self, motion: np.ndarray, loads: np.ndarray
+    ) -> tuple[np.ndarray | None, np.ndarray]:
         """A motion along which loads push and no reaction can hold, ``shape=(m,)``, None if there is none; what balances them.
 
         Args:
@@ -142,7 +153,7 @@ class Statics:
         return None, balancing  # or not decided: the solver will
 
     def _along_surfaces(
-        self, motion: np.ndarray, loads, kept: list, weights: np.ndarray
+        self, motion: np.ndarray, loads: np.ndarray, kept: list, weights: np.ndarray
     ) -> np.ndarray:
         """The part of a motion with which the nodes of some reactions stay on their planes, if loads drive that."""
         normals = [normal for (normal, _), weight in zip(kept, weights) if weight > 0]
@@ -156,7 +167,7 @@ class Statics:
         return motion
 
     def _farthest(
-        self, motion, along: np.ndarray
+        self, motion: np.ndarray, along: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Of reactions with ``r_n = 1`` at one node those whose sums reach farthest along a motion.
 
@@ -220,7 +231,7 @@ class Statics:
         sums = self._body.total(self._modes.T @ forces)
         return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
 
-    def _free_motions(self, step, unfelt: float) -> np.ndarray:
+    def _free_motions(self, step: StepLike, unfelt: float) -> np.ndarray:
         """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
 
         Args:
@@ -245,7 +256,7 @@ class Statics:
         small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
         return vectors[small].T / np.sqrt(self._felt)[:, None]
 
-    def slides(self, step) -> bool:
+    def slides(self, step: StepLike) -> bool:
         """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
         motions = self._free_motions(step, SLIDING)
         left, sizes = self._left()
@@ -286,7 +297,7 @@ class Statics:
         """Present normal reactions of all contacts."""
         return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
 
-    def hidden(self, step) -> str:
+    def hidden(self, step: StepLike) -> str:
         """Whether rounding in gaps and slips makes forces as large as the loads, in words.  Collective."""
         total, unit = self._body.total, step.unit
         rounding = [np.zeros(0)]
@@ -322,7 +333,7 @@ class Statics:
         )
         return sums + self.loads, sizes + np.abs(self.loads)
 
-    def settled(self, step, x: np.ndarray, choice: str) -> np.ndarray:
+    def settled(self, step: StepLike, x: np.ndarray, choice: str) -> np.ndarray:
         """A solution whose undetermined motions are those nearest to the last displacement, by volume.  Collective.
 
         Args:

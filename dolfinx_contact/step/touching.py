@@ -10,10 +10,18 @@ node that opens has the gap ``g < 0`` at the start without the reactions of thos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
-def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
+
+def landing(
+    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, x: np.ndarray, tol: float
+) -> float:
     """Let slip of nodes that land count from where they touch, where that matters; how much it does.  Collective.
 
     An estimate that is made stays for the step: friction, which answers to it, would move the next one to and fro.
@@ -44,13 +52,19 @@ def landing(body, contacts, step, x: np.ndarray, tol: float) -> float:
     return late
 
 
-def _opened(contact, x: np.ndarray) -> np.ndarray:
+def _opened(contact: ContactLike, x: np.ndarray) -> np.ndarray:
     """Nodes that were open at the start of a step, ``shape=(n,)``, booleans: what is left of gaps under reactions is none."""
     last = contact.last
     return (last.gap > contact.gap_rounding(x)) & (last.reaction[:, -1] == 0.0)
 
 
-def _felt(body, contacts, step, slips, at) -> float:
+def _felt(
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    step: StepLike,
+    slips: Sequence[np.ndarray],
+    at: Sequence[np.ndarray],
+) -> float:
     """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries."""
     squares = 0.0
     for contact, of, slip, here in zip(contacts, step.stiffness, slips, at):
@@ -63,7 +77,13 @@ def _felt(body, contacts, step, slips, at) -> float:
     return size / step.carried if size > 0.0 else 0.0
 
 
-def _without(body, contacts, step, x: np.ndarray, nodes) -> np.ndarray | None:
+def _without(
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    step: StepLike,
+    x: np.ndarray,
+    nodes: Sequence[np.ndarray],
+) -> np.ndarray | None:
     """The displacement with which some nodes carry nothing, and all others what they carry.  Collective.
 
     A loose body would fall: it is left where it was placed if it touched nowhere, else nothing is known.
@@ -78,7 +98,7 @@ def _without(body, contacts, step, x: np.ndarray, nodes) -> np.ndarray | None:
     return x - body.solve(forces)
 
 
-def opening(body, contacts, step, tol: float) -> None:
+def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol: float) -> None:
     """Let the slip of nodes that have opened in the step end where they did.  Collective.
 
     Args:

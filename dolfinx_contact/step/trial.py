@@ -4,10 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.solvers.base import SolverName, SolverResult
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
 # Penetration over the largest displacement that three digits of it leave no doubt about.
 CERTAIN = 0.1
@@ -15,7 +21,9 @@ CERTAIN = 0.1
 NOTHING, NO_SOLUTION = "nothing touches", "there is no solution"
 
 
-def without_reactions(body, contacts, step) -> SolverResult | None:
+def without_reactions(
+    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike
+) -> SolverResult | None:
     """The displacement without reactions, if it is the solution of a ``LoadStep``.  Collective."""
     if step.surfaces is not None:
         if not step.surfaces.can_rest:
@@ -34,7 +42,7 @@ def without_reactions(body, contacts, step) -> SolverResult | None:
     return None
 
 
-def unmoved(body, step, last: np.ndarray) -> SolverResult:
+def unmoved(body: BodyLike, step: StepLike, last: np.ndarray) -> SolverResult:
     """The last displacement with the present boundary values, judged as what it is: no solution."""
     x, fixed = last.copy(), body.fixed
     x[fixed] = step.b[fixed]
@@ -42,7 +50,9 @@ def unmoved(body, step, last: np.ndarray) -> SolverResult:
     return SolverResult(x, 0, np.inf, SolverName.NONE, reason=NO_SOLUTION)
 
 
-def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
+def floating(
+    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, last: np.ndarray
+) -> SolverResult | None:
     """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
 
     None where it touches.
@@ -55,17 +65,22 @@ def floating(body, contacts, step, last: np.ndarray) -> SolverResult | None:
     return SolverResult(x, 0, 0.0, SolverName.NONE, reason=NOTHING)
 
 
-def presses(body, contacts, trial: np.ndarray) -> bool:
+def presses(body: BodyLike, contacts: Sequence[ContactLike], trial: np.ndarray) -> bool:
     """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
     return _deepest(body, contacts, trial) > CERTAIN * body.farthest(trial)
 
 
-def may_touch(body, contacts, trial: np.ndarray) -> bool:
+def may_touch(body: BodyLike, contacts: Sequence[ContactLike], trial: np.ndarray) -> bool:
     """Whether a displacement without reactions penetrates a plane by more than rounding."""
     return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
 
 
-def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> float:
+def _deepest(
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    trial: np.ndarray,
+    unit: Callable = lambda contact: 1.0,
+) -> float:
     """The deepest penetration of all contacts, at least zero, in a unit of length.  Collective."""
     depths = [np.zeros(1)]
     for contact in contacts:
@@ -74,7 +89,7 @@ def _deepest(body, contacts, trial: np.ndarray, unit=lambda contact: 1.0) -> flo
     return body.largest(np.concatenate(depths))
 
 
-def refined(body, step, x: np.ndarray) -> np.ndarray:
+def refined(body: BodyLike, step: StepLike, x: np.ndarray) -> np.ndarray:
     """The displacement without reactions, with another digit where what is left of ``b`` counts."""
     errors = step.measure_open(x)
     if errors.largest <= step.tol:

@@ -10,16 +10,21 @@ nodes miss is an error of their forces of about ``kappa`` times that length.
 from __future__ import annotations
 
 import warnings
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 # What is missed, over the largest ``r_n / kappa``, above which the user is told.
 SHARE = 1.0
@@ -55,7 +60,9 @@ class Missed(NamedTuple):
     needed: float = 0.0  # about the size that would see it
     hollow: bool = False  # whether the surface recedes
 
-    def or_more(self, lengths, where, size, needed=0.0, hollow=False) -> Missed:
+    def or_more(
+        self, lengths: Any, where: Any, size: Any, needed: Any = 0.0, hollow: Any = False
+    ) -> Missed:
         """This one, or the largest of those of some facets."""
         if not lengths.size:
             return self
@@ -73,7 +80,7 @@ class Unseen:
         contacts: The contacts.
     """
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: Sequence[ContactLike]):
         self._facets = {
             contact: facets_of(contact.displacements, contact.facets)
             for contact in contacts
@@ -88,8 +95,8 @@ class Unseen:
 
     def check(
         self,
-        body,
-        contacts,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
         stiffness: list[NodalStiffness],
         u: np.ndarray,
         counts: Counts,
@@ -116,7 +123,7 @@ class Unseen:
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
 
-    def _check_facets(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
+    def _check_facets(self, u: np.ndarray, stiffness: dict[ContactLike, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
         for looked_at, look in ((self._straight, self._off_straight), (self._between, _between)):
             for contact in looked_at:
@@ -133,7 +140,7 @@ class Unseen:
                     warnings.warn(said(contact, missed, pushed), stacklevel=4)
                     break
 
-    def _check_wear(self, contacts, stiffness: list[NodalStiffness]) -> None:
+    def _check_wear(self, contacts: Sequence[ContactLike], stiffness: list[NodalStiffness]) -> None:
         """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
         for contact, of in zip(contacts, stiffness):
             if (
@@ -153,7 +160,13 @@ class Unseen:
                     stacklevel=4,
                 )
 
-    def _check_turn(self, body, contacts, stiffness: list[NodalStiffness], u: np.ndarray) -> None:
+    def _check_turn(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: list[NodalStiffness],
+        u: np.ndarray,
+    ) -> None:
         """A linear body that turns, and grows by so much that contact feels it.  Collective."""
         if self._turn is None:
             from dolfinx_contact.step.turned import Turn
@@ -180,7 +193,7 @@ class Unseen:
                 stacklevel=4,
             )
 
-    def _is_straight(self, contact) -> bool:
+    def _is_straight(self, contact: ContactLike) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
         most = 0.0
         for facets in self._facets[contact]:
@@ -191,7 +204,7 @@ class Unseen:
         return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
 
     def _off_straight(
-        self, contact, of: list[Facets], u: np.ndarray, pushed: float, _worn
+        self, contact: ContactLike, of: list[Facets], u: np.ndarray, pushed: float, _worn: Any
     ) -> Missed:
         """How far nodes amid straight edges stand off a round body, where it touches."""
         missed = Missed()
@@ -208,7 +221,7 @@ class Unseen:
         return missed
 
 
-def _check_strayed(contact) -> bool:
+def _check_strayed(contact: ContactLike) -> bool:
     """Warn of a node that has slid too far along a deformable surface; whether one has.  Collective."""
     slid, most = max(contact.comm.allgather(contact.placement.strayed(contact.present)))
     if slid <= most:
@@ -221,7 +234,7 @@ def _check_strayed(contact) -> bool:
     return True
 
 
-def _check_apart(body, contacts) -> bool:
+def _check_apart(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
     """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
     smallest = -max(body.highest(-contact.gap) for contact in contacts)
     if smallest > FAR * body.extent:
@@ -256,7 +269,9 @@ def _check_apart(body, contacts) -> bool:
     return True
 
 
-def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
+def _between(
+    contact: ContactLike, of: list[Facets], u: np.ndarray, _pushed: Any, worn: np.ndarray
+) -> Missed:
     """How far the surface goes into facets between nodes, or recedes between nodes that touch."""
     missed = Missed()
     for facets in of:
@@ -270,7 +285,14 @@ def _between(contact, of: list[Facets], u: np.ndarray, _pushed, worn) -> Missed:
     return missed
 
 
-def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
+def _within(
+    contact: ContactLike,
+    facets: Facets,
+    x: np.ndarray,
+    gaps: np.ndarray,
+    opened: np.ndarray | None,
+    missed: Missed,
+) -> Missed:
     """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
     half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
     rule = 2.0 * gauss(facets.dim) - 1.0
@@ -300,7 +322,7 @@ def _within(contact, facets: Facets, x, gaps, opened, missed: Missed) -> Missed:
     return missed
 
 
-def _of_between(contact, missed: Missed, pushed: float) -> str:
+def _of_between(contact: ContactLike, missed: Missed, pushed: float) -> str:
     near = f"near {_said(missed.where)}"
     if missed.hollow:
         does = f"recedes by {missed.length:.2g} between nodes that touch, {near}"
@@ -314,7 +336,7 @@ def _of_between(contact, missed: Missed, pushed: float) -> str:
     )
 
 
-def _of_straight(contact, missed: Missed, pushed: float) -> str:
+def _of_straight(contact: ContactLike, missed: Missed, pushed: float) -> str:
     felt = f"more than reactions push nodes in, {pushed:.2g}" if pushed else "where nothing touches"
     return (
         f"displacements of second order on straight-sided cells of a round surface: near {_said(missed.where)} nodes between "
@@ -324,11 +346,11 @@ def _of_straight(contact, missed: Missed, pushed: float) -> str:
     )
 
 
-def _said(where) -> str:
+def _said(where: ArrayLike) -> str:
     where = np.where(np.abs(where) < CLEAR * np.abs(where).max(), 0.0, where)
     return f"({', '.join(f'{x:.3g}' for x in where)})"
 
 
-def _positions(contact, facets: Facets, u: np.ndarray) -> np.ndarray:
+def _positions(contact: ContactLike, facets: Facets, u: np.ndarray) -> np.ndarray:
     """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)

@@ -15,9 +15,16 @@ which is neither negative nor more than unloads the node, whatever ``c`` is.  No
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 # Stiffness with which depths follow, over the node's own.
 STIFF = 2.0
@@ -42,7 +49,13 @@ class Wearing:
         tol: By how much forces may differ for depths that are off, over the forces that act.
     """
 
-    def __init__(self, body, contacts, stiffness, tol: float):
+    def __init__(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        tol: float,
+    ):
         self._body, self._contacts, self._tol = body, contacts, PART * tol
         self._kappa = STIFF * np.concatenate([of.normal for of in stiffness])
         self._anderson = Anderson(self._kappa.size, KEPT, body.total)

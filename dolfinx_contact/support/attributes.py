@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 def frozen(array: np.ndarray) -> np.ndarray:
@@ -24,13 +27,13 @@ class Whole(np.ndarray):
 
     called: str = ""
 
-    def __array_finalize__(self, source) -> None:
+    def __array_finalize__(self, source: object) -> None:
         self.called = getattr(source, "called", "")
 
-    def __array_wrap__(self, array, context=None, return_scalar=False):
+    def __array_wrap__(self, array: np.ndarray, context: Any = None, return_scalar: bool = False):
         return array[()] if array.ndim == 0 else array.view(np.ndarray)
 
-    def __setitem__(self, key, value) -> None:
+    def __setitem__(self, key: Any, value: ArrayLike) -> None:
         if self.flags.writeable:  # a copy of it
             super().__setitem__(key, value)
             return
@@ -38,13 +41,13 @@ class Whole(np.ndarray):
             f"{self.called} is read-only, it is assigned as a whole: {self.called} = ..., or {self.called} += ... for all components."
         )
 
-    def __iadd__(self, other):
+    def __iadd__(self, other: Any):
         return super().__iadd__(other) if self.flags.writeable else self + other
 
-    def __isub__(self, other):
+    def __isub__(self, other: Any):
         return super().__isub__(other) if self.flags.writeable else self - other
 
-    def copy(self, order="C") -> np.ndarray:
+    def copy(self, order: Any = "C") -> np.ndarray:
         """A plain array that may be changed."""
         return np.array(self, order=order)
 

@@ -6,8 +6,12 @@ from __future__ import annotations
 
 import math
 import os
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class RoundingWarning(UserWarning):
@@ -18,7 +22,7 @@ class RoundingWarning(UserWarning):
     """
 
 
-def finite(name: str, value, copy: bool = True) -> np.ndarray:
+def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
     """A float64 array of finite numbers, a new one if ``copy``, or a ``ValueError``."""
     if np.ma.is_masked(value):
         raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...).")
@@ -33,7 +37,7 @@ def finite(name: str, value, copy: bool = True) -> np.ndarray:
     return array.astype(np.float64, copy=copy)
 
 
-def vector(name: str, value, size: int | None = None) -> np.ndarray:
+def vector(name: str, value: ArrayLike, size: int | None = None) -> np.ndarray:
     """A vector of finite real numbers, as floats."""
     try:
         array = np.asarray(value)
@@ -48,7 +52,7 @@ def vector(name: str, value, size: int | None = None) -> np.ndarray:
     return array.astype(np.float64)
 
 
-def number(name: str, value) -> float:
+def number(name: str, value: Any) -> float:
     """One finite real number, alone or in an array of one, or a ``ValueError``."""
     array = np.asarray(value)
     if array.size != 1 or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
@@ -56,7 +60,7 @@ def number(name: str, value) -> float:
     return float(array.item())
 
 
-def positive(name: str, value, whole: bool = False, finite: bool = False) -> float:
+def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -> float:
     """A positive number, or a ``ValueError``; of a whole one infinity is none."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)

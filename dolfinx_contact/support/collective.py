@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import pickle
 import sys
+from collections.abc import Callable
 from time import monotonic, sleep
 from traceback import print_exception
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import ArrayLike
 
 # Seconds that a rank that failed waits for the others, which may be busy with work of their own.
 PATIENCE = 60.0
@@ -22,14 +25,14 @@ class raised_together:
     have not come to the end of the block ``PATIENCE`` seconds later, that rank prints its error and ends all of them.
     """
 
-    def __init__(self, comm):
+    def __init__(self, comm: MPI.Comm):
         self._comm = comm
 
     def __enter__(self) -> None:
         pass
 
     def __exit__(
-        self, _, error: BaseException | None, __
+        self, _: type[BaseException] | None, error: BaseException | None, __: object
     ) -> None:  # Ctrl-C, too, must not leave the others waiting
         comm = self._comm
         if comm.size == 1 or (first := _first_to_fail(comm, error)) == comm.size:
@@ -39,7 +42,7 @@ class raised_together:
             raise kind(f"{message} (found on rank {first})")
 
 
-def _first_to_fail(comm, error: BaseException | None) -> int:
+def _first_to_fail(comm: MPI.Comm, error: BaseException | None) -> int:
     """The lowest rank with an error, or the number of ranks."""
     mine, first = np.array([comm.size if error is None else comm.rank]), np.empty(1, dtype=int)
     request = comm.Iallreduce(mine, first, op=MPI.MIN)
@@ -60,7 +63,7 @@ def _first_to_fail(comm, error: BaseException | None) -> int:
     return int(first[0])
 
 
-def by_first_rank(comm, work, tell=None):
+def by_first_rank(comm: MPI.Comm, work: Callable, tell: Callable | None = None):
     """What ``work(monitor)`` returns on rank 0, or its error, on all ranks.
 
     Every ``line`` that it gives its monitor becomes ``tell(*line)`` on all ranks, whose error ends the work; without
@@ -68,7 +71,7 @@ def by_first_rank(comm, work, tell=None):
     """
     failed = result = None
 
-    def monitor(*line) -> None:
+    def monitor(*line: Any) -> None:
         comm.bcast(line, root=0)
         tell(*line)
 
@@ -90,12 +93,12 @@ def by_first_rank(comm, work, tell=None):
     return from_first(comm, result)
 
 
-def from_first(comm, value):
+def from_first(comm: MPI.Comm, value: Any):
     """A value of rank 0, on all ranks.  On one rank it is not taken apart for it."""
     return value if comm.size == 1 else comm.bcast(value, root=0)
 
 
-def agree(comm, **values) -> None:
+def agree(comm: MPI.Comm, **values: object) -> None:
     """Raise a ``ValueError`` on every rank if a value that all ranks should have the same differs."""
     if comm.size == 1:
         return
@@ -109,7 +112,7 @@ def agree(comm, **values) -> None:
                 )
 
 
-def described(value) -> str:
+def described(value: object) -> str:
     """A value in words that are the same on all ranks, which an object's address is not."""
     if type(value).__repr__ is not object.__repr__:
         return repr(value)
@@ -136,7 +139,7 @@ class OverRanks:
 
     comm: MPI.Comm
 
-    def total(self, array: np.ndarray) -> np.ndarray:
+    def total(self, array: ArrayLike) -> np.ndarray:
         """Sum of an array over all ranks."""
         result = np.array(array, dtype=np.float64)
         self.comm.Allreduce(MPI.IN_PLACE, result, op=MPI.SUM)
@@ -157,6 +160,6 @@ class OverRanks:
             return largest
         return largest * float(np.sqrt(self.total(np.sum((x / largest) ** 2))))
 
-    def same(self, x: np.ndarray, y: np.ndarray) -> bool:
-        """Whether two arrays are equal on all ranks."""
+    def same(self, x: np.ndarray, y: np.ndarray | None) -> bool:
+        """Whether two arrays are equal on all ranks; None equals none."""
         return self.comm.allreduce(np.array_equal(x, y), op=MPI.LAND)

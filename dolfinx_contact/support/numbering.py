@@ -4,13 +4,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import dolfinx
 import numpy as np
 
 from dolfinx_contact import compat
 
+if TYPE_CHECKING:
+    from dolfinx import fem
+    from dolfinx.mesh import Mesh
 
-def original_cells(mesh) -> np.ndarray:
+
+def original_cells(mesh: Mesh) -> np.ndarray:
     """Index of each owned cell in the mesh as it was read or made, whatever the ranks.
 
     Raises:
@@ -26,7 +32,7 @@ def original_cells(mesh) -> np.ndarray:
     return np.array(known[:count], dtype=np.int64)
 
 
-def original_nodes(V) -> np.ndarray:
+def original_nodes(V: fem.FunctionSpace) -> np.ndarray:
     """A number for each owned node by the mesh as it was read or made, whatever the ranks; ``V`` of degree 1 or 2.
 
     That of a vertex is its index there. The node of an edge, face or cell is named by two of its vertices that face each

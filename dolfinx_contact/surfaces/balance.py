@@ -4,10 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.support.line_search import halves
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, MapLike
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Steps of Newton's method, and lengths of one that are tried.
 STEPS, LENGTHS = 30, 40
@@ -39,7 +46,14 @@ class SurfaceBalance:
         asked: Function that yields the contacts, each with the reactions that the body asks for.
     """
 
-    def __init__(self, surfaces, body, x, maps, asked):
+    def __init__(
+        self,
+        surfaces: DrivenSurfaces,
+        body: BodyLike,
+        x: np.ndarray,
+        maps: Sequence[MapLike],
+        asked: Callable,
+    ):
         self._surfaces, self._body, self._x, self._maps, self._asked = (
             surfaces,
             body,
@@ -170,7 +184,7 @@ class SurfaceBalance:
         (at_first, rho), D = np.concatenate(parts, axis=1), np.concatenate(columns)
         springs, target, n = surfaces.springs[which], surfaces.driving()[which], which.size
 
-        def energy(moved):
+        def energy(moved: np.ndarray):
             pressure = np.maximum(at_first + rho * (D @ moved), 0.0)
             stored = float(total([(pressure**2 / (2 * rho)).sum()])[0])
             return stored + moved @ (springs * moved / 2 - target), pressure

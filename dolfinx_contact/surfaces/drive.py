@@ -7,13 +7,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import frozen, whole
 from dolfinx_contact.support.checks import finite, vector
+
+if TYPE_CHECKING:
+    from dolfinx_contact.surfaces.surface import Surface
 
 # Part by which guides may miss unit length and right angles: half of the digits.
 SQUARE = 1e-8
@@ -38,7 +41,7 @@ class Drive:
         surface: The ``Surface``, whose ``directions`` and ``drive_axes`` are those of the free motions.
     """
 
-    def __init__(self, surface) -> None:
+    def __init__(self, surface: Surface) -> None:
         self._surface, self._size = surface, surface.point.size
         self._angles = 3 if self._size == 3 else 1
         self._drive = frozen(np.zeros(self._size))
@@ -52,7 +55,7 @@ class Drive:
         self._stiffness = frozen(np.zeros(1))
         self._taken = self._since = 0  # the problem that drove it last, and when
 
-    def of(self, surface) -> Drive:
+    def of(self, surface: Surface) -> Drive:
         """The same forces on another surface."""
         other = copy(self)
         vars(other)["_surface"] = surface

@@ -9,11 +9,17 @@ equilibrium where ``D^T r = F + k (drive - c)``.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
 
 # Part of a motion that has to be along normals for these to resist it.
 RESISTING = 1e-8
@@ -22,7 +28,7 @@ RESISTING = 1e-8
 APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
 
-def approach(body, contacts, u: np.ndarray) -> None:
+def approach(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> None:
     """Move curved surfaces that force drives and no node touches to the body.  Collective.
 
     Args:
@@ -53,7 +59,7 @@ class DrivenSurfaces:
         pressing: Which motions the normal reactions resist most, ``shape=(m,)``.
     """
 
-    def __init__(self, body, contacts):
+    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
         self._body, self._contacts = body, contacts
         self.surfaces = list(
             {id(c.surface): c.surface for c in contacts if c.surface.motions}.values()
@@ -74,7 +80,7 @@ class DrivenSurfaces:
         if not self.plain:
             self.pressing = self._resisted()
 
-    def _axes(self, contact) -> np.ndarray:
+    def _axes(self, contact: ContactLike) -> np.ndarray:
         points, surface = contact.points, contact.surface
         axes = np.zeros((points.count, points.dim, self.count))
         for one, part, motions in zip(self.surfaces, self.parts, self._motions):
@@ -113,7 +119,7 @@ class DrivenSurfaces:
         self._loose = smooth & (along <= RESISTING**2 * (along + across)) & (self.springs == 0.0)
         return (along > across) | (smooth & ~self._loose)
 
-    def _loaded(self, contact) -> np.ndarray:
+    def _loaded(self, contact: ContactLike) -> np.ndarray:
         """Normal reactions of the last step; where there are none, one at the nodes that were nearest.  Collective."""
         pressing = contact.last.reaction[:, -1]
         if self._body.largest(pressing) > 0.0:
@@ -239,7 +245,7 @@ class DrivenSurfaces:
         )
         return total - self.driving(), size + terms / self._lengths
 
-    def tangent(self, derivatives) -> np.ndarray:
+    def tangent(self, derivatives: Sequence[tuple]) -> np.ndarray:
         """Derivative of the forces out of balance by the motions, ``k - D^T R_w D``, ``shape=(m, m)``.  Collective.
 
         Args:
@@ -252,7 +258,7 @@ class DrivenSurfaces:
         stiffness, most = self._body.total(sums)
         return np.diag(self.springs) + stiffness + REGULAR * most
 
-    def columns(self, blocks=None) -> np.ndarray:
+    def columns(self, blocks: np.ndarray | None = None) -> np.ndarray:
         """Forces on owned degrees of freedom, ``B^T S D``, ``shape=(owned dofs, m)``.
 
         Args:
@@ -266,7 +272,7 @@ class DrivenSurfaces:
         columns[:, self._body.fixed] = 0.0
         return columns.T
 
-    def balance(self, x: np.ndarray, maps, asked) -> None:
+    def balance(self, x: np.ndarray, maps: Sequence[MapLike], asked: Callable) -> None:
         """Move the planes until the reactions that maps make are in balance, as far as they can.  Collective.
 
         Args:

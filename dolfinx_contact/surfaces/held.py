@@ -9,13 +9,19 @@ slides: then they carry that, against its motion, and the plane moves until spri
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.contact.interface import STILL
 from dolfinx_contact.support.collective import raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.surfaces.drive import Motion
+    from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a motion along a held direction that may be rounding.
 ALONG = 1e-8
@@ -24,12 +30,14 @@ ALONG = 1e-8
 class Holding(NamedTuple):
     """Nodes of a contact that hold a plane."""
 
-    contact: object
+    contact: ContactLike
     rows: np.ndarray  # (k,)
     axes: np.ndarray  # what the plane's motions move there, tangential components, (k, T, m)
 
 
-def held_surfaces(body, contacts, last: np.ndarray, b: np.ndarray) -> HeldSurfaces | None:
+def held_surfaces(
+    body: BodyLike, contacts: Sequence[ContactLike], last: np.ndarray, b: np.ndarray
+) -> HeldSurfaces | None:
     """The planes that held nodes hold, None if there are none; from now on these motions are not free.  Collective.
 
     Args:
@@ -50,7 +58,9 @@ def held_surfaces(body, contacts, last: np.ndarray, b: np.ndarray) -> HeldSurfac
     return HeldSurfaces(body, [one for one in found if one is not None]) if any(found) else None
 
 
-def _held_surface(body, contacts, surface, u: np.ndarray) -> HeldSurface | None:
+def _held_surface(
+    body: BodyLike, contacts: Sequence[ContactLike], surface: Surface, u: np.ndarray
+) -> HeldSurface | None:
     """The plane with the motions that nodes hold.  Collective."""
     motions, on = surface.motions, [c for c in contacts if c.surface is surface]
     moving = [np.stack([c.carried_by(m.axis, m.turns) for m in motions], axis=2) for c in on]
@@ -84,15 +94,15 @@ def _held_surface(body, contacts, surface, u: np.ndarray) -> HeldSurface | None:
                     "symmetry they are none), and prescribe them by surface.displacement or surface.rotation."
                 )
             holding.append(Holding(contact, rows, along[mine][:, :, which]))
-    surface = HeldSurface(body, surface, [motions[k] for k in which], holding, on)
-    surface.follow(u)
-    return surface
+    found = HeldSurface(body, surface, [motions[k] for k in which], holding, on)
+    found.follow(u)
+    return found
 
 
 class HeldSurfaces:
     """All planes that held nodes hold."""
 
-    def __init__(self, body, surfaces: list):
+    def __init__(self, body: BodyLike, surfaces: list):
         self._body, self._surfaces, self._beyond = body, surfaces, False
 
     def share(self) -> None:
@@ -122,7 +132,14 @@ class HeldSurface:
         contacts: All contacts on it.
     """
 
-    def __init__(self, body, surface, motions, holding, contacts):
+    def __init__(
+        self,
+        body: BodyLike,
+        surface: Surface,
+        motions: list[Motion],
+        holding: list[Holding],
+        contacts: Sequence[ContactLike],
+    ):
         self._body, self._surface, self._motions = body, surface, motions
         self._holding, self._contacts = holding, contacts
         self._part = np.zeros(len(motions))

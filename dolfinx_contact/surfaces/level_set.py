@@ -80,7 +80,9 @@ class RigidSurface(CurvedSurface):
             self.axis = frozen(unit("axis", axis, self.point.size))
         self._made = True
 
-    def _of(self, name: str, function, y: np.ndarray, shape) -> np.ndarray:
+    def _of(
+        self, name: str, function: Callable, y: np.ndarray, shape: tuple[int, ...]
+    ) -> np.ndarray:
         values = finite(f"the values of {name}", function(y.T.copy()))
         if values.shape != shape:
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,7 +96,7 @@ class RigidPlane(Surface):
         """The rows of ``frame``."""
         return self.frame
 
-    def check_pressing(self, motion) -> None:
+    def check_pressing(self, motion: Any) -> None:
         """See ``Surface``."""
         force = np.asarray(self.force)
         pressing = float(force @ self.frame[-1])

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -60,7 +62,7 @@ class CurvedSurface(Surface):
 class _Round(CurvedSurface):
     """A surface of given distance from a point or a line."""
 
-    def __init__(self, point, radius, inside) -> None:
+    def __init__(self, point: ArrayLike, radius: float, inside: bool) -> None:
         super().__init__(point)
         self.radius = positive("radius", radius, finite=True)
         if not isinstance(inside, (bool, np.bool_)):
@@ -92,7 +94,7 @@ class _Round(CurvedSurface):
             )
         return arms / (-length if self.inside else length)[:, None]
 
-    def _numbers(self, *more) -> np.ndarray:
+    def _numbers(self, *more: Any) -> np.ndarray:
         sign = -1.0 if self.inside else 1.0
         return np.concatenate((self.point, [sign * self.radius], *more))
 

@@ -4,8 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from mpi4py import MPI
+
+if TYPE_CHECKING:
+    from dolfinx_contact.law.friction import Friction
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.step.statics import Statics
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
+    from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a motion that is not named.
 NONE = 1e-6
@@ -14,7 +24,9 @@ NONE = 1e-6
 MARGIN = 1e-9
 
 
-def slides_away(surfaces, body, contacts, given: bool) -> str:
+def slides_away(
+    surfaces: DrivenSurfaces, body: BodyLike, contacts: Sequence[ContactLike], given: bool
+) -> str:
     """Which of the ``DrivenSurfaces`` slides away, tips or spins, in words; none is the empty string.  Collective.
 
     Args:
@@ -36,7 +48,13 @@ def slides_away(surfaces, body, contacts, given: bool) -> str:
     return ""
 
 
-def lost_far_away(body, statics, surfaces, x: np.ndarray, acts: bool) -> bool:
+def lost_far_away(
+    body: BodyLike,
+    statics: Statics | None,
+    surfaces: DrivenSurfaces | None,
+    x: np.ndarray,
+    acts: bool,
+) -> bool:
     """Whether body or planes are so far away that rounding hides the loads on them: no state is one then.  Collective.
 
     Args:
@@ -57,7 +75,7 @@ def lost_far_away(body, statics, surfaces, x: np.ndarray, acts: bool) -> bool:
     return not acts or max(body.farthest(x), moved.max(initial=0.0)) > body.extent
 
 
-def nothing_holds(contacts) -> str:
+def nothing_holds(contacts: Sequence[ContactLike]) -> str:
     """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
     surfaces = [contact.surface for contact in contacts]
     if any(
@@ -73,7 +91,15 @@ def nothing_holds(contacts) -> str:
 class _Driven:
     """One surface, its motions ``part`` of all, and the contacts on it with their columns of ``D``."""
 
-    def __init__(self, surface, surfaces, part, driving, contacts, body):
+    def __init__(
+        self,
+        surface: Surface,
+        surfaces: DrivenSurfaces,
+        part: Any,
+        driving: Any,
+        contacts: Sequence[tuple[ContactLike, np.ndarray]],
+        body: BodyLike,
+    ):
         self._surface, self._driving, self._contacts, self._body = surface, driving, contacts, body
         self._springs, self._turns = surfaces.springs[part], surfaces.turns[part]
         self._names, self._pressing = surfaces.names[part], surfaces.pressing[part]
@@ -144,7 +170,7 @@ class _Driven:
         return ""
 
 
-def _radius(friction, slip: np.ndarray) -> np.ndarray:
+def _radius(friction: Friction, slip: np.ndarray) -> np.ndarray:
     """``|M v|`` of nodes that move along their surfaces by ``v``, local components, ``shape=(n,)``."""
     return np.linalg.norm(friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1)
 
@@ -162,7 +188,13 @@ class _Limit:
         weight: Sum of normal reactions, of which no node is known; None takes the present ones.
     """
 
-    def __init__(self, contacts, motions: np.ndarray, body, weight: float | None = None):
+    def __init__(
+        self,
+        contacts: Sequence[tuple[ContactLike, np.ndarray]],
+        motions: np.ndarray,
+        body: BodyLike,
+        weight: float | None = None,
+    ):
         self._body, self._weight = body, weight
         self._parts = [(c.friction, c.reaction[:, -1], axes[:, :, motions]) for c, axes in contacts]
         laws = [friction for friction, _, _ in self._parts]

@@ -14,13 +14,14 @@ from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, vector
 
 if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.surfaces.drive import Drive, Motion
 
 # Part of a length across another vector below which both are parallel.
 PARALLEL = 1e-12
 
 
-def unit(name: str, value, size: int) -> np.ndarray:
+def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """A vector that is not zero, of length one."""
     along = vector(name, value, size)
     largest = np.abs(along).max()
@@ -127,7 +128,7 @@ class Surface(Guarded):
         """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
         return self.guides
 
-    def check_pressing(self, motion) -> None:
+    def check_pressing(self, motion: Any) -> None:
         """Raise a ``ValueError`` if the force pulls it off bodies, which that of a plane may say beforehand."""
 
     # -- motion --------------------------------------------------------------------------------
@@ -267,7 +268,7 @@ def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
     return np.cross(angle, arms)
 
 
-def driven_surfaces(body, contacts):
+def driven_surfaces(body: BodyLike, contacts: Sequence[ContactLike]):
     """The ``DrivenSurfaces`` of some contacts, None where force drives none.  Collective."""
     if not any(contact.surface.motions for contact in contacts):
         return None

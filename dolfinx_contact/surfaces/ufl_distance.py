@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -18,7 +20,7 @@ def is_ufl(given: object) -> bool:
     return isinstance(given, Expr)
 
 
-def by_ufl(expression, gdim: int) -> tuple[_Evaluated, _Evaluated]:
+def by_ufl(expression: Any, gdim: int) -> tuple[_Evaluated, _Evaluated]:
     """Values and gradient of a scalar expression in ``SpatialCoordinate``, at any positions.
 
     The position becomes a function that is constant on each cell of a mesh with a cell for each position: the user's mesh
@@ -52,7 +54,7 @@ def by_ufl(expression, gdim: int) -> tuple[_Evaluated, _Evaluated]:
 class _Evaluated:
     """Values of an expression, or its derivatives, compiled when first asked for so many positions."""
 
-    def __init__(self, expression, x, derived: bool):
+    def __init__(self, expression: Any, x: np.ndarray, derived: bool):
         self._given, self._x, self._derived = expression, x, derived
         self._constants = list(extract_type(expression, ufl.classes.Constant))
         self._room = 0

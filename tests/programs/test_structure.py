@@ -28,6 +28,22 @@ def test_functions_are_short(file):
     assert not long
 
 
+@pytest.mark.parametrize(
+    "file", [f for f in PROGRAMS if "dolfinx_contact" in f.parts[len(ROOT.parts) :]], ids=name
+)
+def test_parameters_have_types(file):
+    """Every parameter of the package says what it is."""
+    functions = [n for n in ast.walk(TREES[file]) if isinstance(n, ast.FunctionDef)]
+    plain = [
+        f"{f.name}({of.arg})"
+        for f in functions
+        for a in [f.args]
+        for of in [*a.posonlyargs, *a.args, *a.kwonlyargs, *filter(None, [a.vararg, a.kwarg])]
+        if of.annotation is None and of.arg not in ("self", "cls")
+    ]
+    assert not plain
+
+
 def test_no_program_changes_the_path():
     """Programs and tests are found by how they are started, not by a path that they change."""
     files = [*PROGRAMS, *(ROOT / "tests").rglob("*.py")]

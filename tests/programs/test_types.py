@@ -47,6 +47,28 @@ KNOWN = {
     "dc.__version__": "str",
 }
 
+# What parts of a step ask of each other, and the classes that have it.
+PARTS = """
+from dolfinx_contact.bodies.elastic import ElasticBody
+from dolfinx_contact.bodies.nonlinear import NonlinearBody
+from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.law.supported import SupportedLaw
+from dolfinx_contact.solvers import protocols
+from dolfinx_contact.step.load_step import LoadStep
+
+
+def fits(body: ElasticBody, rubber: NonlinearBody, contact: Contact, step: LoadStep) -> None:
+    bodies: list[protocols.BodyLike] = [body, rubber]
+    tangent: protocols.NonlinearBodyLike = rubber
+    parts: tuple[protocols.ContactLike, protocols.StepLike] = contact, step
+
+
+def maps(one: BipotentialMap, other: ReturnMap, law: SupportedLaw) -> None:
+    both: list[protocols.MapLike] = [one, other]
+    laws: list[protocols.LawLike] = [law]
+"""
+
 
 def checked(folder, text):
     """What ``mypy --strict`` says of a script, a list of lines."""
@@ -78,6 +100,16 @@ def test_a_users_script_is_well_typed(tmp_path):
         assert f"[{kind}]" in by_line[k][0], by_line[k]
     for k, kind in enumerate(KNOWN.values(), start=len(MISTAKES) + 1):
         assert kind in by_line[k][0] and '"Any"' not in by_line[k][0], by_line[k]
+
+
+def test_parts_of_a_step_have_what_others_ask_of_them(tmp_path):
+    """Bodies, contacts, steps, maps and laws fit the protocols by which parameters are typed; one that lacks a member does not."""
+    assert checked(tmp_path, PARTS) == []
+    wrong = PARTS.replace(
+        "list[protocols.BodyLike] = [body, rubber]", "list[protocols.BodyLike] = [contact]"
+    )
+    (said,) = [line for line in checked(tmp_path, wrong) if "error" in line]
+    assert "BodyLike" in said
 
 
 def test_a_users_script_runs(tmp_path):

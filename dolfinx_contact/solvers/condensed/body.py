@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -27,6 +29,11 @@ from dolfinx_contact.solvers.condensed.input import joint_friction, principal_ax
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.solvers.newton.contact_tangent import next_change
 from dolfinx_contact.support.collective import by_first_rank, raised_together
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.condensed.newton import CondensedNewton
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 # Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
 FEW, MANY, ASTRAY = 3000, 6000, 1e-3
@@ -60,7 +67,14 @@ class CondensedBody:
         MemoryError: on all ranks, if ``W`` and what Newton's method needs beside it would not fit.
     """
 
-    def __init__(self, options, body, contacts, stiffness, memory):
+    def __init__(
+        self,
+        options: CondensedNewton,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+        memory: dict[str, Any],
+    ):
         self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
         self._memory = memory
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
@@ -116,12 +130,12 @@ class CondensedBody:
 
         return CondensedSurfaces(self._body, self._contacts, self._turns, normal)
 
-    def _move_surfaces(self, step, force: np.ndarray) -> None:
+    def _move_surfaces(self, step: StepLike, force: np.ndarray) -> None:
         """Let surfaces that force drives be where forces of all rows have them."""
         if self._surfaces is not None:
             self._surfaces.move(step, force)
 
-    def _driving(self, step) -> np.ndarray:
+    def _driving(self, step: StepLike) -> np.ndarray:
         """Forces that drive the surfaces of the tied rows at present."""
         return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step)
 
@@ -155,7 +169,7 @@ class CondensedBody:
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
         return True
 
-    def _begin(self, step) -> np.ndarray:
+    def _begin(self, step: StepLike) -> np.ndarray:
         """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
         if self._surfaces is not None:
@@ -168,7 +182,7 @@ class CondensedBody:
                 self._set_up()
         return free
 
-    def solve(self, step, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:
+    def solve(self, step: StepLike, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:  # fmt: skip
         """One load step by Newton's method on the condensed problem.
 
         Args:
@@ -228,7 +242,7 @@ class CondensedBody:
             self.past.append((rows, force, self._tied))
         return SolverResult(x, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried)
 
-    def _limited(self, step) -> dict:
+    def _limited(self, step: StepLike) -> dict:
         """Limits of the search for a loose body.  Collective."""
         most = FEW if step.statics.slides(step) else MANY
         return {"max_iterations": min(most, self._options.max_iterations or most)}
@@ -243,7 +257,9 @@ class CondensedBody:
             contact.take(reaction=local[of : of + contact.points.count])
             of += contact.points.count
 
-    def _placed(self, step, free: np.ndarray, starts) -> tuple[np.ndarray, np.ndarray, list]:
+    def _placed(
+        self, step: StepLike, free: np.ndarray, starts: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, list]:
         """Of a loose body: q where it stands at first, the forces of all rows that hold it there, and starts moved there."""
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
         anchors, rows = slice(first, first + self._anchored), self._parts[1]
@@ -309,7 +325,7 @@ class CondensedBody:
         rows = (np.ones(dofs.size), first + dofs, np.arange(dofs.size + 1))
         return Rows(self.comm, sparse.csr_matrix(rows, (dofs.size, whole)), first, size)
 
-    def _motion(self, step, displacement: np.ndarray) -> np.ndarray:
+    def _motion(self, step: StepLike, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
         for contact, moved in zip(self._contacts, self._moved):
@@ -335,12 +351,20 @@ class CondensedBody:
             start += part.size
         return forces
 
-    def _reactions(self, step, q: np.ndarray, tol: float, starts, acting: float, limits: dict):
+    def _reactions(
+        self,
+        step: StepLike,
+        q: np.ndarray,
+        tol: float,
+        starts: Sequence[np.ndarray],
+        acting: float,
+        limits: dict,
+    ):
         """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
         left = max(self._until - perf_counter(), 1e-9)
         options = replace(self._options, **limits | {"max_seconds": left})
 
-        def solve(monitor):
+        def solve(monitor: Callable | None):
             given = self.operator, self.friction, q, max(tol, 1e-14), starts, monitor
             return options.search(*given, external=acting, **self._scales)[0]
 
@@ -378,7 +402,7 @@ class CondensedBody:
         """Rows of all nodes, in the order of ranks and contacts, on all ranks."""
         return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
 
-    def _gathered_stiffness(self, stiffness) -> dict[str, np.ndarray]:
+    def _gathered_stiffness(self, stiffness: Sequence[NodalStiffness]) -> dict[str, np.ndarray]:
         """Normal and tangential blocks of all nodes along the principal axes, for rank 0's errors."""
         gathered = {"stiffness": self.gather(np.concatenate([k.normal for k in stiffness]))}
         if self.dim > 1:
@@ -389,12 +413,12 @@ class CondensedBody:
         return gathered
 
 
-def _searches(step, fallbacks: bool) -> tuple[dict, ...]:
+def _searches(step: StepLike, fallbacks: bool) -> tuple[dict, ...]:
     """Options of one search after another: where something may slide Newton's method alone first."""
     return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
 
 
-def moved_across(contact) -> np.ndarray:
+def moved_across(contact: ContactLike) -> np.ndarray:
     """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
     points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
     rows = points.supported
@@ -402,7 +426,7 @@ def moved_across(contact) -> np.ndarray:
     return moved
 
 
-def acting(contact, moved: np.ndarray) -> Friction:
+def acting(contact: ContactLike, moved: np.ndarray) -> Friction:
     """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
     free, whole = contact.free_friction, contact.friction
     if free is whole or not moved.any():
@@ -412,7 +436,7 @@ def acting(contact, moved: np.ndarray) -> Friction:
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
 
 
-def components(contacts) -> int:
+def components(contacts: Sequence[ContactLike]) -> int:
     """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
     smooth = all(contact.friction.frictionless for contact in contacts)
     if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):

@@ -4,12 +4,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact.petsc.linear_solver import check_solved, mumps_factors
 from dolfinx_contact.support.checks import free_memory
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx_contact.petsc.linear_solver import LinearSolver
 
 UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
 _BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
@@ -27,7 +34,7 @@ class Rows:
         owned: Number of its degrees of freedom.
     """
 
-    def __init__(self, comm, rows: sparse.csr_matrix, first: int, owned: int):
+    def __init__(self, comm: MPI.Comm, rows: sparse.csr_matrix, first: int, owned: int):
         self.comm = comm
         self.all = sparse.vstack(comm.allgather(rows)).tocsr()
         self.size = self.all.shape[0]
@@ -51,7 +58,7 @@ class Rows:
         return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
 
 
-def compliance(solver, rows: list[Rows]) -> np.ndarray:
+def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
     """Motion of all rows by a unit force on each, ``A^-1`` between them.
 
     Args:
@@ -99,7 +106,7 @@ class Responses:
         """Bytes of the blocks with those of these rows."""
         return 8 * self.dofs.size * _COLUMNS * len(self._solved.union(self.needed(rows)))
 
-    def compliance(self, solver, rows: list[Rows]) -> np.ndarray:
+    def compliance(self, solver: Any, rows: list[Rows]) -> np.ndarray:
         """As the function of this name."""
         comm, needed = rows[0].comm, self.needed(rows)
         self._solve(solver, comm, [k for k in needed if k not in self._solved])
@@ -116,7 +123,7 @@ class Responses:
         W = R.tocsr() @ moved.T
         return (W + W.T) / 2
 
-    def _solve(self, solver, comm, blocks: list[int]) -> None:
+    def _solve(self, solver: LinearSolver, comm: MPI.Comm, blocks: list[int]) -> None:
         """Add blocks of columns.  Collective."""
         A = solver.ksp.getOperators()[0]
         first, last = A.getOwnershipRange()
@@ -160,17 +167,17 @@ def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
     return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
 
 
-def available_first(comm) -> float:
+def available_first(comm: MPI.Comm) -> float:
     """What rank 0 has free, which holds W, on all ranks.  Collective."""
     return comm.bcast(free_memory() if comm.rank == 0 else None)
 
 
-def fits(comm, nodes: int, dim: int, unknowns: int) -> bool:
+def fits(comm: MPI.Comm, nodes: int, dim: int, unknowns: int) -> bool:
     """Whether W would fit into half of the memory that rank 0 has free."""
     return 2 * bytes_needed(nodes, dim, unknowns) <= available_first(comm)
 
 
-def check_memory(comm, needed: int) -> None:
+def check_memory(comm: MPI.Comm, needed: int) -> None:
     available = available_first(comm)
     if needed > available:
         raise MemoryError(
@@ -179,7 +186,7 @@ def check_memory(comm, needed: int) -> None:
         )
 
 
-def block_solver(ksp):
+def block_solver(ksp: PETSc.KSP):
     """A function that solves for blocks of sparse right-hand sides with the solver of ``ksp``.
 
     With MUMPS the block goes to it as it is, which leaves out the zeros of the right-hand sides in
@@ -194,7 +201,7 @@ def block_solver(ksp):
     ksp.setUp()
     factors = mumps_factors(ksp) if ksp.getType() == "preonly" else None
 
-    def by_block(rows):
+    def by_block(rows: Any):
         count = rows.shape[0]
         # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
         mine = comm.rank == 0
@@ -218,7 +225,7 @@ def block_solver(ksp):
             matrix.destroy()
         return result
 
-    def by_column(rows):
+    def by_column(rows: Any):
         right, left = A.createVecs()
         first, last = A.getOwnershipRange()
         result = np.empty((owned, rows.shape[0]))

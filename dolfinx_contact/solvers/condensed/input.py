@@ -4,13 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.support.checks import finite, free_memory
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
-def checked_problem(q, W, friction, r0) -> tuple:
+    from dolfinx_contact.solvers.protocols import ContactLike
+
+
+def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
     """``q``, ``W`` and ``r0`` as arrays of numbers that belong together, and a ``Friction`` with them."""
     q = finite("q", q)
     dim = q.shape[1] if q.ndim == 2 else 3
@@ -58,7 +66,7 @@ def checked_problem(q, W, friction, r0) -> tuple:
     return q, W, friction, r0
 
 
-def checked_compliance(W) -> np.ndarray:
+def checked_compliance(W: Any) -> np.ndarray:
     """``W`` as an array, that of the user if it is of the type; a sparse one with its zeros."""
     if not hasattr(W, "tocsc"):
         return finite("W", W, copy=False)
@@ -81,7 +89,9 @@ def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
     return turns
 
 
-def joint_friction(laws, contacts, gather) -> Friction:
+def joint_friction(
+    laws: Sequence[Friction], contacts: Sequence[ContactLike], gather: Callable
+) -> Friction:
     """The law of all nodes; contacts with the same coefficients stay one uniform law.
 
     Args:

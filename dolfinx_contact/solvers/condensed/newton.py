@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,13 @@ class CondensedNewton:
         positive("max_seconds", self.max_seconds)
 
     def solve_condensed(
-        self, operator, friction: Friction, q, tol, starts=(), **given
+        self,
+        operator: Any,
+        friction: Friction,
+        q: np.ndarray,
+        tol: float,
+        starts: Sequence[np.ndarray] = (),
+        **given: Any,
     ) -> CondensedResult:
         """As ``search``, of which no result but a solution is returned; ``solve_condensed`` is the public entry.
 
@@ -89,7 +96,14 @@ class CondensedNewton:
         return found
 
     def search(
-        self, operator, friction: Friction, q, tol, starts=(), monitor=None, **scales
+        self,
+        operator: Any,
+        friction: Friction,
+        q: Any,
+        tol: float,
+        starts: Sequence[np.ndarray] = (),
+        monitor: Callable | None = None,
+        **scales: Any,
     ) -> tuple[CondensedResult, bool]:
         """The best state found with a kernel operator, and whether it is a solution.
 
@@ -150,8 +164,7 @@ def solve_condensed(
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
     Needs neither a body nor DOLFINx.  ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without reactions.
-    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` the
-    slip.
+    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` slip.
 
     The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
 
@@ -200,7 +213,9 @@ def solve_condensed(
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
 
 
-def _checked_options(solver, tol, max_seconds) -> tuple[CondensedNewton, float]:
+def _checked_options(
+    solver: object, tol: float, max_seconds: float | None
+) -> tuple[CondensedNewton, float]:
     solver = CondensedNewton() if solver is None else solver
     if not isinstance(solver, CondensedNewton):
         raise ValueError(f"solver {solver!r} is unknown here: use None or dc.CondensedNewton(...).")
@@ -217,7 +232,14 @@ def _usual(solver: CondensedNewton) -> CondensedNewton:
     return replace(solver, max_iterations=solver.max_iterations or USUAL)
 
 
-def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> CondensedResult:
+def _nearer(
+    solver: CondensedNewton,
+    operator: Any,
+    friction: Any,
+    q: Any,
+    tol: float,
+    found: CondensedResult,
+) -> CondensedResult:
     """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
 
     Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off; where contacts are unlike
@@ -230,7 +252,7 @@ def _nearer(solver, operator, friction, q, tol, found: CondensedResult) -> Conde
     limits = {"max_iterations": most, "max_seconds": left}
     finer = replace(solver, slip_tol=None, fallbacks=cheap, **limits)
 
-    def again(tol, **limits):
+    def again(tol: float, **limits: Any):
         nearer, done = finer.search(operator, friction, q, tol, [found.reaction], **limits)
         return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried), done
 

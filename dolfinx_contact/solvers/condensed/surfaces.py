@@ -4,9 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dolfinx_contact.surfaces.driven import DrivenSurfaces
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
 
 class CondensedSurfaces:
@@ -25,7 +31,13 @@ class CondensedSurfaces:
         tied: Number of tied rows.
     """
 
-    def __init__(self, body, contacts, turns: np.ndarray, stiffness: np.ndarray):
+    def __init__(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        turns: np.ndarray,
+        stiffness: np.ndarray,
+    ):
         surfaces = DrivenSurfaces(body, contacts)
         self._stiff = surfaces.springs > stiffness.max()
         self._stiffest, self._springs = float(stiffness.max()), surfaces.springs
@@ -51,7 +63,7 @@ class CondensedSurfaces:
         bordered[size:, size:] = -np.diag(self._springs[loose])
         return bordered
 
-    def begin(self, step, free: np.ndarray) -> None:
+    def begin(self, step: StepLike, free: np.ndarray) -> None:
         """Planes begin where they were; where springs are not stretched if these are eliminated; all near the body.
 
         Args:
@@ -62,7 +74,7 @@ class CondensedSurfaces:
         step.surfaces.touch(free)
         self._at_first = step.surfaces.moved
 
-    def move(self, step, force: np.ndarray) -> None:
+    def move(self, step: StepLike, force: np.ndarray) -> None:
         """Move the planes where forces of all rows have them, the tied rows' last."""
         moved, stiff = np.zeros(step.surfaces.count), self._stiff
         moved[~stiff] = force[len(force) - self.tied :]
@@ -77,17 +89,17 @@ class CondensedSurfaces:
         apart[:, -self.tied :] *= np.abs(lengths).max() / largest
         return apart.max(axis=1)
 
-    def driving(self, step) -> np.ndarray:
+    def driving(self, step: StepLike) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
         return step.surfaces.driving()[~self._stiff]
 
 
-def _turned(turns: np.ndarray, axes) -> np.ndarray:
+def _turned(turns: np.ndarray, axes: np.ndarray) -> np.ndarray:
     rows = np.einsum("nij,njm->nim", turns, np.concatenate(axes))
     return rows.reshape(-1, rows.shape[2])
 
 
-def _past_held(contact, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _past_held(contact: ContactLike, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``D``, and what of it the reactions without those along held directions pull by: friction there goes with the normal one."""
     if contact.dragged is None:
         return axes, axes

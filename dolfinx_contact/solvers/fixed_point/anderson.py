@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 
@@ -18,7 +20,7 @@ class Anderson:
         total: Function that sums an array over all ranks.
     """
 
-    def __init__(self, size: int, depth: int, total):
+    def __init__(self, size: int, depth: int, total: Callable):
         self._moves = np.empty((depth, size))  # dX + dG
         self._dg = np.empty((depth, size))
         self._gram = np.zeros((depth, depth))

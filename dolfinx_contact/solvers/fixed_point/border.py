@@ -4,11 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import block_diag
 
 from dolfinx_contact.surfaces.surface import driven_surfaces
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
 STEPS, LEFT = 50, 1e-6
@@ -34,7 +40,14 @@ class Border:
         springs: ``S`` of each contact, ``shape=(n, gdim)``, force per length.  Collective.
     """
 
-    def __init__(self, body, contacts, A, stiffened, springs):
+    def __init__(
+        self,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        A: PETSc.Mat,
+        stiffened: Any,
+        springs: Any,
+    ):
         self._body, self._loose = body, body.loose is not None
         surfaces = driven_surfaces(body, contacts)
         columns, s = [], np.zeros((0, 0))
@@ -62,14 +75,14 @@ class Border:
 class _Preconditioner:
     """What applies a preconditioner, as PETSc wants it."""
 
-    def __init__(self, stiffened):
+    def __init__(self, stiffened: Any):
         self._stiffened = stiffened
 
-    def apply(self, _, x, y) -> None:
+    def apply(self, _: object, x: PETSc.Vec, y: PETSc.Vec) -> None:
         y.array_w[:] = self._stiffened.apply(x.array_r)
 
 
-def _solved(body, A, stiffened, C: np.ndarray) -> np.ndarray:
+def _solved(body: BodyLike, A: PETSc.Mat, stiffened: Any, C: np.ndarray) -> np.ndarray:
     """A^-1 C, ``shape=(owned dofs, m)``, by conjugate gradients with a preconditioner."""
     ksp = PETSc.KSP().create(body.comm)
     ksp.setOperators(A)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from dolfinx_contact.solvers.fixed_point.newton_krylov import search_by_newton
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike, StepLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
@@ -85,7 +90,7 @@ class FixedPoint:
         return BoundFixedPoint(self, body, contacts, stiffness)
 
 
-def _slides(step, x: np.ndarray, tried: bool = False) -> bool:
+def _slides(step: StepLike, x: np.ndarray, tried: bool = False) -> bool:
     """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
     if step.surfaces is None and not (tried and step.statics is not None):
         return False
@@ -96,7 +101,13 @@ def _slides(step, x: np.ndarray, tried: bool = False) -> bool:
 class BoundFixedPoint:
     """The fixed point for one body; keeps the preconditioner of the rho used last."""
 
-    def __init__(self, options: FixedPoint, body, contacts, stiffness):
+    def __init__(
+        self,
+        options: FixedPoint,
+        body: BodyLike,
+        contacts: Sequence[ContactLike],
+        stiffness: Sequence[NodalStiffness],
+    ):
         self._options, self._body, self._contacts = options, body, contacts
         self._stiffness = stiffness
         self.preconditioner: ContactPreconditioner | None = None
@@ -114,7 +125,7 @@ class BoundFixedPoint:
             self.destroy()
         return True
 
-    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 
         Args:
@@ -141,7 +152,7 @@ class BoundFixedPoint:
             search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
         )
 
-    def _fall(self, search, factor: float, every: int) -> None:
+    def _fall(self, search: Search, factor: float, every: int) -> None:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
         patience = math.inf if search.step.statics is None else PATIENCE
         search.begin(self._options.max_iterations, patience)
@@ -160,7 +171,9 @@ class BoundFixedPoint:
         self.preconditioner.forget_tangent()
         return maps
 
-    def _accelerate(self, search, maps, x: np.ndarray, every: int) -> None:
+    def _accelerate(
+        self, search: Search, maps: Sequence[MapLike], x: np.ndarray, every: int
+    ) -> None:
         """Anderson's method from ``x``, until the search ends or a tangent misleads."""
         step, tangent = search.step, np.inf  # error at the last tangent
         anderson = Anderson(x.size, self._options.depth, step.total)

@@ -4,14 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.support.line_search import enough, halves
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
+    from dolfinx_contact.solvers.protocols import MapLike, StepLike
+    from dolfinx_contact.solvers.search import Search
 
 # Augmentation parameters over the nodal stiffness, along the normal and along slip. The latter weights errors of slip
 # against errors of reaction; the next one is taken where a step gets SHORT.
@@ -27,7 +34,7 @@ INNER, ACCURACY = 20, 0.1
 SHORTEST = 2.0**-9
 
 
-def search_by_newton(search, preconditioner, x: np.ndarray) -> None:
+def search_by_newton(search: Search, preconditioner: ContactPreconditioner, x: np.ndarray) -> None:
     """Steps of Newton's method from ``x`` until the search is over, or the error no longer halves.
 
     Args:
@@ -63,7 +70,7 @@ class NewtonKrylov:
         preconditioner: The ``ContactPreconditioner``, linearised before every step.
     """
 
-    def __init__(self, step, preconditioner):
+    def __init__(self, step: StepLike, preconditioner: ContactPreconditioner):
         self._step, self._preconditioner, body = step, preconditioner, step.body
         right, left = body.K.createVecs()
         size = (body.K.getSizes()[0],) * 2
@@ -83,16 +90,20 @@ class NewtonKrylov:
         """Free the vectors of GMRES.  Collective."""
         self._solver.destroy()
 
-    def mult(self, _, x, y) -> None:
+    def mult(self, _: object, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """PETSc's product with J."""
         y.array_w[:] = self._preconditioner.tangent(x.array_r.copy())
 
-    def apply(self, _, x, y) -> None:
+    def apply(self, _: object, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """PETSc's preconditioner."""
         y.array_w[:] = self._preconditioner.correct(x.array_r)
 
     def step(
-        self, x: np.ndarray, residual: np.ndarray, maps, forces: np.ndarray | None = None
+        self,
+        x: np.ndarray,
+        residual: np.ndarray,
+        maps: Sequence[MapLike],
+        forces: np.ndarray | None = None,
     ) -> tuple[np.ndarray, float, int]:
         """Direction of Newton's step, how much of it makes the residual smaller, and iterations of GMRES.
 

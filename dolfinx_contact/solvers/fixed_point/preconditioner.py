@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
@@ -13,6 +16,9 @@ from dolfinx_contact.petsc.linear_solver import stage
 from dolfinx_contact.solvers.fixed_point.border import Border
 from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
 
 
 class ContactPreconditioner:
@@ -28,7 +34,7 @@ class ContactPreconditioner:
         stiffened: What applies the preconditioner of the stiffness with springs.
     """
 
-    def __init__(self, body, contacts, maps):
+    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike], maps: Sequence[MapLike]):
         self._body, self._contacts, self._maps = body, contacts, maps
         self._spring_rates = self._rates()
         self._layer, self._linearised = None, False
@@ -82,7 +88,7 @@ class ContactPreconditioner:
             S = sparse.csr_matrix((self._body.size, K.getSize()[1]))
         return like(K, S)
 
-    def linearise(self, derivatives) -> None:
+    def linearise(self, derivatives: Sequence[tuple]) -> None:
         """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.
 
         Args:

@@ -4,9 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dolfinx_contact.support.line_search import halves
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike, StepLike
 
 # A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
 # (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
@@ -45,7 +53,9 @@ class RigidBalance:
         forces: ``K Z``, of the same shape.
     """
 
-    def __init__(self, body, contacts, A, modes):
+    def __init__(
+        self, body: BodyLike, contacts: Sequence[ContactLike], A: PETSc.Mat, modes: np.ndarray
+    ):
         self._body, self._contacts = body, contacts
         forces = np.array([body.multiply(z) for z in modes.T]).T
         right, left = A.createVecs()
@@ -69,7 +79,9 @@ class RigidBalance:
         """Number of soft motions."""
         return len(self._energy)
 
-    def balanced(self, x: np.ndarray, step, maps) -> tuple[np.ndarray, np.ndarray]:
+    def balanced(
+        self, x: np.ndarray, step: StepLike, maps: Sequence[MapLike]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """``x``, moved along the soft motions, or as it was if there is no way down; and the step's ``forces`` there.
 
         Args:
@@ -99,7 +111,14 @@ class RigidBalance:
             (x, forces), (left, slope, size) = trial, result
         return x, forces
 
-    def _across(self, start, left, slope, step, maps) -> tuple:
+    def _across(
+        self,
+        start: tuple[np.ndarray, np.ndarray],
+        left: np.ndarray,
+        slope: np.ndarray,
+        step: StepLike,
+        maps: Sequence[MapLike],
+    ) -> tuple:
         """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
 
         Along that motion, the way that loads drive it, the length is doubled until less is left, and halved where that
@@ -134,7 +153,9 @@ class RigidBalance:
             1.0, self._body.extent / (self._body.largest(np.abs(self.modes @ c)) or np.inf)
         )
 
-    def left(self, x, forces, step, maps) -> tuple[np.ndarray, np.ndarray, float]:
+    def left(
+        self, x: np.ndarray, forces: np.ndarray, step: StepLike, maps: Sequence[MapLike]
+    ) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
 
         All in roots of energy: each force over the root of its node's stiffness in A.
@@ -160,7 +181,7 @@ class RigidBalance:
         return sums[:n], self._energy + sums[n:-1].reshape(n, n), np.sqrt(sums[-1])
 
 
-def patch_motions(body, contacts) -> np.ndarray:
+def patch_motions(body: BodyLike, contacts: Sequence[ContactLike]) -> np.ndarray:
     """What the body gives way to forces and moments on each of its contacts, ``shape=(owned dofs, m)``.
 
     The bending of a slender body is among them.  One solve with the stiffness for each.  Collective.

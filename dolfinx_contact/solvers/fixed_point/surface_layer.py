@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
@@ -11,6 +14,9 @@ from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 from dolfinx_contact.solvers.newton.contact_tangent import change_of
 from dolfinx_contact.surfaces.surface import driven_surfaces
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
@@ -32,7 +38,7 @@ class SurfaceLayer:
         dofs: Owned free degrees of freedom of the layers.
     """
 
-    def __init__(self, body, contacts, prefix: str):
+    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike], prefix: str):
         self._body, self._contacts, self._prefix = body, contacts, prefix
         self.dofs = _near(body, contacts)
         first, last = body.K.getOwnershipRange()
@@ -56,7 +62,7 @@ class SurfaceLayer:
         if self._solver is not None:
             self._solver.destroy()
 
-    def linearise(self, derivatives) -> None:
+    def linearise(self, derivatives: Sequence[tuple]) -> None:
         """Factorise the block at new derivatives of the nodal maps.  Collective.
 
         Args:
@@ -105,7 +111,7 @@ class SurfaceLayer:
         return product
 
 
-def _near(body, contacts) -> np.ndarray:
+def _near(body: BodyLike, contacts: Sequence[ContactLike]) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
     of = body.displacements
     gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)

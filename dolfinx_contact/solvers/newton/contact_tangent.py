@@ -4,12 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.contact.interface import like, response, responses, structure
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
 
 class ContactTangent:
@@ -23,7 +29,7 @@ class ContactTangent:
         contacts: Its contacts.
     """
 
-    def __init__(self, body, contacts):
+    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
         self._body, self._points = body, [contact.points for contact in contacts]
         self._A = self._solver = None
         self._free = np.ones(body.size)
@@ -57,7 +63,7 @@ class ContactTangent:
         """The linear solver of ``matrix``."""
         return self._factors().ksp
 
-    def linearise(self, derivatives) -> None:
+    def linearise(self, derivatives: Sequence[tuple]) -> None:
         """Set up at the present ``K`` and at derivatives of the nodal maps.  Collective.
 
         Args:
@@ -110,7 +116,7 @@ class ContactTangent:
         raise AssertionError
 
 
-def change_of(K, both, free=None) -> PETSc.Mat:
+def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> PETSc.Mat:
     """``R_r K + R_u``, what the contact changes of ``K``.  Collective.
 
     Args:
@@ -129,7 +135,7 @@ def change_of(K, both, free=None) -> PETSc.Mat:
     return change
 
 
-def next_change(step, x: np.ndarray) -> float:
+def next_change(step: StepLike, x: np.ndarray) -> float:
     """How much Newton's next step would still change the sums of reactions at nodes, over the forces that act.  Collective.
 
     Args:
@@ -155,7 +161,7 @@ def next_change(step, x: np.ndarray) -> float:
 class OnTangent:
     """A solver on the tangent of one body, bound; keeps its ordering."""
 
-    def __init__(self, options, body, contacts):
+    def __init__(self, options: Any, body: BodyLike, contacts: Sequence[ContactLike]):
         if any(contact.surface.motions for contact in contacts):
             raise ValueError(
                 f"{type(options).__name__}() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "

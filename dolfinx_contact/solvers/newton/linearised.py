@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
 from dolfinx_contact.step.load_step import Judged
 from dolfinx_contact.step.nonlinear import LinearisedStep
 from dolfinx_contact.support.line_search import halves
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import ContactLike, NonlinearBodyLike, StepLike
+    from dolfinx_contact.step.errors import NodalStiffness
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
 # largest of the last BEFORE ones.
@@ -44,7 +49,13 @@ class Linearised:
 class BoundLinearised:
     """The method for one body; the solver is bound anew to every tangent."""
 
-    def __init__(self, solver, body, contacts, memory):
+    def __init__(
+        self,
+        solver: Solver,
+        body: NonlinearBodyLike,
+        contacts: Sequence[ContactLike],
+        memory: dict[str, Any],
+    ):
         self._solver, self._body, self._contacts, self._memory = solver, body, contacts, memory
 
     def destroy(self) -> None:
@@ -54,7 +65,7 @@ class BoundLinearised:
         """See ``BoundSolver``."""
         return True
 
-    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
         """Linearise until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
@@ -86,7 +97,9 @@ class BoundLinearised:
         said = f"linearised {len(used)} times"
         return SolverResult(best, iterations, forward, solver, reason=said)
 
-    def _linear_step(self, step, x: np.ndarray, forces: np.ndarray, error: float) -> SolverResult:
+    def _linear_step(
+        self, step: StepLike, x: np.ndarray, forces: np.ndarray, error: float
+    ) -> SolverResult:
         """The contact step of the body linearised at ``x``, whose forces ``-F(x)`` and error are known."""
         body = self._body
         body.linearise(x)
@@ -103,7 +116,7 @@ class BoundLinearised:
             if step.surfaces is not None:
                 step.surfaces.moved_with(linear.surfaces)
 
-    def _bind(self, stiffness) -> BoundSolver:
+    def _bind(self, stiffness: Sequence[NodalStiffness]) -> BoundSolver:
         """The solver, bound to the present tangent; the fixed point where that is none of a body by itself.
 
         Bodies under pressure may be stable on the plane alone: without it nodes would not give way to their reactions.
@@ -114,7 +127,7 @@ class BoundLinearised:
         except ValueError:
             return FixedPoint().bind(*arguments)
 
-    def _part(self, step, x: np.ndarray, to: np.ndarray, most: float) -> Judged | None:
+    def _part(self, step: StepLike, x: np.ndarray, to: np.ndarray, most: float) -> Judged | None:
         """The iterate at a part of the way, judged; None if no part helps."""
         for length in halves(SHORTEST):
             judged = step.judged(to if length == 1.0 else x + length * (to - x))

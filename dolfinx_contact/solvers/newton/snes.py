@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -19,6 +19,9 @@ from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
 from dolfinx_contact.solvers.search import Search
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import StepLike
 
 DEFAULT = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
 MOST = 10_000  # iterations, far more than snes_max_it
@@ -62,7 +65,7 @@ class SNES:
 class BoundSNES(OnTangent):
     """SNES for one body."""
 
-    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
         """Let SNES iterate until the errors are at most the tolerance, or it gives up.
 
         Args:
@@ -87,7 +90,9 @@ class BoundSNES(OnTangent):
             search.best, search.iterations, search.forward_error, SolverName.SNES, reason=said
         )
 
-    def _supports_moved(self, step, x: np.ndarray, maps, search, stands: bool) -> np.ndarray:
+    def _supports_moved(
+        self, step: StepLike, x: np.ndarray, maps: Sequence[ReturnMap], search: Search, stands: bool
+    ) -> np.ndarray:
         """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""
         descent, forces, length = Descent(step, self._tangent, stands), step.forces(x), 1.0
         descent.begin(maps)
@@ -132,7 +137,9 @@ class _Equations:
         failure: What a callback has raised.
     """
 
-    def __init__(self, step, tangent: ContactTangent, maps, search: Search):
+    def __init__(
+        self, step: StepLike, tangent: ContactTangent, maps: Sequence[ReturnMap], search: Search
+    ):
         self.search, self.failure = search, None
         self._step, self._tangent, self._maps = step, tangent, maps
         self._last: tuple | None = None  # a displacement, and the step's forces there
@@ -140,7 +147,7 @@ class _Equations:
     def calls(self, work: Callable) -> Callable:
         """A callback of PETSc that leaves what it raises in ``failure``."""
 
-        def call(*arguments):
+        def call(*arguments: Any):
             try:
                 return work(*arguments)
             except BaseException as failure:
@@ -156,19 +163,19 @@ class _Equations:
             self._last = x, self._step.forces(x)
         return self._last
 
-    def function(self, snes, X, residual) -> None:
+    def function(self, snes: PETSc.SNES, X: PETSc.Vec, residual: PETSc.Vec) -> None:
         """Forces that are too much; zero at fixed degrees of freedom."""
         step, (x, forces) = self._step, self._at(X)
         residual.array_w[:] = -step.free(step.out_of_balance(x, self._maps, forces))
 
-    def jacobian(self, snes, X, J, P) -> None:
+    def jacobian(self, snes: PETSc.SNES, X: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         """Their derivative, written into the tangent's matrix."""
         (x, forces), body = self._at(X), self._step.body
         if body.nonlinear:
             body.linearise(x)
         self._tangent.linearise(self._step.derivatives(x, self._maps, forces))
 
-    def test(self, snes, iteration: int, norms) -> int:
+    def test(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
         """Judge the iterate by the errors of the step."""
         x, forces = self._at(snes.getSolution())
         self.search.residual(x, self._maps, forces)

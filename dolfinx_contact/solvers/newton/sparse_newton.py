@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTan
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.line_search import enough, halves
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import LawLike, StepLike
 
 NAME = "SparseNewton"
 
@@ -67,7 +71,7 @@ class SparseNewton:
 class BoundSparseNewton(OnTangent):
     """The method for one body."""
 
-    def solve(self, step, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
@@ -91,7 +95,14 @@ class BoundSparseNewton(OnTangent):
             search.best, search.iterations, search.forward_error, SolverName.SPARSE_NEWTON
         )
 
-    def _fall(self, search, descent, x: np.ndarray, forces: np.ndarray, maps) -> tuple:
+    def _fall(
+        self,
+        search: Search,
+        descent: Descent,
+        x: np.ndarray,
+        forces: np.ndarray,
+        maps: Sequence[ReturnMap],
+    ) -> tuple:
         """Steps with the same maps until the search ends or one gets short: the last iterate and its forces."""
         descent.begin(maps)
         while True:
@@ -112,11 +123,11 @@ class Descent:
     residual, and a step of length t leaves ``1 - t`` of it.
     """
 
-    def __init__(self, step, tangent: ContactTangent, stands: bool):
+    def __init__(self, step: StepLike, tangent: ContactTangent, stands: bool):
         self._step, self._body, self._tangent = step, step.body, tangent
         self._stands = stands  # the body's tangent is good enough
 
-    def begin(self, maps) -> None:
+    def begin(self, maps: Sequence[ReturnMap]) -> None:
         """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
         self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
 
@@ -172,7 +183,7 @@ class Descent:
             maps.append(ReturnMap(normal, map.tangential))
         return maps
 
-    def _closing(self, x: np.ndarray, maps) -> list:
+    def _closing(self, x: np.ndarray, maps: Sequence[ReturnMap]) -> list:
         """Maps for which nodes that just touch do so under load: a body at rest on a plane is not to fall through."""
         both = zip(self._step.contacts, maps)
         return [_Closing(map, contact.gap_rounding(x)) for contact, map in both]
@@ -184,5 +195,5 @@ class _Closing(NamedTuple):
     map: ReturnMap
     depth: float  # length
 
-    def linearised(self, law, reaction, gap, slip):
+    def linearised(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return self.map.linearised(law, reaction, gap - self.depth, slip)
