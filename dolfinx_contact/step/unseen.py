@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.step.errors import NodalStiffness
@@ -118,7 +119,7 @@ class Unseen:
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
         self._turns = self._turns and not body.nonlinear
         if self._turns:
-            self._check_turn(body, contacts, stiffness, u[: body.size])
+            self._check_turn(body, contacts, stiffness, u)
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
@@ -173,7 +174,7 @@ class Unseen:
 
             self._turns = not any(contact.axial for contact in contacts)
             self._turn = Turn(body)
-        angles = self._turn.angles(u)
+        angles = self._turn.angles(u[: body.size])
         theta = float(np.linalg.norm(angles, axis=1).max())
         if theta <= CLEAR:
             return
@@ -183,8 +184,8 @@ class Unseen:
             return
         if length <= -body.highest(-np.concatenate([contact.gap for contact in contacts])):
             return
-        share = self._turn.share(contacts, u, angles)
-        if share > GROWN:
+        share = self._turn.share(contacts, u[: body.size], angles)
+        if share > GROWN and 0.5 * theta**2 > GROWN * mean_strain(body.displacements, u):
             self._turns = False
             warnings.warn(
                 f"the body has turned by {theta:.3g} rad, and F is linear in u: so it grows by theta^2 / 2 = {0.5 * theta**2:.2g} of its "
