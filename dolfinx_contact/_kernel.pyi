@@ -383,13 +383,14 @@ def common_integrals(
     other_degree: typing.SupportsInt | typing.SupportsIndex,
     at: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    density: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> tuple[
     numpy.typing.NDArray[numpy.float64],
     numpy.typing.NDArray[numpy.float64],
     numpy.typing.NDArray[numpy.float64],
 ]:
     """
-    Integrals over the common parts of n pairs of pieces: of shape functions N of the one side, shape (n, k), of products of them, (n, k, k), and with those of the other side, (n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where these are on the reference facet; shape functions are monomials times coefficients, shape (k, k); at and weights are a rule on the unit interval.
+    Integrals over the common parts of n pairs of pieces: of shape functions N of the one side, shape (n, k), of products of them, (n, k, k), and with those of the other side, (n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where these are on the reference facet; shape functions are monomials times coefficients, shape (k, k); at and weights are a rule on the unit interval; density is that of the measure, shape (n, k), at the nodes of the one side's facets, or empty.
     """
 
 def instruction_sets() -> list[str]:

@@ -836,6 +836,12 @@ class Contact(Guarded):
         return fields.per_area(self.reaction[:, -1], self.area)
 
     @property
+    def density(self) -> np.ndarray | None:
+        """``weight`` at the nodes of ``displacements.V``, None where it is one.  Collective."""
+        weight = self._weight
+        return None if weight is None else fields.at_nodes(self.displacements.V, weight)
+
+    @property
     def weighted(self) -> bool:
         """Whether the surface measure has a weight."""
         return self._weight is not None

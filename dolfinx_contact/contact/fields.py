@@ -45,6 +45,19 @@ def weight_on(V: fem.FunctionSpace, weight: Any):
     return values
 
 
+def at_nodes(V: fem.FunctionSpace, weight: Any) -> np.ndarray:
+    """What ``weight_on`` returns at the nodes of ``V`` that this rank knows, ``shape=(n,)``.  Collective."""
+    scalars, parent = V.sub(0).collapse()
+    values = fem.Function(scalars)
+    if isinstance(weight, ufl.constantvalue.ConstantValue):  # it has no mesh
+        values.x.array[:] = float(weight)
+    else:
+        values.interpolate(fem.Expression(weight, compat.interpolation_points(scalars)))
+    found = np.zeros(len(values.x.array))
+    found[np.ravel(parent) // V.dofmap.index_map_bs] = values.x.array
+    return found
+
+
 def _assembled(density: Any, V: fem.FunctionSpace, facets: np.ndarray, weight: Any) -> np.ndarray:
     """A density with a test function of ``V``, integrated over facets with a weight.  Collective."""
     mesh, fdim = V.mesh, V.mesh.topology.dim - 1

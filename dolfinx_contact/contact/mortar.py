@@ -47,6 +47,10 @@ FACING = -0.1
 STRAIGHT = 1e-12
 
 
+# Arrays of a ``Side`` with a row for each facet.
+BY_FACET = ("nodes", "x", "outwards", "density")
+
+
 class Side(NamedTuple):
     """Facets of one shape of one side.
 
@@ -57,6 +61,7 @@ class Side(NamedTuple):
         local: Where the nodes are on the reference facet, ``shape=(k, gdim - 1)``.
         corners: Which of them are corners, in the order of a unit interval, triangle or square, ``shape=(c,)``.
         degree: Of the shape functions.
+        density: Of the surface measure, at the nodes, ``shape=(m, k)``; None is one.
     """
 
     nodes: np.ndarray
@@ -65,10 +70,12 @@ class Side(NamedTuple):
     local: np.ndarray
     corners: np.ndarray
     degree: int
+    density: np.ndarray | None = None
 
     def some(self, which: np.ndarray | slice) -> Side:
         """Those of the facets that a slice or a mask names."""
-        rows = {name: getattr(self, name)[which] for name in ("nodes", "x", "outwards")}
+        named = {name: getattr(self, name) for name in BY_FACET}
+        rows = {name: array[which] for name, array in named.items() if array is not None}
         return self._replace(**rows)
 
     def moved(self, x: np.ndarray) -> Side:
@@ -268,7 +275,8 @@ def _integrals(
     at, weight = _gauss(max(_points(one), _points(two)))
     here = one, pieces.local[a], side.inverse, side.degree
     there = two, others.local[b], other.inverse, other.degree
-    return _kernel.common_integrals(*here, *there, at, weight)
+    density = np.zeros(0) if side.density is None else side.density[pieces.facet[a]]
+    return _kernel.common_integrals(*here, *there, at, weight, density)
 
 
 def _points(corners: np.ndarray) -> int:

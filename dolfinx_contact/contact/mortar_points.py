@@ -19,7 +19,7 @@ from scipy import sparse
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
-from dolfinx_contact.contact.mortar import Rows, Side, rows_of
+from dolfinx_contact.contact.mortar import BY_FACET, Rows, Side, rows_of
 from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
@@ -46,9 +46,8 @@ class MortarPlacement(Placement):
 
     def __init__(self, contact: ContactLike, facets: np.ndarray, owned: tuple, extent: float):
         of, nodes, comm = contact.displacements, contact.nodes, contact.comm
-        self._slave, self._master = (
-            Skin(of, some, comm) for some in (facets, contact.surface.facets)
-        )
+        self._slave = Skin(of, facets, comm, contact.density)
+        self._master = Skin(of, contact.surface.facets, comm)
         numbers = _numbers(of.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)
         self._near = [np.isin(side.nodes, self._mine).any(axis=1) for side in self._slave.sides]
@@ -177,6 +176,12 @@ class Ended(NamedTuple):
 class Skin:
     """Facets of one side and their nodes, known to all ranks.
 
+    Args:
+        of: ``Displacements``.
+        facets: Local indices.
+        comm: MPI communicator.  Collective.
+        density: Of the surface measure at local nodes, None is one.
+
     Attributes:
         sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
@@ -186,8 +191,8 @@ class Skin:
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
     """
 
-    def __init__(self, of: Displacements, facets: np.ndarray, comm: MPI.Comm):
-        sides, self._comm = _gathered(of, facets, comm), comm
+    def __init__(self, of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None = None):  # fmt: skip
+        sides, self._comm = _gathered(of, facets, comm, density), comm
         self.numbers = np.unique(
             np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
         )
@@ -418,20 +423,20 @@ def frames_along(normals: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
     return np.stack((along, np.cross(normals, along), normals), axis=1)
 
 
-def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm) -> list[Side]:
-    """The facets of all ranks by shape, nodes in global numbers.  Collective."""
+def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip
+    """The facets of all ranks by shape, nodes in global numbers; with a density of the measure at local nodes.  Collective."""
     mine = []
     for part in facets_of(of, facets):
         numbers = _numbers(of.V.dofmap.index_map, part.nodes.ravel()).reshape(part.nodes.shape)
-        mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree))
+        here = None if density is None else density[part.nodes]
+        mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree, here))  # fmt: skip
     shapes: dict = {}
     for side in [side for sides in comm.allgather(mine) for side in sides]:
         key = (side.corners.tobytes(), np.round(side.local, 9).tobytes())
         shapes.setdefault(key, []).append(side)
+    names = BY_FACET if density is not None else BY_FACET[:-1]
     return [
-        same[0]._replace(
-            **{n: np.concatenate([getattr(s, n) for s in same]) for n in ("nodes", "x", "outwards")}
-        )
+        same[0]._replace(**{n: np.concatenate([getattr(s, n) for s in same]) for n in names})
         for same in shapes.values()
     ]
 

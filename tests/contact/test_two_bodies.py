@@ -6,7 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
-from two_bodies import COMM, E, blocks, dc, patch
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import locate_entities_boundary
+from two_bodies import COMM, E, blocks, dc, pair, patch
+
+from dolfinx_contact.compat import functionspace
 
 pytestmark = pytest.mark.ranks
 
@@ -118,6 +123,30 @@ def test_sliding_carries_mu_n(degree):
     slip = scene.contact.slip_increment[:, 0]
     assert largest(slip) > 0.0
     assert (scene.contact.area > 0).all()
+
+
+@pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
+@pytest.mark.parametrize("weight", ["2 pi r", "callable", "thickness"])
+def test_an_even_pressure_of_weighted_forms(weight, swapped):
+    """Cylinders, and plates of a thickness, under an even pressure: nodes have it, although meshes do not match down to the axis."""
+    domain, top, bottom, upper, lower, _ = pair("quadrilateral", ((4, 2), (7, 2)))
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(domain)[0]
+    given = {"2 pi r": 2 * ufl.pi * r, "callable": lambda x: 2 * np.pi * x[0], "thickness": 3.0}[weight]  # fmt: skip
+    factor, hoop = (3.0, 0.0) if weight == "thickness" else (2 * ufl.pi * r, u[0] * v[0] / r**2)
+    strain = [ufl.sym(ufl.grad(w)) for w in (u, v)]
+    F = E * (ufl.inner(*strain) + hoop) * factor * ufl.dx  # Poisson's ratio is zero
+    down, parts = fem.Constant(domain, 0.0), [V.sub(0), V.sub(1)]
+    axis = locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
+    held = [(0.0, axis, parts[0]), (0.0, bottom, parts[1]), (down, top, parts[1])]
+    bcs = [fem.dirichletbc(value, fem.locate_dofs_topological(W, 1, facets), W) for value, facets, W in held]  # fmt: skip
+    slave, master = (lower, upper) if swapped else (upper, lower)
+    contact = dc.Contact(V, slave, dc.DeformableSurface(V, master), 0.0, weight=given)
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, tol=1e-10)
+    down.value = -2e-3
+    problem.solve()
+    assert contact.pressure == pytest.approx(1e-3 * E, rel=1e-9)
+    assert total(contact.area) == pytest.approx(3.0 if weight == "thickness" else np.pi)
 
 
 def test_sliding_too_far_is_told():

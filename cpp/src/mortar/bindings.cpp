@@ -87,13 +87,15 @@ struct PairedSide {
 auto common_integrals(const Corners &one, const Corners &one_local, const Corners &one_shapes,
                       int one_degree, const Corners &other, const Corners &other_local,
                       const Corners &other_shapes, int other_degree, const Corners &at,
-                      const Corners &weights) {
+                      const Corners &weights, const Corners &density) {
     const PairedSide here(one, one_local, one_shapes, one_degree),
         there(other, other_local, other_shapes, other_degree);
     if (here.pairs != there.pairs || here.dim != there.dim || at.ndim() != 1 ||
         weights.ndim() != 1 || at.size() != weights.size())
         throw py::value_error("one and other must have as many pieces, at and weights points");
     const py::ssize_t n = here.pairs, k = here.shapes.count(), m = there.shapes.count();
+    if (density.size() > 0 && density.size() != n * k)
+        throw py::value_error("density must have shape (n, k), or no entries");
     py::array_t<double> D({n, k}), M({n, k, k}), C({n, k, m});
     for (auto *array : {&D, &M, &C})
         std::fill_n(array->mutable_data(), array->size(), 0.0);
@@ -101,7 +103,8 @@ auto common_integrals(const Corners &one, const Corners &one_local, const Corner
     for (py::ssize_t i = 0; i < n; ++i)
         dolfinx_contact::add_common_integrals(
             here.piece(i), here.shapes, there.piece(i), there.shapes, rule,
-            D.mutable_data() + k * i, M.mutable_data() + k * k * i, C.mutable_data() + k * m * i);
+            density.size() > 0 ? density.data() + k * i : nullptr, D.mutable_data() + k * i,
+            M.mutable_data() + k * k * i, C.mutable_data() + k * m * i);
     return py::make_tuple(D, M, C);
 }
 } // namespace
@@ -115,9 +118,11 @@ void bind_mortar(py::module_ &m) {
     m.def("common_integrals", common_integrals, py::arg("one"), py::arg("one_local"),
           py::arg("one_shapes"), py::arg("one_degree"), py::arg("other"), py::arg("other_local"),
           py::arg("other_shapes"), py::arg("other_degree"), py::arg("at"), py::arg("weights"),
+          py::arg("density"),
           "Integrals over the common parts of n pairs of pieces: of shape functions N of the one "
           "side, shape (n, k), of products of them, (n, k, k), and with those of the other side, "
           "(n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where "
           "these are on the reference facet; shape functions are monomials times coefficients, "
-          "shape (k, k); at and weights are a rule on the unit interval.");
+          "shape (k, k); at and weights are a rule on the unit interval; density is that of the "
+          "measure, shape (n, k), at the nodes of the one side's facets, or empty.");
 }

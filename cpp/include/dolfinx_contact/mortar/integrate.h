@@ -139,13 +139,21 @@ void on_common_part(const FacetPiece &one, const FacetPiece &other, const LineRu
     }
 }
 
-// Adds int N_i, int N_i N_j and int N_i N'_j over the common part, row by row.
+// Adds int N_i, int N_i N_j and int N_i N'_j over the common part, row by row. `density`, of the
+// measure, has a value for each shape function of the one side, or is null.
 inline void add_common_integrals(const FacetPiece &one, const FacetShapes &N,
                                  const FacetPiece &other, const FacetShapes &others,
-                                 const LineRule &rule, double *D, double *M, double *C) {
+                                 const LineRule &rule, const double *density, double *D, double *M,
+                                 double *C) {
     const int k = N.count(), m = others.count();
     on_common_part(one, other, rule, [&](Point p, double weight) {
         const auto here = N.at(one.reference(p)), there = others.at(other.reference(p));
+        if (density) {
+            double factor = 0;
+            for (int i = 0; i < k; ++i)
+                factor += density[i] * here[std::size_t(i)];
+            weight *= factor;
+        }
         for (int i = 0; i < k; ++i) {
             const double value = weight * here[std::size_t(i)];
             D[i] += value;
