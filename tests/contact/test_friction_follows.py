@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scenes
 import ufl
+from defined_maps import return_map
 from dolfinx import fem, mesh
-from twin import return_map
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace

@@ -5,7 +5,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
-import twin
+from defined_maps import project
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -98,14 +98,14 @@ def test_projection_to_four_units_of_rounding(ratio, magnitude):
 
 
 @pytest.mark.parametrize("mu", [(0.3, 0.15), (0.2, 0.2), (1.5, 0.01), (0.1, 3.0)])
-def test_projection_is_the_twins(mu):
-    """The nearest point of the cone as the twin finds it by trying all rays (to half the digits, as a
+def test_projection_is_the_nearest_point(mu):
+    """The nearest point of the cone as trying all rays finds it (to half the digits, as a
     maximum can be found); its load function is not positive."""
     rng = np.random.default_rng(8)
     tau = nasty_points(rng, 60, np.array(mu))
     r = project_cone(tau, mu)
     for point, found in zip(tau, r):
-        error = np.linalg.norm(found - twin.project(point, np.array(mu)))
+        error = np.linalg.norm(found - project(point, np.array(mu)))
         assert error <= 1e-6 * (1 + np.linalg.norm(point))
     assert np.all(load_function(r, mu) <= 8 * EPS * r[:, 2])
 

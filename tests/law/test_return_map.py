@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The return map: projection of the tangential reaction in the metric of the slip rule.
 
-That it is the twin's, and has the law as its fixed points, is tested in test_bipotential.py.
+That it is the one of its definition, and has the law as its fixed points, is tested in test_bipotential.py.
 """
 
 import numpy as np

@@ -7,7 +7,6 @@ from collections import Counter
 import numpy as np
 import pytest
 import scipy.sparse
-import twin_solver
 
 from dolfinx_contact import Friction
 from dolfinx_contact.solvers.condensed.newton import (
@@ -92,15 +91,13 @@ def test_random_problems_of_usual_friction():
         )
 
 
-def test_agrees_with_the_twin():
-    """Where the solution is unique (small friction, regular W) the slow twin finds the same one."""
+def test_what_is_unique_is_found():
+    """Where the solution is unique (small friction, regular W) it is the one that the problem was made from."""
     for seed in range(4):
         scene = random_problem(seed, contacts=3, rank=9, mu_range=(0.05, 0.3), ratio=1.5)
         scene.W += 5 * np.diag(scene.W).mean() * np.eye(9)
         scene.q = scene.w - (scene.W @ scene.r.ravel()).reshape(-1, 3)
         found = check(scene, tol=1e-11)
-        expected = twin_solver.solve(scene.W.reshape(3, 3, 3, 3), scene.q, scene.mu, scene.p)
-        assert found.reaction == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
         assert found.reaction == pytest.approx(scene.r, abs=1e-8)
 
 

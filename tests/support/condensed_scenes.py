@@ -1,4 +1,4 @@
-"""A second judge of condensed answers, in long double, that knows the projection of the twin.
+"""Errors of condensed answers as the documentation defines them, in long double, with a projection of their own.
 
 Everything here is NumPy alone, written from the paper; of the package nothing is imported.
 """
@@ -6,9 +6,43 @@ Everything here is NumPy alone, written from the paper; of the package nothing i
 from __future__ import annotations
 
 import numpy as np
-from twin_solver import normalised, project_elliptic_cone
 
 from mechanics.condensed import direction_of_slip
+
+
+def normalised(mu, p):
+    """p scaled so that max(p / mu) = 1: only its ratio matters."""
+    mu, p = np.atleast_1d(np.asarray(mu, dtype=float)), np.atleast_1d(np.asarray(p, dtype=float))
+    return mu, p / np.max(p / mu)
+
+
+def project_elliptic_cone(tau, mu):
+    """Euclidean projection on {|M^-1 t| <= n} by bisection of the multiplier's optimality condition.
+
+    Stationarity with multiplier s of (|M^-1 t|^2 - n^2) / 2 gives t_i = tau_i / (1 + s / mu_i^2) and
+    n (1 - s) = tau_n; the boundary is where |M^-1 t| = n, so |M^-1 t(s)| (1 - s) = tau_n, whose left
+    side falls with s.
+    """
+    t, n = tau[:-1], tau[-1]
+    if np.linalg.norm(t / mu) <= n:
+        return tau.copy()
+    if np.linalg.norm(mu * t) <= -n:
+        return np.zeros_like(tau)
+
+    def foot(s):
+        return t / (1 + s / mu**2)
+
+    def excess(s):
+        return np.linalg.norm(foot(s) / mu) * (1 - s) - n
+
+    low, high = np.zeros_like(n), np.ones_like(n)  # of the precision of tau
+    while excess(high) > 0:
+        low, high = high, 2 * high
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    found = foot(low)
+    return np.append(found, np.linalg.norm(found / mu))
 
 
 def judge(W, q, mu, p, r, external=0.0):

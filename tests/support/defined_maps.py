@@ -1,8 +1,8 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A slow twin of the law and its maps at one node, in NumPy, written from the paper's if-then-else
-form and from definitions (nearest point, metric), not from the kernel: no quartic, no secular
-equation, no scaled variables.
+"""The maps of the law at one node by their definitions (nearest point, metric), in NumPy: no quartic, no secular equation.
+
+What obeys the law the judge says (mechanics/judge_law.py); what a map makes of a state that does not, these.
 
 [dSFMH07]: G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, "Comportement hystérétique du frottement
 anisotrope", 18e Congrès Français de Mécanique, 2007.
@@ -11,33 +11,6 @@ anisotrope", 18e Congrès Français de Mécanique, 2007.
 from __future__ import annotations
 
 import numpy as np
-
-
-def slip_of(mu, p, r, multiplier):
-    """``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` [dSFMH07, Section 1]."""
-    P = np.diag(p)
-    r_t = r[:-1]
-    return -multiplier * np.linalg.solve(P @ P, r_t) / np.linalg.norm(np.linalg.solve(P, r_t))
-
-
-def obeys(mu, p, r, x_n, du, tol=1e-9):
-    """The complete law: the two nested if-then-else of [dSFMH07, Section 1]."""
-    M = np.diag(mu)
-    r_t, r_n = r[:-1], r[-1]
-    f = np.linalg.norm(np.linalg.solve(M, r_t)) - r_n  # Eq. (1)
-    if r_n < 0 or f > tol * r_n:
-        return False
-    if r_n == 0:
-        return x_n >= 0
-    if abs(x_n) > tol:
-        return False
-    if f < -tol * r_n:  # inside
-        return np.linalg.norm(du) <= tol
-    length = np.linalg.norm(du)
-    if length <= tol:
-        return True
-    expected = slip_of(mu, p, r, 1.0)
-    return np.linalg.norm(du - length * expected / np.linalg.norm(expected)) <= tol * length
 
 
 def argmax_on_circle(function):
