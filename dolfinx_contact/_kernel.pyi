@@ -72,16 +72,6 @@ class Law2D:
         """
         Euclidean projection on the friction cone: (r, branch)  [dSFMH07, Section 2]
         """
-    def project_jacobian(
-        self, tau: numpy.typing.NDArray[numpy.float64]
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.uint8],
-        numpy.typing.NDArray[numpy.float64],
-    ]:
-        """
-        project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))
-        """
     def return_jacobian(
         self,
         r: numpy.typing.NDArray[numpy.float64],
@@ -199,16 +189,6 @@ class Law3D:
     ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
         """
         Euclidean projection on the friction cone: (r, branch)  [dSFMH07, Section 2]
-        """
-    def project_jacobian(
-        self, tau: numpy.typing.NDArray[numpy.float64]
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.uint8],
-        numpy.typing.NDArray[numpy.float64],
-    ]:
-        """
-        project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))
         """
     def return_jacobian(
         self,

@@ -52,13 +52,6 @@ template <int T> void bind_law(py::module_ &m, const char *name) {
         r, gap, slip, rho_n, rho_t, "Projection in the metric of the slip rule: (r, branch)");
 
     law.def(
-        "project_jacobian",
-        [](const Law &self, const Array &tau) {
-            const auto all = Call(self, "tau", tau).linearisation(ProjectionJacobian{});
-            return std::make_tuple(std::get<0>(all), std::get<1>(all), std::get<2>(all));
-        },
-        tau, "project and its derivative: (r, branch, dr/dtau of shape (n, dim, dim))");
-    law.def(
         "bipotential_jacobian",
         [](const Law &self, const Array &r, const Array &gap, const Array &slip, const Array &rho) {
             return Call(self, "r", r)

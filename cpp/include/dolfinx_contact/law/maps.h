@@ -62,16 +62,6 @@ struct SlipDefect {
 
 // Derivatives.
 
-struct ProjectionJacobian {
-    template <class Law, class S, int T = Law::tangents>
-    Linearisation<T> operator()(const Law &law, const S &s) const {
-        Linearisation<T> out;
-        out.value = project(law, s.r, &out.by_reaction);
-        out.by_motion.setZero();
-        return out;
-    }
-};
-
 struct BipotentialJacobian {
     template <class Law, class S> auto operator()(const Law &law, const S &s) const {
         return bipotential_jacobian(law, s.r, s.gap, s.slip, s.rho_n);
