@@ -149,6 +149,21 @@ class MortarPlacement(Placement):
         slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
         return float(slid), STRAYED * self._master.smallest
 
+    def sides(self, state: State) -> tuple[float, float] | None:
+        """How many times the facets of the slave are as large, and its body as stiff, as those of the other side.  Collective.
+
+        Medians where nodes press; None while none does.  The stiffness of a node is that of the body times its size in three dimensions.
+        """
+        some = state.reaction[:, -1] > 0.0
+        points, dim = self.now.points, self.x.shape[1]
+        size = (self._slave.size[self._mine] / np.where(some, points.m @ self._master.size, 1.0))[
+            some
+        ]
+        pairs = np.stack((size, points.stiffer[some] / size ** (dim - 2)))
+        found = np.concatenate(self._comm.allgather(pairs), axis=1)
+        size, stiff = np.median(found, axis=1) if found.size else (None, None)
+        return None if size is None else (float(size), float(stiff))
+
     def follows(self, wanders: bool) -> bool:
         """See ``Placement``."""
         return self.changes
@@ -186,6 +201,7 @@ class Skin:
         sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
         smallest: The shortest edge of a facet.
+        size: Length of edges at each node, mean of its facets, ``shape=(m,)``.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
         x: Where they are, ``shape=(m, gdim)``.
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
@@ -199,12 +215,14 @@ class Skin:
         self.x = np.zeros((self.numbers.size, of.dim))
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
-        ends = [side.x[:, side.corners] for side in sides]
-        self.smallest = min(
-            [np.linalg.norm(x[:, 1] - x[:, 0], axis=1).min(initial=np.inf) for x in ends],
-            default=np.inf,
-        )
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
+        ends = [side.x[:, side.corners] for side in sides]
+        edges = [np.linalg.norm(x[:, 1] - x[:, 0], axis=1) for x in ends]
+        self.smallest = min([edge.min(initial=np.inf) for edge in edges], default=np.inf)
+        sums = np.zeros((2, self.numbers.size))
+        for side, edge in zip(self.sides, edges):
+            np.add.at(sums, (slice(None), side.nodes), np.stack((edge, np.ones_like(edge)))[:, :, None])  # fmt: skip
+        self.size = sums[0] / sums[1]
         index_map, count = of.V.dofmap.index_map, of.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
         self.nodes = np.flatnonzero(own)
@@ -238,10 +256,13 @@ class MortarPoints(ContactPoints):
         alone: Nodes opposite nothing, or next to nothing, ``shape=(n,)``.
         share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
         met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
+        m: Coefficients of the opposite nodes, sparse, ``shape=(n, m)``.
+        stiffer: Of the last ``stiffness``: that of each node over that of the nodes opposite, along the normal, ``shape=(n,)``.
     """
 
     local = False
     met: np.ndarray
+    stiffer: np.ndarray
 
     def __init__(
         self,
@@ -254,14 +275,14 @@ class MortarPoints(ContactPoints):
     ):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
-        self._m, self._opposite, self._comm = rows.m, opposite, comm
+        self.m, self._opposite, self._comm = rows.m, opposite, comm
         self.alone = ~rows.covered
         none = np.zeros(self.count)
         part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
         self.share = frozen(np.where(rows.covered, part, 0.0))
         turned = block_diagonal(frames)
         mine = (self.first + dofs).ravel()
-        away = (turned @ sparse.kron(self._m, sparse.eye(self.dim), "csr")).tocoo()
+        away = (turned @ sparse.kron(self.m, sparse.eye(self.dim), "csr")).tocoo()
         own = turned.tocoo()
         columns = (mine[own.col], opposite.ravel()[away.col])
         parts = (np.append(own.row, away.row), np.append(*columns))
@@ -381,9 +402,10 @@ class MortarPoints(ContactPoints):
         """See ``ContactPoints``: of springs in series, ``1/k = 1/k_a + sum_b m_ab^2 / k_b``, as matrices along slip.  Collective."""
         alone = super().stiffness(K)
         C = self._opposite_compliance(K)
-        squares = self._m.multiply(self._m).tocsr()
+        squares = self.m.multiply(self.m).tocsr()
         flat = (squares @ C.reshape(len(C), -1)).reshape(-1, self.dim, self.dim)
         local = self.frames @ flat @ self.frames.transpose(0, 2, 1)
+        self.stiffer = alone.normal * local[:, -1, -1]
         normal = 1.0 / (1.0 / alone.normal + local[:, -1, -1])
         along = local[:, :-1, :-1]
         eye = np.eye(self.dim - 1)

@@ -9,6 +9,7 @@ nodes miss is an error of their forces of about ``kappa`` times that length.
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+
+LOG = logging.getLogger("dolfinx_contact")
+
+# Ratio of sizes of facets, or of stiffnesses, up to which two sides are alike.
+ALIKE = 2.0
 
 # What is missed, over the largest ``r_n / kappa``, above which the user is told.
 SHARE = 1.0
@@ -92,6 +98,7 @@ class Unseen:
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._leaps = self._apart = True  # to be looked at
         self._near = [contact for contact in contacts if contact.surface.deformable]
+        self._sided = self._near  # which side carries the unknowns is to be looked at
         self._turn, self._turns = None, bool(contacts)  # to be looked at
 
     def check(
@@ -117,6 +124,7 @@ class Unseen:
             self._check_facets(u, dict(zip(contacts, stiffness)))
         self._check_wear(contacts, stiffness)
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
+        self._sided = [contact for contact in self._sided if not _check_side(contact)]
         self._turns = self._turns and not body.nonlinear
         if self._turns:
             self._check_turn(body, contacts, stiffness, u)
@@ -220,6 +228,22 @@ class Unseen:
             near = contact.surface.distances(x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
+
+
+def _check_side(contact: ContactLike) -> bool:
+    """Log, as soon as nodes press, that the other side would be the better slave; whether they do.  Collective."""
+    found = contact.placement.sides(contact.present)
+    if found is None:
+        return False
+    size, stiff = found
+    coarse, hard = size > ALIKE, stiff > ALIKE
+    if (coarse and stiff > 1 / ALIKE) or (hard and size > 1 / ALIKE):
+        if contact.comm.rank == 0:
+            LOG.info(
+                f"{contact!r}: its facets are {size:.2g} times as large as those opposite, and its body is {stiff:.2g} times as stiff. "
+                "The finer or softer side is better as the one that carries the unknowns: swap both, and compare."
+            )
+    return True
 
 
 def _check_strayed(contact: ContactLike) -> bool:

@@ -213,3 +213,23 @@ def test_what_makes_no_sense_is_refused():
             ],
             bcs=scene.bcs,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "cells, moduli, told",
+    [
+        (((2, 2), (7, 2)), (E, E), "3.5 times as large"),
+        (((4, 2), (4, 2)), (5 * E, E), "5 times as stiff"),
+        (((7, 2), (2, 2)), (5 * E, E), ""),
+        (((4, 2), (4, 2)), (E, E), ""),
+    ],
+)
+def test_the_wrong_side_is_told(cells, moduli, told, caplog):
+    """The coarser or stiffer side as the one that carries the unknowns is logged once, when it presses."""
+    scene = blocks("quadrilateral", 1, cells, moduli=moduli)
+    with caplog.at_level("INFO", logger="dolfinx_contact"):
+        for down in (0.01, -0.01, -0.02):
+            scene.way.value[1] = down
+            scene.problem.solve()
+    lines = [line for line in caplog.messages if "carries the unknowns" in line]
+    assert len(lines) == bool(told and COMM.rank == 0) and all(told in line for line in lines)
