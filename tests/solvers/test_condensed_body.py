@@ -301,3 +301,33 @@ def test_one_budget_for_all_searches_of_a_step(monkeypatch):
     if scene.mesh.comm.rank == 0:
         assert len(given) > 1
         assert 25 > given[0] and (np.diff(given) < 0).all()
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.0])
+def test_frames_that_turn_cost_no_solves(mu, monkeypatch):
+    """On a ball W of later steps is made of the columns that the first one has solved for, and is the same as one solved anew."""
+    asked, solver = [], compliance.block_solver
+
+    def counted(ksp):
+        solve = solver(ksp)
+        return lambda rows: asked.append(rows.shape[0]) or solve(rows)
+
+    monkeypatch.setattr(compliance, "block_solver", counted)
+    low, high = [-0.5, -0.5, 0.0], [0.5, 0.5, 0.6]
+    domain = mesh.create_box(MPI.COMM_WORLD, [low, high], [4, 4, 2], mesh.CellType.hexahedron)
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, held = fem.Function(V), fem.Constant(domain, np.zeros(3))
+    foot, head = (mesh.locate_entities_boundary(domain, 2, lambda x, z=z: np.isclose(x[2], z)) for z in (0, 0.6))  # fmt: skip
+    F = scenes.elasticity(u, ufl.TestFunction(V), 100.0, 0.3)
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, head), V)
+    contact = dc.Contact(V, foot, dc.RigidSphere((0, 0, -3), 3.0), mu)
+    problem = dc.ContactProblem(F, u, contact, bcs=[bc], solver=dc.CondensedNewton())
+    for way in (0.0, 0.05, 0.1):
+        held.value[:] = way, 0.0, -0.02
+        problem.solve()
+        assert sum(asked) == 3 * 25
+    bound = problem.bound()
+    W = bound.compliance()
+    anew = compliance.compliance(problem.body, [bound._rows(), bound._anchor_rows()])  # noqa: SLF001
+    if MPI.COMM_WORLD.rank == 0:
+        assert np.abs(W - anew).max() <= 1e-12 * W.max()

@@ -275,15 +275,15 @@ class CondensedBody:
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
-        slides = any(c.surface.deformable and c.changes for c in self._contacts)
-        if slides and not self._body.nonlinear:
+        changes = any(contact.changes for contact in self._contacts)
+        if changes and not self._body.nonlinear:
             kept = self._responses()
             if 2 * kept.bytes_needed(self._parts) <= available_first(self.comm):
                 return kept.compliance(self._held_by, self._parts)
         return compliance(self._held_by, self._parts)
 
     def _responses(self) -> Responses:
-        """Columns of ``K^-1`` that rows of surfaces on which bodies slide have needed so far, of the present stiffness.  Collective."""
+        """Columns of ``K^-1`` that rows whose frames or nodes change have needed so far, of the present stiffness.  Collective."""
         made, kept = self._memory.get("responses", (None, None))
         if made != self._body.assemblies:
             reach = [contact.points.reach for contact in self._contacts]

@@ -87,7 +87,7 @@ def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
 class Responses:
     """``A^-1`` between the degrees of freedom that rows may ever have, solved for a block of columns at a time when rows need it.
 
-    Rows of deformable surfaces change as bodies slide; ``A`` stays.  Blocks do not depend on who asked first, so that W does not.
+    Rows of curved and turning surfaces change with their frames, those of deformable ones as bodies slide; ``A`` stays.  Blocks do not depend on who asked first, so that W does not.
 
     Args:
         dofs: Global numbers, sorted, the same on all ranks, ``shape=(m,)``.
