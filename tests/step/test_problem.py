@@ -1,14 +1,18 @@
 """Contact problems against what mechanics says of them: closed forms, symmetries, units, limits."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scenes
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
 
 pytestmark = pytest.mark.ranks
@@ -209,6 +213,27 @@ def test_matrix_is_rebuilt_only_when_it_changes():
     scene.problem.solve()
     assert scenes.gathered(scene.contact)[1] == pytest.approx(2 * first, abs=1e-8 * first.max())
     assert body.refresh() == 2
+
+
+def test_a_modulus_that_changes_on_one_rank_alone_changes_the_next_step():
+    """Softer cells at one end: without friction the step ends as one of a body that was soft there from the start."""
+    found = []
+    for change in (False, True):
+        scene = scenes.block(mu=0.0, p=None)
+        stiff = fem.Function(functionspace(scene.mesh, ("DG", 0)))
+        stiff.x.array[:] = 1000.0
+        middles = stiff.function_space.tabulate_dof_coordinates()[:, 0]
+        u = fem.Function(scene.V)
+        F = scenes.elasticity(u, ufl.TestFunction(scene.V), stiff, 0.3)
+        contact = dc.Contact(scene.V, scene.facets, scene.surface, dc.Friction(0.0))
+        problem = dc.ContactProblem(F, u, [contact], bcs=scene.bcs, tol=1e-10)
+        scene.move_top(0, 0, -0.01)
+        if change:
+            problem.solve()
+        stiff.x.array[middles < -0.3] = 100.0
+        problem.solve()
+        found.append(scenes.by_position(SimpleNamespace(contact=contact), "reaction"))
+    assert np.abs(found[0] - found[1]).max() < 1e-7 * np.abs(found[0]).max()
 
 
 @pytest.mark.parametrize(
