@@ -54,6 +54,7 @@ class Leg(NamedTuple):
 
 PRESS = (Leg((0.0, 0.0, -0.004)), Leg((4e-4, 2e-4, -0.004)), Leg((0.012, 6e-3, -0.005)))
 ALONG = tuple(Leg((leg.at[0], 0.0, leg.at[2])) for leg in PRESS)
+ABOVE, ASIDE = Leg((0.0, 0.0, 0.05)), Leg((0.3, -0.2, 0.05))
 DOWN = (Leg((0.0, 0.0, -0.002)), Leg((0.0, 0.0, -0.006)))
 
 
@@ -76,6 +77,7 @@ class Way:
         petsc: Options of the linear solver.
         posed: Whether the surface is made at the origin and moved to its place before anything else.
         driven: Forces that drive the surface along the normal, one for each step; None prescribes it.
+        again: Whether it is played, reset and played again.
         twice: Whether each step is taken back once and made again.
         texture: None, "body" or "surface": axes turned from place to place.
     """
@@ -112,6 +114,7 @@ class Way:
     petsc: dict | None = None
     driven: tuple | None = None
     twice: bool = False
+    again: bool = False
 
     @property
     def base(self) -> np.ndarray:
@@ -376,6 +379,13 @@ class Played:
         return self.F.T @ Rotation.from_rotvec(angle).as_matrix()[: self.way.d, : self.way.d].T
 
     def _play(self) -> dict:
+        if self.way.again:
+            self._played()
+            self.problem.reset()
+            self.pressing.clear()
+        return self._played()
+
+    def _played(self) -> dict:
         way, found, before = self.way, dict(forces=[], work=[], worn=[]), Leg((0.0, 0.0, 0.0))
         if way.free:
             found |= dict(moved=[], turned=[])
@@ -498,7 +508,12 @@ def _held(name, way):
 
 
 def _flat_or_round(name, way):
-    return _held(name, way) and way.texture != "body" and name not in ROUGHLY
+    return _held(name, way) and name not in ROUGHLY
+
+
+def _lands_at_once(name, way):
+    """Nodes that land one after another slip, each for a part of the step, which is another path in one step than in two."""
+    return _held(name, way) and (way.surface == "plane" or name == "ball, smooth")
 
 
 # Where nodes land on curved surfaces their slip is an estimate, see docs/surfaces.md.
@@ -510,7 +525,7 @@ VARIANTS = [
     Variant("turned frame, 2-D", dict(frame=SPUN), lambda name, way: way.d == 2),
     Variant("axes permuted", dict(frame=PERMUTED), lambda name, way: way.d == 3),
     Variant("axes swapped, 2-D", dict(frame=SWAPPED), lambda name, way: way.d == 2),
-    Variant("put into place, 3-D", dict(frame=TURNED, posed=True), lambda name, way: way.d == 3 and "tilted" not in name and way.surface != "wavy" and "turned" not in name),
+    Variant("put into place, 3-D", dict(frame=TURNED, posed=True), lambda name, way: way.d == 3 and "tilted" not in name and "turned" not in name),
     Variant("put into place, 2-D", dict(frame=SPUN, posed=True), lambda name, way: way.d == 2 and "tilted" not in name),
     Variant("mirrored", dict(frame=MIRRORED), lambda name, way: way.texture is None),
     Variant("mm instead of m", dict(length=1e3, E=2e-4)),
@@ -523,6 +538,11 @@ VARIANTS = [
     Variant("exponent of friction", dict(given="k"), lambda name, way: way.d == 3 and len(set(way.mu)) > 1),
     Variant("weight one", dict(weight=1.0)),
     Variant("taken back and made again", dict(twice=True)),
+    Variant("again after a reset", dict(again=True)),
+    Variant("lands from above", lambda played: dict(legs=(ABOVE, *played.way.legs)), _lands_at_once, 5e-4),
+    Variant("flies about first", lambda played: dict(legs=(ASIDE, ABOVE, *played.way.legs)), _lands_at_once, 5e-4),
+    Variant("ball as function, put into place", dict(surface="ball as function", frame=TURNED, posed=True), lambda name, way: way.surface == "ball" and way.d == 3 and not way.free, 2e-4),
+    Variant("roll as function, put into place", dict(surface="roll as function", frame=TURNED, posed=True), lambda name, way: way.surface == "roll", 2e-4),
     Variant("far from the origin", dict(away=1e4), tol=1e-5),
     Variant("from a nonsensical guess", dict(guess=True), lambda name, way: way.form != "finite"),
     Variant("by multigrid", dict(petsc=MULTIGRID, solver="FixedPoint"), lambda name, way: way.form != "mixed"),
