@@ -9,6 +9,7 @@ PETSc matrix: the opposite nodes may belong to other ranks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -320,6 +321,12 @@ class MortarPoints(ContactPoints):
     ) -> None:
         """See ``ContactPoints``; nodes opposite nothing never touch, either."""
         super().hold(held, closed | self.alone, guided, fixed)
+
+    def known(self, motion: np.ndarray, terms: Iterable[np.ndarray]) -> None:
+        """See ``ContactPoints``: nodes have no friction along what supports hold, such as across a plane of symmetry.
+
+        There opposite nodes move towards the plane and away from it; their mirror images, which the rows lack, do the contrary.
+        """
 
     def motion(self, u: np.ndarray) -> np.ndarray:
         """See ``ContactPoints``."""

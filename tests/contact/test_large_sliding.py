@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, mesh
-from two_bodies import COMM, E, blocks, dc, pair, rubber, stress
+from two_bodies import COMM, E, blocks, box, dc, joined, pair, rubber, stress
 
 from dolfinx_contact.compat import cell_points, functionspace
 
@@ -282,3 +282,33 @@ def test_a_texture_slides_with_the_other_body():
         axes = np.einsum("nij,jn->ni", contact.frame[:, :2], turns(at.T))
         used = contact.friction.axes
         assert largest(axes[:, 0] * used[:, 1] - axes[:, 1] * used[:, 0]) <= 2e-3
+
+
+@pytest.mark.parametrize("cell, degree", [("hexahedron", 1), pytest.param("tetrahedron", 2, marks=pytest.mark.slow)])  # fmt: skip
+def test_half_of_it(cell, degree):
+    """On a plane of symmetry along which a block slides, rows see one half of the other body: half the force and work of friction."""
+    found = []
+    for low in (0.0, -1.0):
+        cells = 1 if low == 0.0 else 2
+        parts = [box(cell, (0.5, low / 2, 0), (1.5, 0.5, 1), (2, cells, 1)), box(cell, (0, low, -1), (3, 1, 0), (7, 3 * cells, 1))]  # fmt: skip
+        domain = joined(parts)
+        V = functionspace(domain, ("Lagrange", degree, (3,)))
+        u, way = fem.Function(V), fem.Constant(domain, np.zeros(3))
+        side, top, bottom, faces = (mesh.locate_entities_boundary(domain, 2, lambda x, k=k, at=at: np.isclose(x[k], at)) for k, at in ((1, 0.0), (2, 1.0), (2, -1.0), (2, 0.0)))  # fmt: skip
+        above = mesh.locate_entities(domain, 3, lambda x: x[2] > -1e-9)
+        domain.topology.create_connectivity(2, 3)
+        links = domain.topology.connectivity(2, 3)
+        upper = np.array([links.links(face)[0] in above for face in faces], dtype=bool)
+        F = ufl.inner(stress(u, E / 2, E / 2), ufl.grad(ufl.TestFunction(V))) * ufl.dx
+        held = [(way, top, V), (np.zeros(3), bottom, V)]
+        held += [(0.0, side, V.sub(1))] if low == 0.0 else []
+        bcs = [fem.dirichletbc(value, fem.locate_dofs_topological(W, 2, facets), W) for value, facets, W in held]  # fmt: skip
+        contact = dc.Contact(V, faces[upper], dc.DeformableSurface(V, faces[~upper], axis=(1, 0, 0)), dc.Friction((0.3, 0.1), (0.1, 0.2)))  # fmt: skip
+        problem = dc.ContactProblem(F, u, [contact], bcs=bcs, geometry_tol=1e-5)
+        for k in range(3):
+            way.value[:] = (0.3 * k, 0.0, -0.01)
+            problem.solve()
+        share = 1.0 if low == 0.0 else 0.5
+        found.append(share * np.append(contact.force()[[0, 2]], total(contact.dissipation)))
+    # halves of tetrahedral meshes are no mirror images
+    assert found[0] == pytest.approx(found[1], rel=1e-5 if cell == "hexahedron" else 0.01)
