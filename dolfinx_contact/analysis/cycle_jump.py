@@ -131,6 +131,13 @@ def cycle_jump(
     folder = None if path is None else _Folder(path, run)
     if folder is not None:
         folder.read(cycles)
+    _jump_on(run, cycles, folder, monitor)
+    return run.found()
+
+
+def _jump_on(run: _Run, cycles: int, folder: _Folder | None, monitor: Callable | None) -> None:
+    """Jump until all cycles are done; whatever happens the problem is at the end of the last jump.  Collective."""
+    comm = run.problem.body.comm
     with progress_bar(comm.rank, cycles) as shown:
         try:
             while run.record["done"] < cycles:
@@ -143,7 +150,6 @@ def cycle_jump(
                 shown(run.record["done"])
         finally:
             run.show()
-    return run.found()
 
 
 def _check(problem: Any, cycle: object, monitor: object) -> None:
