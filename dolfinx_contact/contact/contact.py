@@ -18,7 +18,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import contact_nodes, weight_on
-from dolfinx_contact.contact.friction_field import guided
+from dolfinx_contact.contact.friction_field import guided, wear_on_nodes
 from dolfinx_contact.contact.input import (
     check_coefficients,
     check_law,
@@ -198,6 +198,8 @@ class Contact(Guarded):
     @wear.setter
     def wear(self, wear: Wear | None) -> None:
         check_wear(wear)
+        with raised_together(self.comm):
+            self._wear_field = wear_on_nodes(self, wear)
         self._laws.wear = wear
 
     @property
@@ -581,7 +583,7 @@ class Contact(Guarded):
         if self._wearing is not None:
             depth = self._wearing
         else:
-            depth = np.zeros_like(path) if self.wear is None else self.wear.depth(work, self.area)
+            depth = np.zeros_like(path) if self.wear is None else self._depth(work)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
         if self.surface.spin is not None:
             self.take(displacement=self._placement.turned_past(self.displacement))
@@ -613,7 +615,20 @@ class Contact(Guarded):
         none, unit = np.zeros_like(self.reaction), np.zeros_like(self.reaction)
         unit[:, -1] = 2.0 * self.repeats * slips  # the work has half of the force at the end
         work = work_of_friction(self.friction, none, slips, unit, slip)
-        return self.wear.depth(work, self.area)
+        if not self.wear.threshold:
+            return self._depth(work)
+        force = np.maximum(state.reaction[:, -1:], 0.0)
+        begun = self._begun(force * work)
+        return begun * self.wear.depth(work, self.area, self._wear_field)
+
+    def _depth(self, work: np.ndarray) -> np.ndarray:
+        """Depth that the work of a step wears, ``shape=(n,)``."""
+        depth = self.wear.depth(work, self.area, self._wear_field)
+        return depth * self._begun(work) if self.wear.threshold else depth
+
+    def _begun(self, work: np.ndarray) -> np.ndarray:
+        """Part of the work of a step that is above the threshold of wear, ``shape=(n,)``."""
+        return self.wear.part(work.sum(axis=1), self.dissipation, self.area)
 
     @property
     def law_before(self) -> Friction | None:

@@ -13,6 +13,7 @@ from dolfinx import fem
 
 from dolfinx_contact import compat
 from dolfinx_contact.law.friction import Friction, is_field, rough
+from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.checks import finite
 
 if TYPE_CHECKING:
@@ -103,6 +104,20 @@ def _coefficients(contact: ContactLike, name: str, given: Any, state: dict[str, 
             f"{values.shape}."
         )
     return np.broadcast_to(values, (2, n)).T.copy()
+
+
+def wear_on_nodes(contact: ContactLike, wear: Wear | None) -> np.ndarray | None:
+    """Values of a wear law's field for each owned node of a contact, ``shape=(n, 2)``; None of numbers.
+
+    Raises:
+        ValueError: as ``on_nodes``, and for negative values.  On this rank alone.
+    """
+    if wear is None or not wear.field:
+        return None
+    values = _coefficients(contact, "wear coefficient", wear.coefficient, {})
+    if (values < 0.0).any():
+        raise ValueError(f"wear coefficient must be >= 0, but the field has {values.min():g}.")
+    return values
 
 
 def directions(contact: ContactLike, friction: Friction) -> np.ndarray:

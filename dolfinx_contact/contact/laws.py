@@ -138,7 +138,7 @@ class Laws:
             if is_field(self._field.given()["axes"]):
                 texture = {"texture": directions(contact, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
-        wear = np.nan if self.wear is None else self.wear.coefficient
+        wear = np.nan if self.wear is None else np.inf if self.wear.field else self.wear.coefficient
         parts = (contact.surface.described(), np.broadcast_to(wear, 2))
         return {
             "laws": rows(law, contact.nodes.size),

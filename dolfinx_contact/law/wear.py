@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dolfinx_contact.law.friction import Field, is_field
 from dolfinx_contact.support.attributes import Guarded, frozen
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import finite, number
 
 
 class Wear(Guarded):
@@ -26,32 +27,63 @@ class Wear(Guarded):
     a warning says into how many steps to divide it.
 
     Args:
-        coefficient: k, a number, or a pair for the two friction directions; volume per work, the inverse of a stress, >= 0.
+        coefficient: k, a number, or a pair for the two friction directions; volume per work, the inverse of a stress, >= 0.  Or a field:
+            a callable of ``x``, ``shape=(3, n)``, that returns ``shape=(n,)`` or ``(2, n)``, or a DOLFINx Function in a continuous Lagrange
+            space, evaluated at the contact nodes when the contact takes the law.
         explicit: Whether the depth worn in a step opens the gap of the next one only.
+        threshold: Frictional work per area that a node takes before it wears, force per length.
 
     Raises:
-        ValueError: a coefficient that is negative, not finite or not real, or more than two.
+        ValueError: a coefficient or threshold that is negative, not finite or not real, or more than two coefficients.
 
     Example:
         >>> contact.wear = dc.Wear(1e-6)  # mm³ per N mm
+        >>> contact.wear = dc.Wear(lambda x: np.where(x[0] < 0.5, 1e-6, 1e-7))  # a coating on one half
     """
 
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
 
-    def __init__(self, coefficient: ArrayLike, *, explicit: bool = False) -> None:
-        array = finite("wear coefficient", coefficient)
-        if array.shape not in ((), (1,), (2,)) or (array < 0).any():
-            raise ValueError(
-                "wear coefficient must be a number or a pair of numbers >= 0, volume per work; got "
-                f"{coefficient!r}."
-            )
-        self.coefficient, self.explicit = frozen(array), bool(explicit)
+    def __init__(
+        self, coefficient: ArrayLike | Field, *, explicit: bool = False, threshold: float = 0.0
+    ) -> None:
+        self.explicit, self.threshold = bool(explicit), number("wear threshold", threshold)
+        if self.threshold < 0.0:
+            raise ValueError(f"wear threshold must be a number >= 0, got {threshold!r}.")
+        self.field = is_field(coefficient)
+        self.coefficient = coefficient if self.field else _checked(coefficient)
         self._made = True
 
-    def depth(self, work: np.ndarray, area: np.ndarray) -> np.ndarray:
-        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length.  None where there is no area."""
-        volume = (self.coefficient * work).sum(axis=1)
+    def depth(
+        self, work: np.ndarray, area: np.ndarray, coefficient: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length.  None where there is no area.
+
+        Args:
+            work, area: Of the nodes.
+            coefficient: Values of a field at the nodes, ``shape=(n, 2)``.
+        """
+        k = np.broadcast_to(
+            self.coefficient if coefficient is None else coefficient, (len(work), 2)
+        )
+        volume = (k[:, : work.shape[1]] * work).sum(axis=1)
         return np.divide(volume, area, out=np.zeros_like(volume), where=area > 0.0)
 
+    def part(self, work: np.ndarray, before: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Part of the work of a step, beyond ``before``, that is above the threshold; all arrays ``shape=(n,)``."""
+        beyond = before + work - self.threshold * area
+        return np.clip(np.divide(beyond, work, np.ones_like(work), where=work > 0.0), 0.0, 1.0)
+
     def __repr__(self) -> str:
-        return f"Wear({self.coefficient.tolist()}{', explicit=True' * self.explicit})"
+        said = "field" if self.field else self.coefficient.tolist()
+        options = ", explicit=True" * self.explicit
+        options += f", threshold={self.threshold:g}" * (self.threshold > 0.0)
+        return f"Wear({said}{options})"
+
+
+def _checked(coefficient) -> np.ndarray:
+    array = finite("wear coefficient", coefficient)
+    if array.shape not in ((), (1,), (2,)) or (array < 0).any():
+        raise ValueError(
+            f"wear coefficient must be a number or a pair of numbers >= 0, volume per work; got {coefficient!r}."
+        )
+    return frozen(array)

@@ -93,3 +93,29 @@ def test_refusals_and_options():
     """A Wear says whether it is explicit; a checkpoint of it is the same."""
     assert repr(dc.Wear(1e-6, explicit=True)) == "Wear(1e-06, explicit=True)"
     assert not dc.Wear(1e-6).explicit
+
+
+@pytest.mark.parametrize("explicit", [False, True])
+def test_a_coating_and_a_threshold_of_work(explicit):
+    """A coefficient that is a field wears what a number wears on each side; below the threshold nothing wears, above it what is beyond."""
+    k = 1e-6
+
+    def half(x):
+        return np.where(x[0] < 0.0, k, 0.0)
+
+    coated, whole = (rubbed(of, (1.0, 2.0), explicit=explicit) for of in (half, k))
+    left = whole.contact.x[:, 0] < 0.0
+    depth = whole.contact.wear_depth
+    assert (depth > 0.0).all()
+    assert coated.contact.wear_depth == pytest.approx(np.where(left, depth, 0.0), rel=1e-3)
+    scene, depths = rubbed(0.0, ()), []
+    limit = 1.5 * MU * scene.contact.force()[-1]  # work of one way and a half
+    late = rubbed(k, (1.0, 2.0, 3.0), explicit=explicit, threshold=limit, look=lambda s: depths.append(s.contact.wear_depth @ s.contact.area))  # fmt: skip
+    volumes = COMM.allreduce(np.array(depths))
+    work = COMM.allreduce(float(late.contact.dissipation.sum()))
+    assert volumes[0] < volumes[1] < volumes[2]
+    assert volumes[2] == pytest.approx(k * np.maximum(work - limit, 0.0), rel=0.1)
+    with pytest.raises(ValueError, match="threshold must be a number >= 0"):
+        dc.Wear(1.0, threshold=-1.0)
+    with pytest.raises(ValueError, match="the field has -1"):
+        rubbed(lambda x: -np.ones(x.shape[1]), ())
