@@ -109,7 +109,7 @@ def _moved(
     contact: ContactLike, u: np.ndarray, motions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
-    if not contact.surface.curved:
+    if not contact.surface.curved or contact.surface.deformable:
         return contact.points.motion(motions), contact.gap
     surface, there = contact.placement.ended_at(u)
     y = surface.relative(there)

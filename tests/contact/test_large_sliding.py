@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Two deformable bodies that slide over many facets: even pressures, forces of fine steps, balance, slip that is objective."""
 
+import warnings
+
 import numpy as np
 import pytest
 import ufl
@@ -312,3 +314,13 @@ def test_half_of_it(cell, degree):
         found.append(share * np.append(contact.force()[[0, 2]], total(contact.dissipation)))
     # halves of tetrahedral meshes are no mirror images
     assert found[0] == pytest.approx(found[1], rel=1e-5 if cell == "hexahedron" else 0.01)
+
+
+def test_a_body_that_is_tipped():
+    """A tall block on rough ground is dragged at its top and turns: what the step looks at then knows of deformable surfaces."""
+    scene = blocks("quadrilateral", 1, ((4, 7), (11, 1)), size=(1.0, 2.0), sliding="large", mu=1.0, swapped=True, tol=1e-8)  # fmt: skip
+    for part in range(3):
+        scene.way.value[:] = (0.24 * part, -0.013)
+        with warnings.catch_warnings(record=True):
+            warnings.simplefilter("always")
+            assert scene.problem.solve().geometry_error <= 1e-3
