@@ -384,6 +384,36 @@ def test_two_deformable_bodies_in_stages(sliding):
     assert apart(expected[0][2], expected[3][2]) > 0.1
 
 
+def test_friction_between_two_bodies_goes_on_after_a_release():
+    """A side of the upper block pushed and let go: as where its support moves to where the side has gone then."""
+    scene = two_bodies.blocks("quadrilateral", cells=((3, 3), (4, 2)), mu=0.3, moduli=(1e3, 2e3), geometry_tol=1e-9)  # fmt: skip
+    held, moved = fem.Function(scene.V), fem.Function(scene.V)
+    scene.way.value = (0.0, -0.02)
+
+    def on_side(values):
+        dofs = fem.locate_dofs_geometrical(scene.V, lambda x: np.isclose(x[0], 1.0) & (x[1] > 0.1))
+        return [*scene.bcs, fem.dirichletbc(values, dofs)]
+
+    def pushed():
+        scene.problem.reset()
+        scene.problem.bcs = on_side(held)
+        for way in (0.0, -0.03):
+            held.x.array[0::2], held.x.array[1::2] = way, -0.02
+            scene.problem.solve()
+
+    pushed()
+    before = total(scene.contact.slip_path)
+    scene.problem.bcs = scene.bcs
+    scene.problem.solve()
+    released = left(scene, scene.contact)
+    assert 0.0 < before < total(scene.contact.slip_path)
+    pushed()
+    moved.x.array[:] = released[0]
+    scene.problem.bcs = on_side(moved)
+    scene.problem.solve()
+    assert all(apart(*both) < 1e-6 for both in zip(left(scene, scene.contact), released))
+
+
 def test_supports_of_a_mixed_space_in_stages():
     """Displacement and pressure: without friction each stage ends where a problem built anew with its supports does."""
     scenes_of = [mixed_scenes.block(mu=0.0, whole=False, confined=c) for c in (True, False)]
