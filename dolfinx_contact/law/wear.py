@@ -80,7 +80,7 @@ class Wear(Guarded):
         return f"Wear({said}{options})"
 
 
-def _checked(coefficient) -> np.ndarray:
+def _checked(coefficient: ArrayLike) -> np.ndarray:
     array = finite("wear coefficient", coefficient)
     if array.shape not in ((), (1,), (2,)) or (array < 0).any():
         raise ValueError(
