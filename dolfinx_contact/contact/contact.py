@@ -130,7 +130,7 @@ class Contact(Guarded):
 
             self._placement = MortarPlacement(self, facets, owned, extent)
         else:
-            self._placement = Placement(surface, x, dofs, owned, extent, mesh.comm)
+            self._placement = Placement(surface, x, dofs, self.points_in, extent, mesh.comm)
         self._laws, self._history, self.rho = Laws(), History(), None
         self._laws.assign(self, friction, empty=True)
         self.wear = wear
@@ -330,6 +330,15 @@ class Contact(Guarded):
     def points(self) -> ContactPoints:
         """The ``ContactPoints``: motion as a sparse operator, directions that supports hold."""
         return self._placement.now.points
+
+    def points_in(self, frames: np.ndarray) -> ContactPoints:
+        """The contact points with these frames, on rigid surfaces: the nodes.  A subclass may have others, see docs/extending.md.
+
+        Args:
+            frames: Rows (t1, t2, n) at each node, ``shape=(n, gdim, gdim)``, global components, orthonormal.
+        """
+        of = self.displacements
+        return ContactPoints(of.dofs(self.nodes), frames, of.owned)
 
     @property
     def home(self) -> np.ndarray:

@@ -19,13 +19,22 @@ FREE, STILL = 1e-12, 64 * EPSILON
 class ContactPoints:
     """Points of a body that may touch, each with a frame of its own, this rank's share.
 
+    A point is a node, or moves as several nodes together: point a of frame ``F_a`` by ``w_a = F_a sum_b m_ab u_b``, and its
+    reaction ``r_a`` loads each node b by ``m_ab F_a^T r_a``.  Coefficients ``s`` find reactions from such forces,
+    ``r_a = F_a sum_b s_ab f_b``.  See docs/extending.md.
+
     Args:
-        dofs: Owned degrees of freedom of each point's node, ``shape=(n, gdim)``.
+        dofs: Owned degrees of freedom of each point's own node, ``shape=(n, gdim)``; supports are looked for there.
         frames: Rows (t1, t2, n) of each point, ``shape=(n, gdim, gdim)``, global components, orthonormal.
         owned: Number of owned degrees of freedom, global number of the first, and number of all on all ranks.
+        m, s: Sparse, ``shape=(n, n)``, dimensionless, ``s m^T`` the identity but for points without an entry in ``m``, which never
+            touch; None where a point is its own node.
 
     Attributes:
         B: Sparse, ``shape=(n gdim, size)``: local components of the motion of all points, dimensionless.
+        S: Of the same shape: local components of the reactions that make forces ``B^T r``.
+        local: Whether each point is one node, so that its springs stand where the stiffness has entries.
+        alone: Points that never touch, whatever supports do, ``shape=(n,)``.
         held: Tangential directions that a boundary condition fixes, ``shape=(n, gdim - 1)``.  Slip in them is known:
             friction follows from it, and the support carries the rest, see ``law/supported.py``.
         guided: Points that can slide along one tangential direction alone, which is none of the frame's, and the
@@ -35,19 +44,37 @@ class ContactPoints:
         along: Their tangential direction that is left free, unit vectors, zero where none is, ``shape=(k, gdim - 1)``.
     """
 
-    local = True  # a point is one node, its springs stand where the stiffness has entries
-
-    def __init__(self, dofs: np.ndarray, frames: np.ndarray, owned: tuple[int, int, int]):
+    def __init__(
+        self,
+        dofs: np.ndarray,
+        frames: np.ndarray,
+        owned: tuple[int, int, int],
+        m: sparse.spmatrix | None = None,
+        s: sparse.spmatrix | None = None,
+    ):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
+        self.local, self.alone = m is None, np.zeros(self.count, dtype=bool)
         columns = np.repeat(dofs, self.dim, axis=0).ravel()
         starts = np.arange(0, frames.size + 1, self.dim)
-        self.B = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
+        self.B = self.S = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
+        if m is not None:
+            self.B, self.S = self._of_several(m), self._of_several(s)
+            self.alone = m.tocsr().getnnz(axis=1) == 0
         self._forces = self.B.T.tocsr()
         self._magnitudes, self._sizes = abs(self.B), abs(self._forces)
         self.hold(
             np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
         )
+
+    def _of_several(self, coefficients: sparse.spmatrix) -> sparse.csr_matrix:
+        """Local components of sums over the points' own nodes, ``shape=(n gdim, size)``."""
+        columns, starts = self.dofs.ravel(), np.arange(self.dofs.size + 1)
+        nodes = sparse.csr_matrix(
+            (np.ones(columns.size), columns, starts), (columns.size, self.size)
+        )
+        sums = sparse.kron(coefficients, sparse.eye(self.dim), "csr")
+        return (block_diagonal(self.frames) @ sums @ nodes).tocsr()
 
     def hold(
         self,
@@ -61,6 +88,7 @@ class ContactPoints:
         Args:
             fixed: Which degrees of freedom of the points they are, ``shape=(n, gdim)``; None is none.
         """
+        closed = closed | self.alone
         self.held, self.closed, self.guided = held, closed, guided
         some = held.any(axis=1)
         along = np.where(some[:, None] & ~held, 1.0, 0.0)
@@ -113,7 +141,7 @@ class ContactPoints:
 
     def reactions(self, forces: np.ndarray) -> np.ndarray:
         """Reactions, ``shape=(n, gdim, ...)``, local, that are these forces on the body at the points' nodes: ``S f``, ``S B^T = I``."""
-        return self.motion(forces)  # the frames are orthonormal, and a point is a node
+        return (self.S @ forces).reshape(self.count, self.dim, *forces.shape[1:])
 
     def add_forces(self, reaction: np.ndarray, forces: np.ndarray) -> None:
         """Add the forces on the body that are these reactions to those on owned degrees of freedom."""
@@ -125,13 +153,17 @@ class ContactPoints:
 
     def matrix(self, blocks: np.ndarray) -> sparse.csr_matrix:
         """``B^T D B`` of blocks ``D`` of points, ``shape=(n, gdim, gdim)``, local frame: owned rows, columns in global numbers."""
-        product = self._forces @ block_diagonal(blocks) @ self.B
-        columns = product.indices + self.first
-        return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
+        return self._product(blocks, self.B)
 
     def of_reactions(self, blocks: np.ndarray) -> sparse.csr_matrix:
         """``B^T D S``: forces by the forces that make reactions, which blocks ``D`` turn into others.  As ``matrix``."""
-        return self.matrix(blocks)
+        return self._product(blocks, self.S)
+
+    def _product(self, blocks: np.ndarray, by: sparse.csr_matrix) -> sparse.csr_matrix:
+        """``B^T D by``, columns in global numbers."""
+        product = self._forces @ block_diagonal(blocks) @ by
+        columns = product.indices + self.first
+        return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
 
     def rows(self, turns: np.ndarray, free: np.ndarray) -> sparse.csr_matrix:
         """Rows of ``B`` along other directions of each point, columns in global numbers.
@@ -140,13 +172,13 @@ class ContactPoints:
             turns: The directions, local components, ``shape=(n, k, gdim)``.
             free: Which owned degrees of freedom count, booleans.
         """
-        kept = turns @ self.frames * free[self.dofs][:, None, :]
-        kept[np.linalg.norm(kept, axis=2) < FREE] = 0.0  # fixed but for rounding
-        columns = np.repeat(self.dofs + self.first, turns.shape[1], axis=0)
-        starts = np.arange(0, kept.size + 1, self.dim)
-        return sparse.csr_matrix(
-            (kept.ravel(), columns.ravel(), starts), (len(starts) - 1, self._whole)
-        )
+        B = self.B.copy()
+        B.data *= free[B.indices]
+        kept = (block_diagonal(turns) @ B).tocsr()
+        fixed = np.sqrt(kept.multiply(kept).sum(axis=1)) < FREE  # but for rounding
+        kept.data[np.repeat(np.ravel(fixed), np.diff(kept.indptr))] = 0.0
+        columns = kept.indices + self.first
+        return sparse.csr_matrix((kept.data, columns, kept.indptr), (kept.shape[0], self._whole))
 
     @property
     def reach(self) -> np.ndarray:
@@ -181,9 +213,9 @@ class ContactPoints:
 
 
 def block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
-    """A sparse matrix of blocks, ``shape=(n, gdim, gdim)``, on its diagonal."""
-    n, dim = len(blocks), blocks.shape[1]
-    return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * dim,) * 2).tocsr()
+    """A sparse matrix of blocks, ``shape=(n, k, gdim)``, on its diagonal."""
+    n, k, dim = blocks.shape
+    return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), (n * k, n * dim)).tocsr()
 
 
 def nodal_blocks(K: PETSc.Mat, dofs: np.ndarray) -> np.ndarray:

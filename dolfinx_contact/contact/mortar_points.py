@@ -55,8 +55,9 @@ class MortarPlacement(Placement):
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
         self._projected: tuple = (None, None)  # a displacement, and what was placed for it
         self._start = np.zeros(owned[0])
+        self._owned = owned
         super().__init__(
-            contact.surface, contact.x[:, : of.dim], of.dofs(nodes), owned, extent, comm
+            contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
         )
 
     def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
@@ -254,7 +255,7 @@ class MortarPoints(ContactPoints):
         comm: MPI communicator.  Everything that asks for motion or forces is collective.
 
     Attributes:
-        alone: Nodes opposite nothing, or next to nothing, ``shape=(n,)``.
+        alone: Nodes opposite nothing, or next to nothing, which never touch, ``shape=(n,)``.
         share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
         met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
         m: Coefficients of the opposite nodes, sparse, ``shape=(n, m)``.
@@ -311,16 +312,6 @@ class MortarPoints(ContactPoints):
         """Magnitudes of ``B``.  Collective."""
         starts, columns, values = self._B.getValuesCSR()
         return self._petsc(starts, columns, np.abs(values))
-
-    def hold(
-        self,
-        held: np.ndarray,
-        closed: np.ndarray,
-        guided: tuple | None = None,
-        fixed: np.ndarray | None = None,
-    ) -> None:
-        """See ``ContactPoints``; nodes opposite nothing never touch, either."""
-        super().hold(held, closed | self.alone, guided, fixed)
 
     def known(self, motion: np.ndarray, terms: Iterable[np.ndarray]) -> None:
         """See ``ContactPoints``: nodes have no friction along what supports hold, such as across a plane of symmetry.
@@ -390,15 +381,10 @@ class MortarPoints(ContactPoints):
         kept.destroy()
         weights.destroy()
         B = sparse.csr_matrix((values, columns, starts), (self.dofs.size, self._whole))
-        k = turns.shape[1]
-        turned = sparse.bsr_matrix(
-            (turns, np.arange(self.count), np.arange(self.count + 1)),
-            (self.count * k, self.dofs.size),
-        )
         own = np.linalg.norm(turns @ self.frames * free[self.dofs][:, None, :], axis=2)
         out = (own < FREE) | self.closed[:, None]  # held: then what opposite nodes do is carried
         own = np.where(out, 0.0, 1.0).ravel()
-        return (sparse.diags(own) @ turned @ B).tocsr()
+        return (sparse.diags(own) @ block_diagonal(turns) @ B).tocsr()
 
     @property
     def reach(self) -> np.ndarray:

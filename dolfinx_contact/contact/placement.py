@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import EPSILON
 from dolfinx_contact.support.attributes import frozen
@@ -24,7 +23,11 @@ from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, composed, cross, rotation_between
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mpi4py import MPI
+
+    from dolfinx_contact.contact.interface import ContactPoints
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
 CLEAR = 1e-9
@@ -58,7 +61,7 @@ class Placement:
         surface: The surface.
         x: Reference positions of the nodes, ``shape=(n, gdim)``.
         dofs: Their degrees of freedom, ``shape=(n, gdim)``.
-        owned: As ``ContactPoints`` has it.
+        points_in: Makes the ``ContactPoints`` of frames, ``shape=(n, gdim, gdim)``, see ``Contact.points_in``.
         extent: Largest coordinate of the mesh.
         comm: MPI communicator.
 
@@ -77,12 +80,12 @@ class Placement:
         surface: Surface,
         x: np.ndarray,
         dofs: np.ndarray,
-        owned: tuple,
+        points_in: Callable[[np.ndarray], ContactPoints],
         extent: float,
         comm: MPI.Comm,
     ):
         self.surface, self.x, self._comm = surface, x, comm
-        self._dofs, self._owned, self._apart = dofs, owned, CLEAR * extent
+        self._dofs, self._points_in, self._apart = dofs, points_in, CLEAR * extent
         self._place(surface.relative(x) if surface.varies else x, x, None)
         self.settle()
 
@@ -137,7 +140,7 @@ class Placement:
             points = before.points
         else:
             frames = np.broadcast_to(frame, (*x.shape, x.shape[1])).copy()
-            points = ContactPoints(self._dofs, frames, self._owned)
+            points = self._points_in(frames)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
         turned = surface.rotation
         self.now = Placed(home, turned, own, frame, flat, points, arms, None, turned)

@@ -289,7 +289,7 @@ class Friction(Guarded):
         return np.column_stack((cos * x - sin * y, sin * x + cos * y))
 
     def law(self, dim: int):
-        """The kernel's law in ``dim`` = 2 or 3 dimensions.
+        """The kernel's law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw`` of ``solvers/protocols.py``.
 
         Raises:
             ValueError: Friction is not isotropic and ``dim`` is 2, where there is only one

@@ -36,12 +36,20 @@ if TYPE_CHECKING:
 
 
 class LawLike(Protocol):
-    """The law at ``n`` nodes: the kernel's, or what takes its place where supports move nodes."""
+    """What nodal maps ask of the law at ``n`` nodes: the kernel's, or what takes its place where supports move nodes."""
 
     def return_map(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, normal: np.ndarray, tangential: np.ndarray) -> tuple: ...  # fmt: skip
     def return_jacobian(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, normal: np.ndarray, tangential: np.ndarray) -> tuple: ...  # fmt: skip
     def bipotential_map(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray) -> tuple: ...  # fmt: skip
     def bipotential_jacobian(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray) -> tuple: ...  # fmt: skip
+
+
+class ContactLaw(LawLike, Protocol):
+    """The law of a contact, ``Friction.law(dim)``: also what the errors and the record of a step ask of it, see docs/extending.md."""
+
+    def slip_defect(self, reaction: np.ndarray, slip: np.ndarray, status: np.ndarray) -> np.ndarray: ...  # fmt: skip
+    def bipotential_gap(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray) -> np.ndarray: ...  # fmt: skip
+    def load_function(self, reaction: np.ndarray) -> np.ndarray: ...
 
 
 class MapLike(Protocol):
@@ -174,7 +182,7 @@ class ContactLike(Protocol):
     @property
     def wear(self) -> Wear | None: ...
     @property
-    def law(self) -> Any: ...
+    def law(self) -> ContactLaw: ...
     @property
     def has_history(self) -> bool: ...
     @property

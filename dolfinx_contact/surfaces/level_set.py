@@ -12,8 +12,7 @@ from ufl.core.expr import Expr
 
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import finite, vector
-from dolfinx_contact.surfaces.round import CurvedSurface
-from dolfinx_contact.surfaces.surface import unit
+from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 from dolfinx_contact.surfaces.ufl_distance import by_ufl, is_ufl
 
 # Step of central differences over the size of the nodes' positions: rounding and truncation alike.
@@ -158,12 +157,6 @@ class RigidSurface(CurvedSurface):
                 f"distance of RigidSurface has no gradient at {at}, relative to it: there is no normal."
             )
         return lengths
-
-    def described(self) -> np.ndarray:
-        """Point and axis; what the function is nobody knows."""
-        return np.concatenate(
-            (self.point, np.zeros(self.point.size) if self.axis is None else self.axis)
-        )
 
     def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()

@@ -11,52 +11,10 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import positive, vector
-from dolfinx_contact.surfaces.surface import Surface, unit
+from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 
-# Part of the radius within which a position has no direction from the centre; of a direction that has to be tangential.
-NEAR, ALONG = 1e-9, 1e-8
-
-# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent.
-TIES = 9
-
-
-class CurvedSurface(Surface):
-    """A surface with a normal at every position."""
-
-    curved = varies = True
-
-    def normals(self, y: np.ndarray) -> np.ndarray:
-        """Unit normals towards the side where the body may be, ``shape=(n, gdim)``."""
-        raise NotImplementedError
-
-    def frames(self, y: np.ndarray) -> np.ndarray:
-        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
-
-        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
-
-        Raises:
-            ValueError: an axis along the normal of a position.
-        """
-        n = self.normals(y)
-        if n.shape[1] == 2:
-            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
-        axis = (
-            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
-            if self.axis is None
-            else self.axis
-        )
-        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
-        length = np.linalg.norm(t1, axis=1)
-        if (length < ALONG).any():
-            at = y[np.argmin(length)].tolist()
-            raise ValueError(
-                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
-                "another first principal friction direction."
-            )
-        t1 /= length[:, None]
-        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
-        t1 /= np.linalg.norm(t1, axis=1)[:, None]
-        return np.stack((t1, np.cross(n, t1), n), axis=1)
+# Part of the radius within which a position has no direction from the centre.
+NEAR = 1e-9
 
 
 class _Round(CurvedSurface):

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 # Part of a length across another vector below which both are parallel.
 PARALLEL = 1e-12
 
+# Part of a direction that has to be tangential.
+ALONG = 1e-8
+
+# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent.
+TIES = 9
+
 
 def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """A vector that is not zero, of length one."""
@@ -47,7 +53,8 @@ class _OfDrive:
 class Surface(Guarded):
     """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
 
-    Such positions are in axes that move with the surface: global components as long as it stands where it was made.
+    Such positions are in axes that move with the surface: global components as long as it stands where it was made.  A surface of
+    your own has ``distance`` and ``frames``, or, on ``CurvedSurface``, ``normals``, see docs/extending.md.
 
     Args:
         point: About which the surface rotates, ``shape=(gdim,)``, global frame, length units.
@@ -210,7 +217,10 @@ class Surface(Guarded):
         return vector if self._turn is None or vector.size == 1 else vector + vector @ self._turn
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Distance to the surface, ``shape=(n,)``, positive on the side where the body may be."""
+        """Distance to the surface, ``shape=(n,)``, length units, positive on the side where the body may be; ``y``, ``shape=(n, gdim)``.
+
+        What counts is its value on the surface, zero, and its slope there, one along the normal.
+        """
         raise NotImplementedError
 
     def frames(self, y: np.ndarray) -> np.ndarray:
@@ -221,8 +231,51 @@ class Surface(Guarded):
         """Raise a ``ValueError`` if what the user says of the surface contradicts itself at positions of nodes."""
 
     def described(self) -> np.ndarray:
-        """Numbers that say which surface it is, for checkpoints."""
+        """Numbers that say which surface it is, for checkpoints: point and axis, and whatever else a class has."""
+        return np.append(self.point, np.zeros(self.point.size) if self.axis is None else self.axis)
+
+    def __repr__(self) -> str:
+        """Which surface it is, in words: the same on all ranks."""
+        return f"{type(self).__name__}({', '.join(map(str, self.described().tolist()))})"
+
+
+class CurvedSurface(Surface):
+    """A surface with a normal at every position."""
+
+    curved = varies = True
+
+    def normals(self, y: np.ndarray) -> np.ndarray:
+        """Unit normals towards the side where the body may be, ``shape=(n, gdim)``."""
         raise NotImplementedError
+
+    def frames(self, y: np.ndarray) -> np.ndarray:
+        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
+
+        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
+
+        Raises:
+            ValueError: an axis along the normal of a position.
+        """
+        n = self.normals(y)
+        if n.shape[1] == 2:
+            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
+        axis = (
+            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
+            if self.axis is None
+            else self.axis
+        )
+        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
+        length = np.linalg.norm(t1, axis=1)
+        if (length < ALONG).any():
+            at = y[np.argmin(length)].tolist()
+            raise ValueError(
+                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
+                "another first principal friction direction."
+            )
+        t1 /= length[:, None]
+        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
+        t1 /= np.linalg.norm(t1, axis=1)[:, None]
+        return np.stack((t1, np.cross(n, t1), n), axis=1)
 
 
 def rotation_less_one(angle: np.ndarray) -> np.ndarray:

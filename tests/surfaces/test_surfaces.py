@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.surfaces.surface import CurvedSurface
 from dolfinx_contact.surfaces.ufl_distance import by_ufl
 from mechanics.material import elasticity
 
@@ -582,3 +583,30 @@ def test_dimensions_have_to_agree():
     facets = mesh.locate_entities_boundary(V.mesh, 2, lambda x: np.isclose(x[2], 0.0))
     with pytest.raises(ValueError, match="has 2 dimensions, the mesh 3"):
         dc.Contact(V, facets, dc.RigidSphere((0, 0), 1.0), dc.Friction(0.0))
+
+
+class Raised(CurvedSurface):
+    """A ball like ``RigidSphere``, with no more than a surface of one's own must have."""
+
+    def __init__(self, centre, radius):
+        super().__init__(centre)
+        self.radius = radius
+
+    def distance(self, y):
+        return np.linalg.norm(y - self.point, axis=1) - self.radius
+
+    def normals(self, y):
+        return (y - self.point) / np.linalg.norm(y - self.point, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_surface_of_ones_own_is_as_good_as_that_of_the_package(gdim):
+    """A subclass with distance and normals gives the forces of ``RigidSphere``, and the same words on all ranks."""
+    centre, forces = np.append(np.zeros(gdim - 1), -2.0), []
+    for ball in (dc.RigidSphere(centre, 2.0), Raised(centre, 2.0)):
+        ball.displacement = np.append(np.zeros(gdim - 1), 0.05)
+        scene = block(ball, 0.3, cells=[4] * gdim)
+        scene.problem.solve()
+        forces.append(scene.contact.force())
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9, abs=1e-9 * abs(forces[0][-1]))
+    assert COMM.allgather(repr(ball)) == [repr(ball)] * COMM.size
