@@ -60,6 +60,8 @@ struct Tuning {
 
     // -- judge -----------------------------------------------------------------------------------
     static constexpr double near_rounding = 1e-2; ///< of the tolerance: sums in twice the precision
+    static constexpr double local_rounding =
+        32; ///< eps of its terms: a contact's defect is rounding
 
     // -- linear algebra --------------------------------------------------------------------------
     static constexpr double smallest_rcond = 1e-12;      ///< of a W that is inverted

@@ -97,6 +97,7 @@ template <int P> class Judge {
 
   private:
     static constexpr double eps = std::numeric_limits<double>::epsilon();
+    static constexpr double local_rounding = Tuning::local_rounding * eps;
 
     /// What the law and the slip rule leave, and the size of the terms of which it is the
     /// difference; forces, Euclidean over all contacts. The largest of a contact over its own
@@ -187,7 +188,7 @@ template <int P> class Judge {
             slip_size += contact.slip_size;
             for (const auto &[left, terms] :
                  {std::pair(contact.law, contact.size), std::pair(contact.slip, contact.slip_size)})
-                if (left > eps * eps * terms) // else it may be rounding
+                if (left > local_rounding * local_rounding * terms)
                     local = std::max(local, left / scale);
         }
     };
