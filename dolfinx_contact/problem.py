@@ -382,7 +382,7 @@ class ContactProblem(Guarded):
         return self._bound
 
     def _search(self) -> tuple[LoadStep, SolverResult]:
-        """The step that has judged what the solver takes for the solution, and that."""
+        """The step that has judged what the solver takes for the solution, and that; once more with planes that held nodes let slide."""
         step, found = self._worn(self.load_step())
         if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
             for contact in self.contacts:
@@ -545,7 +545,7 @@ class ContactProblem(Guarded):
         return step, found._replace(x=statics.settled(step, found.x, self.undetermined))
 
     def _solved(self, step: LoadStep) -> SolverResult:
-        """What the solver finds, measured."""
+        """What the solver finds; contacts and ``step.errors`` are those of it then.  Collective."""
         with stage("contact: iterations"):
             found = self.bound().solve(step)
         step.measure(found.x)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """What a solver is: options that can be bound to a body and its contacts, and then solves load steps.
 
-A solver is an object with options and ``bind(body, contacts, stiffness)``, which returns a ``BoundSolver``.  That owns
+A solver is an object with options and ``bind(body, contacts, stiffness, memory)``, which returns a ``BoundSolver``.  That owns
 everything set up for the body's present stiffness, and is thrown away when the stiffness changes.
 """
 

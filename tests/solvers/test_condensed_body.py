@@ -69,7 +69,7 @@ def test_default_falls_back(monkeypatch):
     def give_up(self, step, start=None):
         return SolverResult(step.body.free_state(step.b), 1, 1.0, "CondensedNewton")
 
-    monkeypatch.setattr(condensed.CondensedBody, "solve", give_up)
+    monkeypatch.setattr(condensed.BoundCondensedNewton, "solve", give_up)
     reactions, steps = run()
     assert steps[0].solver == dc.SolverName.FIXED_POINT
     assert "CondensedNewton ended at" in steps[0].reason

@@ -42,7 +42,7 @@ FEW, MANY, ASTRAY = 3000, 6000, 1e-3
 RIGID = 1e-9
 
 
-class CondensedBody:
+class BoundCondensedNewton:
     """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
 
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of

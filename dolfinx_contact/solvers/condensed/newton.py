@@ -145,10 +145,10 @@ class CondensedNewton:
     def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
         """See ``Solver``."""
         from dolfinx_contact.solvers.condensed.body import (
-            CondensedBody,  # arrays alone do without DOLFINx
+            BoundCondensedNewton,  # arrays alone do without DOLFINx
         )
 
-        return CondensedBody(self, body, contacts, stiffness, memory)
+        return BoundCondensedNewton(self, body, contacts, stiffness, memory)
 
 
 def solve_condensed(
