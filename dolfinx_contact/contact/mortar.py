@@ -34,8 +34,9 @@ POINTS, MORE = 4, 10
 # Facets of the slave side at a time.
 BLOCK = 4096
 
-# Part of a node's area that has to be covered: of less the coefficients are rounding.
-COVERED = 0.05
+# Part of a node's area that has to be covered, by the degree: with less, rows sum up to one by terms that are several times larger,
+# up to 3 in first order, 7 in second.
+COVERED = {1: 0.05, 2: 0.2}
 
 # Area of a node over the largest that is none: of vertices of triangles of second order.
 NOTHING = 1e-9
@@ -137,7 +138,8 @@ def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: i
             D, part = _coupled(block, pieces, opposite, count)
             area += to_nodes @ D.ravel()
             m = m + to_nodes @ part
-    covered = area > np.maximum(COVERED * whole, NOTHING * whole.max(initial=0.0))
+    least = max((COVERED[side.degree] for side in slaves), default=0.0)
+    covered = area > np.maximum(least * whole, NOTHING * whole.max(initial=0.0))
     inverse = np.divide(1.0, area, out=np.zeros_like(area), where=covered)
     m = (sparse.diags(inverse) @ m).tocsr()
     m.eliminate_zeros()
