@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
+LEAVES = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
+
 AXIS = 1e-8  # part of an axis along the surface, of a direction that is none
 
 
@@ -54,7 +56,7 @@ class MortarPlacement(Placement):
         self._near = [np.isin(side.nodes, self._mine).any(axis=1) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
         self._projected: tuple = (None, None)  # a displacement, and what was placed for it
-        self._start = np.zeros(owned[0])
+        self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
         self._owned = owned
         super().__init__(
             contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
@@ -74,6 +76,7 @@ class MortarPlacement(Placement):
         mine = [side.some(near) for side, near in zip(slaves, self._near)]
         with raised_together(self._comm):
             rows = _sorted_rows(mine, masters, self._mine)
+            rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, _mean_normals(mine, self._mine))
             frames = frames_along(normals, self.surface.axis)
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
@@ -90,8 +93,16 @@ class MortarPlacement(Placement):
 
     def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
         """See ``Placement``; rows stay as they are at the start of a step, and are renewed within it."""
-        self._start = start
-        self.now = self.settled if u is start else self.placed(u)
+        if u is start:
+            self._start, self._used, self._renewed = start, self.settled.points, 0
+            self._left[:] = False
+            self.now = self.settled
+            return
+        self.now, self._renewed = self.placed(u), self._renewed + 1
+        alone = self.now.points.alone
+        if self._renewed > LEAVES:
+            self._left |= alone & ~self._used.alone
+        self._used = self.now.points
 
     def carried(self, last: State) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
