@@ -428,7 +428,8 @@ class ContactProblem(Guarded):
             return 0.0, ""
         contacts, stiffness = map(list, zip(*both))
         said = "" if repeated else too_long(self.body, contacts, found.x)
-        return geometry_error(self.body, contacts, stiffness, found.x, step.carried), said
+        acting = step.carried(self.geometry_tol)
+        return geometry_error(self.body, contacts, stiffness, found.x, acting), said
 
     def _repeated(self, step: LoadStep, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
         """The step with the geometry of a displacement at its end.  Collective."""
@@ -456,7 +457,7 @@ class ContactProblem(Guarded):
             step, found = self._with_friction(step)
             known = self._keep_one_start(known)
             rounds, iterations = rounds + 1, iterations + found.iterations
-            if not step.errors.within(step.tol) or depths.settled(step.scale):
+            if not step.errors.within(step.tol) or depths.settled(step.carried(self.geometry_tol)):
                 break
             if rounds == wearing.MOST:
                 found = found._replace(forward_error=np.inf)

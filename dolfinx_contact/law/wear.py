@@ -20,7 +20,7 @@ class Wear(Guarded):
 
     Wear is integrated implicitly, by backward Euler: the depth worn in a step is part of its equations, and the work is the slip
     times the force at its end.  So a node is never worn below contact, whatever the coefficient.  The step is solved again until
-    depths are off by at most a tenth of ``geometry_tol`` of the acting forces; once is enough for gentle wear.
+    depths are off by at most a tenth of ``geometry_tol`` of the reactions; once is enough for gentle wear.
 
     Explicit wear opens the gap of the next step, and its work is that of ``contact.dissipation``, with the mean of the forces at
     both ends.  If the depth worn in a step, times the node's stiffness, then exceeds the node's reaction, the step is too large:

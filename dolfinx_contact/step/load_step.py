@@ -254,10 +254,14 @@ class LoadStep:
         """Forces that act in the state judged last."""
         return self.errors.scale * self.unit
 
-    @property
-    def carried(self) -> float:
-        """Reactions of that state, but no less than the tolerance of the forces that act: beside stiff springs they may be small."""
-        return self.scale * max(self.errors.share, self.tol)
+    def carried(self, tol: float) -> float:
+        """What forces are held against of which a part ``tol`` does not matter: the reactions of that state.
+
+        Beside stiff springs they may be small; then what the errors leave unknown does not matter either.
+        """
+        errors = self.errors
+        unknown = max(errors.largest, ROUNDED * errors.rounding)
+        return self.scale * max(errors.share, unknown / tol)
 
     def rest(self) -> None:
         """Call sticking what slips by less than is unknown of the state judged last, or than the tolerance of its reactions."""

@@ -39,13 +39,13 @@ def landing(
     lands = [_opened(c, x) & (c.reaction[:, -1] > 0.0) for c in contacts]
     new = [at & ~c.counts_from.any(axis=1) for c, at in zip(contacts, lands)]
     slips = [contact.slip_increment for contact in contacts]
-    if _felt(body, contacts, step, slips, new) <= tol:
+    if _felt(body, contacts, step, slips, new, tol) <= tol:
         return 0.0
     without = _without(body, contacts, step, x, lands)
     if without is None:
         return 0.0
     before = [contact.before_touching(without, at) for contact, at in zip(contacts, new)]
-    late = _felt(body, contacts, step, before, new)
+    late = _felt(body, contacts, step, before, new, tol)
     if late > tol:
         for contact, slip in zip(contacts, before):
             contact.count_from(contact.counts_from + slip)
@@ -64,6 +64,7 @@ def _felt(
     step: StepLike,
     slips: Sequence[np.ndarray],
     at: Sequence[np.ndarray],
+    tol: float,
 ) -> float:
     """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries."""
     squares = 0.0
@@ -74,7 +75,7 @@ def _felt(
         most = 2.0 * contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
         squares += np.square(np.minimum(made, most)).sum()
     size = float(np.sqrt(body.total([squares])[0]))
-    return size / step.carried if size > 0.0 else 0.0
+    return size / step.carried(tol) if size > 0.0 else 0.0
 
 
 def _without(
@@ -110,7 +111,7 @@ def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol
     opens = [(c.settled.reaction[:, -1] > 0.0) & (c.reaction[:, -1] == 0.0) for c in contacts]
     before = [np.where(at[:, None], c.settled.reaction, 0.0) for c, at in zip(contacts, opens)]
     size = np.sqrt(body.total([sum(np.square(r).sum() for r in before)])[0])
-    if size <= tol * step.carried:
+    if size <= tol * step.carried(tol):
         return
     forces, points = np.zeros(body.size), [c.placement.settled.points for c in contacts]
     for of, reaction in zip(points, before):

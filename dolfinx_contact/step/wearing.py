@@ -46,7 +46,7 @@ class Wearing:
         body: The body.
         contacts: Those that wear within the step.
         stiffness: ``NodalStiffness`` of each.
-        tol: By how much forces may differ for depths that are off, over the forces that act.
+        tol: By how much forces may differ for depths that are off, over the reactions.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Wearing:
         """Whether the depths are those that the present state wears; if not, takes others to solve the step with.  Collective.
 
         Args:
-            scale: Forces that act.
+            scale: Reactions, see ``LoadStep.carried``.
         """
         state = [(c.wear_compliance(c.present), c.reaction[:, -1], c.gap) for c in self._contacts]
         c, force, gap = map(np.concatenate, zip(*state))
