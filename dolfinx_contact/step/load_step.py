@@ -12,7 +12,7 @@ import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
 from dolfinx_contact.law.maps import ReturnMap
-from dolfinx_contact.results.record import Counts, counts
+from dolfinx_contact.results.record import WORSE, Counts, counts
 from dolfinx_contact.step.errors import (
     EPSILON,
     ROUNDED,
@@ -257,11 +257,12 @@ class LoadStep:
     def carried(self, tol: float) -> float:
         """What forces are held against of which a part ``tol`` does not matter: the reactions of that state.
 
-        Beside stiff springs they may be small; then what the errors leave unknown does not matter either.
+        Beside stiff springs they may be so small that it is told; then what the errors leave unknown does not matter either.
         """
         errors = self.errors
         unknown = max(errors.largest, ROUNDED * errors.rounding)
-        return self.scale * max(errors.share, unknown / tol)
+        told = unknown > WORSE * self.tol * errors.share
+        return self.scale * max(errors.share, unknown / tol if told else 0.0)
 
     def rest(self) -> None:
         """Call sticking what slips by less than is unknown of the state judged last, or than the tolerance of its reactions."""
