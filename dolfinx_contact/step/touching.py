@@ -73,7 +73,7 @@ def _felt(
         contact.points.without_held(slip)
         made = np.linalg.norm(np.einsum("nij,nj->ni", of.tangential, slip), axis=1)
         most = 2.0 * contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
-        squares += np.square(np.minimum(made, most)).sum()
+        squares += np.square(np.minimum(made, most)[here]).sum()
     size = float(np.sqrt(body.total([squares])[0]))
     return size / step.carried(tol) if size > 0.0 else 0.0
 
