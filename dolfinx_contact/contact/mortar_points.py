@@ -137,7 +137,7 @@ class MortarPlacement(Placement):
         there.points.add_forces(reaction, forces)
         now.points.add_forces(-state.reaction, forces)
         gap = there.flat + there.points.motion(u)[:, -1]
-        return Ended(gap, missed[:, :-1], forces, there.home, there.frame)
+        return Ended(gap, missed[:, :-1], forces, there.home, there.frame, there.points.alone)
 
     @property
     def changes(self) -> bool:
@@ -199,6 +199,7 @@ class Ended(NamedTuple):
     forces: np.ndarray  # of the reactions on owned degrees of freedom, less those that were used
     home: np.ndarray  # where on the undeformed surface nodes are, (n, gdim)
     frame: np.ndarray  # (n, gdim, gdim)
+    alone: np.ndarray  # opposite nothing, (n,)
 
 
 class Skin:

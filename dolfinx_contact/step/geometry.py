@@ -103,7 +103,7 @@ def _missed(
     way = placement.way(surface, y, own, distance, contact.settled)
     missed = way - (0.0 if placement.now.way is None else placement.now.way)
     return (
-        _pressed(contact, stiffness, distance),
+        _pressed(contact, stiffness, distance, contact.points.closed),
         np.hypot(size * angle, friction * contact.texture_turned(y, own)),
         _dragged(contact, stiffness, missed),
     )
@@ -116,21 +116,24 @@ def _missed_by_rows(
     ended = contact.placement.ended(contact.present, u)
     ended.forces[fixed] = 0.0
     friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
+    came = contact.points.alone & ~ended.alone  # opposite something at the end alone
     with raised_together(contact.comm):  # the user's functions
         turned = friction * contact.texture_turned(ended.home, ended.frame)
     return (
-        _pressed(contact, stiffness, ended.gap),
+        _pressed(contact, stiffness, ended.gap, contact.points.closed & ~came),
         np.append(ended.forces, turned),
         _dragged(contact, stiffness, ended.slip),
     )
 
 
-def _pressed(contact: ContactLike, stiffness: NodalStiffness, distance: np.ndarray) -> np.ndarray:
-    """Normal forces that distances at the end of a step, ``shape=(n,)``, would make beside the gaps used."""
+def _pressed(
+    contact: ContactLike, stiffness: NodalStiffness, distance: np.ndarray, closed: np.ndarray
+) -> np.ndarray:
+    """Normal forces that distances at the end of a step, ``shape=(n,)``, would make beside the gaps used, but at ``closed`` nodes."""
     exact = distance + contact.wear_depth
     presses = contact.reaction[:, -1] > 0.0
     off = np.where(presses, np.abs(exact - contact.gap), np.maximum(-exact, 0.0))
-    off[contact.points.closed] = 0.0
+    off[closed] = 0.0
     return stiffness.normal * off
 
 

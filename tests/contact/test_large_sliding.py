@@ -139,6 +139,20 @@ def test_over_the_edge():
     )
 
 
+@pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
+def test_taken_away_and_put_back(swapped):
+    """A block that was beside the other one, where its nodes are opposite nothing, presses as one that never left, on which side the unknowns are."""
+    forces = []
+    for ways in ([(0, -0.02)], [(0, 0.1), (3, 0.1), (3, -0.05), (3, 0.1), (0, 0.1), (0, -0.02)], [(3, 0.1), (0, -0.02)]):  # fmt: skip
+        scene = blocks("quadrilateral", 1, ((3, 2), (7, 2)), 0.0, swapped=swapped, sliding="large", size=(1.0, 2.0))  # fmt: skip
+        for way in ways:
+            scene.way.value[:] = way
+            scene.problem.solve()
+        forces.append(np.abs(scene.contact.force()))
+    assert forces[0][1] > 1e-3 * E
+    assert np.allclose(forces[1:], forces[:1], atol=1e-3 * forces[0][1])
+
+
 def test_checkpoints_and_rewind(tmp_path):
     """A run that goes on from a file, or whose last step was taken back and made again, has the same bits on one rank."""
     whole, parted = (blocks("quadrilateral", 1, ((4, 2), (13, 2)), size=(1.0, 2.0), sliding="large") for _ in range(2))  # fmt: skip

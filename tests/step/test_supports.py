@@ -462,3 +462,29 @@ def test_how_guided_nodes_hold_a_driven_plane_is_not_known():
     contact.surface.free, contact.surface.force = ("t2", "n"), (0.0, 0.1, 10.0)
     problem.solve()
     assert np.abs(contact.force()[1:] - (0.1, 10.0)).max() < 1e-8
+
+
+def test_a_driven_plane_carries_a_block_whose_side_is_held():
+    """Under dead weight, nodes of the side free in the other direction: both solvers agree, and friction is that of the weight."""
+    found = []
+    for solver in (dc.CondensedNewton(), dc.FixedPoint()):
+        domain = mesh.create_unit_cube(COMM, 2, 2, 2, mesh.CellType.hexahedron)
+        V = functionspace(domain, ("Lagrange", 1, (3,)))
+        u, v = fem.Function(V), ufl.TestFunction(V)
+        F = scenes.elasticity(u, v, 1000.0, 0.3)
+
+        def held(i, axis, at, V=V, domain=domain):
+            side = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[axis], at))
+            dofs = fem.locate_dofs_topological(V.sub(i), 2, side)
+            return fem.dirichletbc(fem.Constant(domain, 0.0), dofs, V.sub(i))
+
+        foot = mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[2], 0))
+        plane = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0))
+        contact = dc.Contact(V, foot, plane, dc.Friction(0.3))
+        bcs = [held(1, 2, 1), held(2, 2, 1), held(0, 0, 0)]
+        problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=1e-9)
+        plane.free, plane.force, plane.displacement = ("n",), (0, 0, 20.0), (0.05, 0, 0)
+        assert problem.solve().counts.slip == 9
+        found.append(contact.force())
+    assert np.abs(found[0] - found[1]).max() < 1e-6
+    assert found[0][2] == pytest.approx(20.0, rel=1e-8) and 5.0 < found[0][0] <= 6.0

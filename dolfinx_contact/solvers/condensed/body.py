@@ -180,6 +180,8 @@ class BoundCondensedNewton:
             now = map(moved_across, self._contacts)
             if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):
                 self._set_up()
+                if self._surfaces is not None:  # made anew
+                    self._surfaces.begin(step, free)
         return free
 
     def solve(self, step: StepLike, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:  # fmt: skip
