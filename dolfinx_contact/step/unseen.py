@@ -42,6 +42,9 @@ ROUND = 4.0
 # By what a linear body that turns is too large, over the lengths by which contact and supports deform it.
 GROWN = 0.1
 
+# Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
+SLOPES, ALONG = 0.1, 1e-5
+
 # What is rounding, over the size of a facet.
 CLEAR = 1e-6
 
@@ -96,6 +99,7 @@ class Unseen:
         }
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.surface.varies]
+        self._wavy = [c for c in self._between if getattr(c.surface, "height", None) is not None]
         self._leaps = self._apart = True  # to be looked at
         self._near = [contact for contact in contacts if contact.surface.deformable]
         self._sided = self._near  # which side carries the unknowns is to be looked at
@@ -122,6 +126,7 @@ class Unseen:
         """
         if self._facets:
             self._check_facets(u, dict(zip(contacts, stiffness)))
+        self._wavy = [contact for contact in self._wavy if not _check_slopes(body, contact, u)]
         self._check_wear(contacts, stiffness)
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
         self._sided = [contact for contact in self._sided if not _check_side(contact)]
@@ -254,6 +259,29 @@ def _check_strayed(contact: ContactLike) -> bool:
     warnings.warn(
         f"a node has slid by {slid:.3g} along a deformable surface, further than half of the shortest edge of a facet, {most:.3g}: "
         "who presses on whom is that of the undeformed state, and forces go to where the other body was. Take sliding='large'.",
+        stacklevel=5,
+    )
+    return True
+
+
+def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
+    """Warn of a wavy face that is steep where nodes press on it, whose reactions are along the plane's normal; whether it is.  Collective."""
+    step, force = ALONG * body.extent, contact.reaction[:, -1]
+    dofs = contact.displacements.dofs(contact.nodes)
+    x, squares = contact.x[:, : dofs.shape[1]] + u[dofs], np.zeros(len(force))
+    with raised_together(contact.comm):
+        for along in contact.frame[:-1]:
+            ends = [contact.surface.distances(x + side * step * along) for side in (1.0, -1.0)]
+            with np.errstate(invalid="ignore"):  # infinite where it has none
+                slopes = (ends[0] - ends[1]) / (2.0 * step)
+            squares += np.square(np.where(np.isfinite(slopes), slopes, 0.0))
+    sizes = np.array([squares @ force**2, force @ force])
+    turned, pressing = np.sqrt(contact.comm.allreduce(sizes))
+    if not turned > SLOPES * pressing:
+        return False
+    warnings.warn(
+        f"the height of {contact.surface!r} slopes by {turned / pressing:.2g} where nodes press on it, and its normal stays that of the plane: "
+        "reactions have the wrong direction by that part. Take a dc.RigidSurface, whose distance is that from the face.",
         stacklevel=5,
     )
     return True

@@ -104,6 +104,22 @@ def test_a_height_that_only_nodes_have_is_taken_as_it_is():
     assert scene.contact.force()[1] > 0.0
 
 
+@pytest.mark.parametrize("height, told", [(1e-2, False), (0.1, True)])
+def test_steep_waves_are_told(height, told):
+    """A block that stands aslant on waves of slopes 0.06 and 0.6: the normal of a plane with a height stays."""
+    plane = dc.RigidPlane((0, 0), (0, 1), height=lambda y: height * np.sin(2 * np.pi * y[0]))
+    scene = block(plane, cells=[16, 4])
+    scene.step(0, 0)  # with what stands in the way
+    if told:
+        with pytest.warns(
+            UserWarning, match=r"slopes by 0\.\d+ where nodes press on it, and its normal stays"
+        ):
+            scene.step(0, -1e-3)
+    else:
+        scene.step(0, -1e-3)
+    scene.step(0, -2e-3)
+
+
 def ring(order, curved, interference, cells=(2, 12), uneven=0.0):
     """Half a ring held outside, on a shaft that is too large; its problem and the pressure of Lamé."""
     domain = mesh.create_rectangle(COMM, [np.zeros(2), np.ones(2)], cells, mesh.CellType.quadrilateral)  # fmt: skip
