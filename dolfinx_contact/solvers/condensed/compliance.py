@@ -113,14 +113,13 @@ class Responses:
         if comm.rank > 0:
             return np.zeros((0, 0))
         loads = sparse.vstack([part.all for part in rows]).tocsr()
-        shape = loads.shape[0], self.dofs.size
-        at = np.searchsorted(self.dofs, loads.indices)
-        R = sparse.csc_matrix(sparse.csr_matrix((loads.data, at, loads.indptr), shape))
-        moved = np.zeros(shape)
+        met, at = np.unique(np.searchsorted(self.dofs, loads.indices), return_inverse=True)
+        R = sparse.csr_matrix((loads.data, at.ravel(), loads.indptr), (loads.shape[0], met.size))
+        between = np.empty((met.size, met.size))  # a row for each column of A^-1
         for k in needed:
-            part = slice(k * _COLUMNS, (k + 1) * _COLUMNS)
-            moved += R[:, part] @ self._blocks[k].T
-        W = R.tocsr() @ moved.T
+            here = met // _COLUMNS == k
+            between[here] = self._blocks[k][np.ix_(met, met[here] - k * _COLUMNS)].T
+        W = R @ (R @ between).T
         return (W + W.T) / 2
 
     def _solve(self, solver: LinearSolver, comm: MPI.Comm, blocks: list[int]) -> None:
