@@ -124,7 +124,8 @@ class Contact(Guarded):
         x, dofs = self.x[:, :gdim], self.displacements.dofs(self.nodes)
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
-        extent, owned = np.abs(mesh.geometry.x).max(initial=0.0), self.displacements.owned
+        extent = mesh.comm.allreduce(np.abs(mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
+        owned = self.displacements.owned
         if surface.deformable:
             from dolfinx_contact.contact.mortar_points import MortarPlacement
 

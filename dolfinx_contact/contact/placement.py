@@ -62,7 +62,7 @@ class Placement:
         x: Reference positions of the nodes, ``shape=(n, gdim)``.
         dofs: Their degrees of freedom, ``shape=(n, gdim)``.
         points_in: Makes the ``ContactPoints`` of frames, ``shape=(n, gdim, gdim)``, see ``Contact.points_in``.
-        extent: Largest coordinate of the mesh.
+        extent: Largest coordinate of the mesh, on any rank.
         comm: MPI communicator.
 
     Attributes:
@@ -85,7 +85,12 @@ class Placement:
         comm: MPI.Comm,
     ):
         self.surface, self.x, self._comm = surface, x, comm
-        self._dofs, self._points_in, self._apart = dofs, points_in, CLEAR * extent
+        self._dofs, self._points_in, self._extent, self._apart = (
+            dofs,
+            points_in,
+            extent,
+            CLEAR * extent,
+        )
         self._place(surface.relative(x) if surface.varies else x, x, None)
         self.settle()
 
@@ -343,8 +348,11 @@ class Placement:
 
     def gap_rounding(self, u: np.ndarray) -> float:
         """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
-        lengths = (self.x, self.surface.point, self.surface.displacement, self.now.points.motion(u))
-        return 16 * np.finfo(float).eps * max(np.abs(length).max(initial=0.0) for length in lengths)
+        lengths = (self.surface.point, self.surface.displacement, self.now.points.motion(u))
+        largest = max(np.abs(length).max(initial=0.0) for length in lengths)
+        return (
+            16 * np.finfo(float).eps * max(self._extent, largest)
+        )  # a rank may have the origin alone
 
     def motion_rounding(self, u: np.ndarray, state: State, last: State, worn: np.ndarray) -> tuple:
         """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.

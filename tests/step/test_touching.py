@@ -4,9 +4,11 @@
 
 import numpy as np
 import pytest
+from dolfinx import mesh
 from way_scenes import COMM, slab
 
 import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
 
 pytestmark = pytest.mark.ranks
 MU, SHEAR, PRESS = 0.3, 1e4, 2e4  # of the plate: stiffness along and across, force per length
@@ -106,3 +108,14 @@ def test_what_does_not_matter_costs_no_repetition(monkeypatch):
         scene.surface.displacement = place
         scene.problem.solve()
     assert len(times) == 3
+
+
+def test_what_rounding_is_does_not_depend_on_whose_a_node_is():
+    """A rank that has the node at the origin alone takes its last digits for no more of a gap than the others."""
+    square = mesh.create_unit_square(COMM, 3, 3, mesh.CellType.quadrilateral)
+    V = functionspace(square, ("Lagrange", 1, (2,)))
+    foot = mesh.locate_entities_boundary(square, 1, lambda x: np.isclose(x[1], 0))
+    contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), MU)
+    at_rest = np.zeros(2 * V.dofmap.index_map.size_local)
+    assert not any(COMM.allgather(contact.may_land(at_rest)))
+    assert len(set(COMM.allgather(contact.gap_rounding(at_rest)))) == 1
