@@ -832,8 +832,16 @@ class Contact(Guarded):
         do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
         """
         if self._area is None:
-            self._area, self._area_of = frozen(fields.facing_areas(self, self._weight)), self.surface.rotation  # fmt: skip
+            self._area, self._area_of = frozen(self._facing_areas()), self.surface.rotation  # fmt: skip
         return frozen(self._area * self.covered) if self.surface.deformable else self._area
+
+    def _facing_areas(self) -> np.ndarray:
+        flat = not (self.surface.curved or self.surface.deformable)
+        x = self.x[:, : self.points.dim]
+        turn, none = fields.turn_of_nodes(x, self.arms, self.comm), np.eye(x.shape[1])
+        if not flat or np.abs(turn - none).max() <= TILTED:
+            turn = none
+        return fields.facing_areas(self, self._weight, turn)
 
     def _renew_area(self) -> None:
         """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""

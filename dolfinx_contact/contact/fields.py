@@ -86,7 +86,7 @@ def areas(
     return _assembled(shape, V, facets, weight)
 
 
-def facing_areas(contact: ContactLike, weight: Any) -> np.ndarray:
+def facing_areas(contact: ContactLike, weight: Any, turn: np.ndarray) -> np.ndarray:
     r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
 
     On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that an even pressure p makes the
@@ -96,6 +96,7 @@ def facing_areas(contact: ContactLike, weight: Any) -> np.ndarray:
     Args:
         contact: The contact.
         weight: Of the surface measure, as ``weight_on`` returns it.
+        turn: Rotation of the contact nodes as a whole, ``shape=(gdim, gdim)``: the surface is seen from the undeformed body.
     """
     V, surface = contact.displacements.V, contact.surface
     if surface.deformable:
@@ -104,7 +105,7 @@ def facing_areas(contact: ContactLike, weight: Any) -> np.ndarray:
     towards, n_f, v = fem.Function(V), ufl.FacetNormal(V.mesh), ufl.TestFunction(V)
     at = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, contact.facets)
     x = V.tabulate_dof_coordinates()[at, :dim]
-    frames = surface.turned(surface.frames(surface.relative(x) if surface.curved else x))
+    frames = surface.turned(surface.frames(surface.relative(x) if surface.curved else x)) @ turn
     towards.x.array.reshape(-1, dim)[at] = frames[..., -1, :]
     density = -ufl.inner(n_f, v) if not surface.curved else v[0]
     faces = ufl.conditional(ufl.lt(ufl.inner(n_f, towards), 0.0), density, 0.0)
@@ -120,6 +121,22 @@ def facing_areas(contact: ContactLike, weight: Any) -> np.ndarray:
             )
     found[found <= ZERO * largest] = 0.0
     return found
+
+
+def turn_of_nodes(x: np.ndarray, there: np.ndarray, comm: MPI.Comm) -> np.ndarray:
+    """The rotation that takes nodes as a whole nearest to where they are, ``shape=(gdim, gdim)``; none where they do not tell.  Collective.
+
+    Args:
+        x, there: Positions of this rank's nodes, undeformed and now, each up to a translation, ``shape=(n, gdim)``.
+        comm: MPI communicator.
+    """
+    count = max(comm.allreduce(len(x)), 1)
+    means = comm.allreduce(np.stack((x.sum(axis=0), there.sum(axis=0)))) / count
+    left, sizes, right = np.linalg.svd(comm.allreduce((there - means[1]).T @ (x - means[0])))
+    if not sizes[len(sizes) - 2] > ZERO * sizes[0]:
+        return np.eye(len(sizes))
+    left[:, -1] *= np.linalg.det(left @ right)
+    return left @ right
 
 
 def per_area(forces: np.ndarray, area: np.ndarray) -> np.ndarray:

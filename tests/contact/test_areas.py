@@ -290,3 +290,38 @@ def test_a_plane_that_tilts_sees_less_of_a_face():
     contact.surface.rotation = (0, 0.3, 0)
     problem.solve()
     assert COMM.allreduce(contact.area.sum()) == pytest.approx(before * np.cos(0.3), rel=1e-9)
+
+
+def test_areas_turn_with_the_body():
+    """A rubber block and its plane turned together by a right angle: areas, pressures and worn depths are those of before."""
+    body = mesh.create_rectangle(COMM, [[0, 0], [1, 1]], [3, 2], mesh.CellType.quadrilateral)
+    V = functionspace(body, ("Lagrange", 1, (2,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    log = ufl.ln(ufl.det(ufl.Identity(2) + ufl.grad(u)))
+    G = ufl.Identity(2) + ufl.grad(u)
+    energy = 100 * (ufl.tr(G.T * G) - 2 - 2 * log) + 100 * log**2
+    head, foot = (boundary(body, lambda x, at=at: np.isclose(x[1], at)) for at in (1, 0))
+    way = fem.Function(V)
+    bc = fem.dirichletbc(way, fem.locate_dofs_topological(V, 1, head))
+    plane = dc.RigidPlane((0, 0), (0, 1))
+    contact = dc.Contact(V, foot, plane, dc.Friction(0.3), wear=dc.Wear(1e-4, explicit=True))
+    problem = dc.ContactProblem(ufl.derivative(energy * ufl.dx, u, v), u, [contact], bcs=[bc])
+    x = V.tabulate_dof_coordinates()[:, :2]
+
+    def put(angle, slid):
+        c, s = np.cos(angle), np.sin(angle)
+        plane.rotation = angle
+        way.x.array[:] = ((x + (slid, -0.02)) @ np.array([[c, s], [-s, c]]) - x).ravel()
+        problem.solve()
+
+    put(0.0, 0.0)
+    put(0.0, 0.1)
+    pressure = contact.pressure.copy()
+    for angle in np.linspace(0.0, np.pi / 2, 7)[1:]:
+        put(angle, 0.1)
+    assert COMM.allreduce(contact.area.sum()) == pytest.approx(1.0, rel=1e-9)
+    assert contact.pressure == pytest.approx(pressure, rel=5e-3)
+    worn, work = contact.wear_depth.copy(), contact.dissipation.copy()
+    put(np.pi / 2, 0.2)
+    area = contact.area
+    assert contact.wear_depth - worn == pytest.approx(1e-4 * (contact.dissipation - work) / area)
