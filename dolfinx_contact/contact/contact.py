@@ -575,18 +575,11 @@ class Contact(Guarded):
 
     def advance(self) -> None:
         """Accept the present state as the last converged one, from which the next slip counts."""
-        before, slipped = self.last.reaction, self.last.status == int(Status.SLIP)
-        law, law_before = self.friction, self.law_before
+        before, law = self.last.reaction, self.friction
         slip = self.slip_kept + self.slip_increment
         sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
-        begun = self._laws.begun
-        if begun is None:
-            work = work_of_friction(law, before, slipped, self.reaction, slip, law_before)
-        else:  # forces before the step with the law at its beginning
-            none = np.zeros_like(before)
-            work = work_of_friction(begun, before, slipped, none, slip, law_before)
-            work += work_of_friction(law, none, slipped, self.reaction, slip)
+        work = sum(self._works(slip, self.reaction))
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(slip, axis=1)
         work, path = self.repeats * work, self.repeats * path
@@ -618,22 +611,37 @@ class Contact(Guarded):
         """Let the step at hand wear by so much, ``shape=(n,)``, length."""
         self._wearing = frozen(depth)
 
-    def wear_compliance(self, state: State) -> np.ndarray:
-        """Depth that the slip of a state wears per normal force, ``shape=(n,)``, length per force; none of nodes that stick."""
-        slip = self.slip_kept + state.slip_increment
-        slips = state.status != int(Status.STICK)
-        none, unit = np.zeros_like(self.reaction), np.zeros_like(self.reaction)
-        unit[:, -1] = 2.0 * self.repeats * slips  # the work has half of the force at the end
-        work = work_of_friction(self.friction, none, slips, unit, slip)
-        if not self.wear.threshold:
-            return self._depth(work)
-        force = np.maximum(state.reaction[:, -1:], 0.0)
-        begun = self._begun(force * work)
-        return begun * self.wear.depth(work, self.area, self._wear_field)
+    def wear_rates(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Depth that the slip of a state wears under the force at the start of the step, and that per normal force at its end; none of nodes that stick.
+
+        Returns:
+            Length, and length per force, ``shape=(n,)`` each.
+        """
+        slips = (state.status != int(Status.STICK))[:, None]
+        slip = slips * (self.slip_kept + state.slip_increment)
+        unit = np.zeros_like(self.reaction)
+        unit[:, -1] = 1.0
+        start, end = (2.0 * self.repeats * work for work in self._works(slip, unit))  # a half each
+        begun = 1.0
+        if self.wear.threshold:
+            force = np.maximum(state.reaction[:, -1:], 0.0)
+            begun = self._begun(0.5 * (start + force * end))
+        return begun * self._rate(start), begun * self._rate(end)
+
+    def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shares of the frictional work of a step that the forces at its start and at its end have, ``shape=(n, gdim - 1)`` each."""
+        none, before = np.zeros_like(reaction), self.last.reaction
+        slipped = self.last.status == int(Status.SLIP)
+        law = self.friction if self._laws.begun is None else self._laws.begun
+        start = work_of_friction(law, before, slipped, none, slip, self.law_before)
+        return start, work_of_friction(self.friction, none, slipped, reaction, slip)
+
+    def _rate(self, work: np.ndarray) -> np.ndarray:
+        return self.wear.depth(work, self.area, self._wear_field)
 
     def _depth(self, work: np.ndarray) -> np.ndarray:
         """Depth that the work of a step wears, ``shape=(n,)``."""
-        depth = self.wear.depth(work, self.area, self._wear_field)
+        depth = self._rate(work)
         return depth * self._begun(work) if self.wear.threshold else depth
 
     def _begun(self, work: np.ndarray) -> np.ndarray:

@@ -18,13 +18,14 @@ class Wear(Guarded):
     w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
     hardness H [J.  F.  Archard, J.  Appl.  Phys. 24 (1953) 981].
 
-    Wear is integrated implicitly, by backward Euler: the depth worn in a step is part of its equations, and the work is the slip
-    times the force at its end.  So a node is never worn below contact, whatever the coefficient.  The step is solved again until
-    depths are off by at most a tenth of ``geometry_tol`` of the reactions; once is enough for gentle wear.
+    The depth worn in a step is part of its equations, so that a node is never worn below contact, whatever the coefficient.  The
+    work is that of ``contact.dissipation``, with the mean of the forces at both ends of the step, as long as it takes less than a fiftieth of
+    its force from a node; beyond that the force at the end counts more, and at last alone (backward Euler).  The step is solved
+    again until depths are off by at most a tenth of ``geometry_tol`` of the reactions; once is enough for gentle wear.
 
-    Explicit wear opens the gap of the next step, and its work is that of ``contact.dissipation``, with the mean of the forces at
-    both ends.  If the depth worn in a step, times the node's stiffness, then exceeds the node's reaction, the step is too large:
-    a warning says into how many steps to divide it.
+    Explicit wear opens the gap of the next step, and the work is always that of ``contact.dissipation``.  If the depth worn in a
+    step, times the node's stiffness, then exceeds the node's reaction, the step is too large: a warning says into how many steps
+    to divide it.
 
     Args:
         coefficient: k, a number, or a pair for the two friction directions; volume per work, the inverse of a stress, >= 0.  Or a field:

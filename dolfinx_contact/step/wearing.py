@@ -1,16 +1,18 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Depth that a step wears, by the pressure at its end: part of the step's equations.
+"""Depth that a step wears, as part of its equations.
 
-A node that slips by ``s`` wears by ``d = c r_n``, ``c = k m s / A``, with m friction per normal force, k the wear coefficient and A the
-area: for given slip a spring of compliance c in series with the surface.  The step is solved for given depths ``d``, and others
-follow from what is found.  With a stiffness ``kappa`` a node at another depth ``d'`` has the force ``r_n - kappa (d' - d)``, an
-open one ``-kappa x_n - kappa (d' - d)``; so
+A node that slips by ``s`` wears by ``d = (1 - theta) c0 N0 + theta c r_n``, with the normal forces N0 at the start of the step and r_n at its end, and
+``c = k m s / A``, friction m per normal force, wear coefficient k, area A.  With ``theta = 1/2`` the volume is k times the frictional
+work (``law/dissipation.py``); that is taken where wear is gentle.  Where ``c kappa``, with a stiffness ``kappa`` of the node, is
+large, ``1 - theta = START / (c kappa)``: what is worn under the force at the start takes at most the part START of it from the node, and
+the step is one of backward Euler, which does not alternate.
 
-    d' = c max(r_n - kappa max(x_n, 0) + kappa d, 0) / (1 + c kappa),
-
-which is neither negative nor more than unloads the node, whatever ``c`` is.  Nodes move each other, which Anderson's method learns;
-``kappa`` is twice the node's own stiffness, so that neighbours that give way together do not overshoot.
+For given slip the second term is a spring in series with the surface.  The step is solved for given depths ``d``, and others follow
+from what is found: a node at another depth ``d'`` has the force ``r_n - kappa (d' - d)``, an open one
+``-kappa x_n - kappa (d' - d)``, none below zero.  The ``d'`` that this gives neither unloads the node nor is negative, whatever
+``c`` is.  Nodes move each other, which Anderson's method learns; ``kappa`` is twice the node's own stiffness, so that neighbours
+that give way together do not overshoot.
 """
 
 from __future__ import annotations
@@ -32,8 +34,12 @@ STIFF = 2.0
 # Differences that Anderson's method keeps, and how often depths are mixed at most.
 KEPT, MOST = 20, 200
 
-# What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open and close.
+# What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open, close and stick, and twice
+# as many rounds do without.
 FALL, PATIENCE = 0.7, 10
+
+# Part of its force that what a step wears under the force at its start takes from a node, at most.
+START = 0.01
 
 # Part of ``geometry_tol`` that depths may be off.
 PART = 0.1
@@ -60,8 +66,7 @@ class Wearing:
         self._kappa = STIFF * np.concatenate([of.normal for of in stiffness])
         self._anderson = Anderson(self._kappa.size, KEPT, body.total)
         self._best, self._stale = np.inf, 0
-        guess = [c.wear_compliance(c.last) * c.last.reaction[:, -1] for c in contacts]
-        self._take(np.concatenate(guess))
+        self._take(self._worn("last", [contact.last.reaction[:, -1] for contact in contacts])[0])
 
     def settled(self, scale: float) -> bool:
         """Whether the depths are those that the present state wears; if not, takes others to solve the step with.  Collective.
@@ -69,24 +74,38 @@ class Wearing:
         Args:
             scale: Reactions, see ``LoadStep.carried``.
         """
-        state = [(c.wear_compliance(c.present), c.reaction[:, -1], c.gap) for c in self._contacts]
-        c, force, gap = map(np.concatenate, zip(*state))
         kappa, depth = self._kappa, self._depth
-        pushed = np.maximum(force + kappa * (depth - np.maximum(gap, 0.0)), 0.0)
-        for following in (c * force, c * pushed / (1.0 + c * kappa)):  # the first one is exact
+        forces = [contact.reaction[:, -1] for contact in self._contacts]
+        gap = np.concatenate([contact.gap for contact in self._contacts])
+        exact, start, c = self._worn("present", forces)
+        pushed = np.concatenate(forces) + kappa * (depth - np.maximum(gap, 0.0))
+        implicit = np.maximum((start + c * pushed) / (1.0 + c * kappa), start)
+        for following in (exact, implicit):
             change = kappa * (following - depth)
             off = self._body.norm(change)
             if off <= self._tol * scale:
                 self._take(following)
                 return True
         self._stale += 1
-        if off <= FALL * self._best or self._stale > PATIENCE:
-            if self._stale > PATIENCE:
-                self._anderson.restart()
+        if off <= FALL * self._best:
             self._best, self._stale = off, 0
-        mixed, _ = self._anderson.step(kappa * depth, change)
-        self._take(np.maximum(mixed, 0.0) / kappa)
+        if self._stale < PATIENCE:
+            mixed, _ = self._anderson.step(kappa * depth, change)
+            following = np.maximum(mixed, 0.0) / kappa
+        elif self._stale >= 3 * PATIENCE:  # some rounds without differences are over
+            self._anderson.restart()
+            self._best, self._stale = off, 0
+        self._take(following)
         return False
+
+    def _worn(self, name: str, forces: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+        """Depth that the slip of a state wears under forces at the end, the part of it due to the start, and that per force at the end."""
+        rates = [contact.wear_rates(getattr(contact, name)) for contact in self._contacts]
+        start, c = map(np.concatenate, zip(*rates))
+        z = c * self._kappa
+        share = np.minimum(0.5, np.divide(START, z, np.ones_like(z), where=z > START))
+        start, c = share * start, (1.0 - share) * c
+        return start + c * np.concatenate(forces), start, c
 
     def _take(self, depth: np.ndarray) -> None:
         self._depth, first = depth, 0

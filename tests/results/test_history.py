@@ -128,7 +128,7 @@ def test_without_wear_nothing_is_computed_for_it(monkeypatch):
 def test_wear_of_a_dragged_block_follows_archard():
     """With Archard's K and hardness H: volume = K N s / H for a normal force N and a sliding path s."""
     K, H, mu = 1e-6, 1e3, 0.3
-    scene = scenes.block(mu=mu, p=None, wear=dc.Wear(K / (mu * H), explicit=True))
+    scene = scenes.block(mu=mu, p=None, wear=dc.Wear(K / (mu * H)))
     drag(scene, [1.0])
     c = scene.contact
     before, normal = COMM.allreduce(c.wear_depth @ c.area), c.force()[2]

@@ -56,9 +56,7 @@ def belt(degree=1, side=True, nonlinear=False, solver=None, wear=1e-6, unit=1.0)
     else:
         dofs = fem.locate_dofs_geometrical((V.sub(0), V.sub(0).collapse()[0]), lambda x: x[0] < 9)[0]  # fmt: skip
     plane = dc.RigidPlane((0, 0), (0, 1))
-    contact = dc.Contact(
-        V, foot, plane, dc.Friction(0.3), wear=wear and dc.Wear(wear, explicit=True)
-    )
+    contact = dc.Contact(V, foot, plane, dc.Friction(0.3), wear=wear and dc.Wear(wear))
     bcs = [fem.dirichletbc(push, dofs, V.sub(0))]
     return dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, tol=1e-10), contact, push
 
