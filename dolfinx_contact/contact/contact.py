@@ -818,14 +818,28 @@ class Contact(Guarded):
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
 
-    def moment(self) -> np.ndarray:
+    def moment(self, u: fem.Function | None = None) -> np.ndarray:
         """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
 
         Lever arms are taken in the deformed state, from the present position of the point.  After a step, the moment about free
         axes equals ``surface.moment``.
+
+        Args:
+            u: The displacement, with a deformable surface, which has no point: the moment is about the origin.
+
+        Raises:
+            ValueError: a deformable surface without ``u``, which contacts know relative to the other body alone.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
-        arms = self.arms
+        if not self.surface.deformable:
+            arms = self.arms
+        elif u is None:
+            raise ValueError(
+                "contact.moment on a deformable surface needs the displacement: contact.moment(problem.u)."
+            )
+        else:
+            nodes = self.displacements.dofs(self.nodes)
+            arms = self.x[:, : nodes.shape[1]] + u.x.array[nodes]
         if arms.shape[1] == 2:
             moments = (arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]).sum(axis=0)
         else:

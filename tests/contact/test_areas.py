@@ -269,7 +269,7 @@ def test_a_surface_that_was_turned_into_place_sees_the_same_areas(kind):
             surface = dc.RigidPlane((0, 0, 0), (1, 0, 0) if turned else (0, 0, 1), (0, 1, 0))
             angle = (0, -np.pi / 2, 0)
         else:
-            surface = dc.RigidSphere((0.5, 0.5, -3), 3.0)
+            surface = dc.RigidSphere((0.5, 0.5, -30), 30.0)
             angle = (np.pi, 0, 0)
         if turned:
             surface.rotation = angle

@@ -139,6 +139,17 @@ def test_over_the_edge():
     )
 
 
+def test_the_moment_is_that_of_where_bodies_are():
+    """Of both blocks moved by three times their width the resultant acts in their middle; without a displacement the moment is refused."""
+    scene = blocks("quadrilateral", 1, ((3, 2), (4, 2)), 0.0, sliding="large")
+    scene.way.value[:], scene.foot.value[:] = (3.0, -0.02), (3.0, 0.0)
+    scene.problem.solve()
+    moment = float(np.ravel(scene.contact.moment(scene.problem.u))[0])
+    assert moment == pytest.approx(3.5 * scene.contact.force()[1], rel=1e-6)
+    with pytest.raises(ValueError, match="problem.u"):
+        scene.contact.moment()
+
+
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
 def test_taken_away_and_put_back(swapped):
     """A block that was beside the other one, where its nodes are opposite nothing, presses as one that never left, on which side the unknowns are."""
