@@ -63,7 +63,7 @@ class Wearing:
         tol: float,
     ):
         self._body, self._contacts, self._tol = body, contacts, PART * tol
-        self._kappa = STIFF * np.concatenate([of.normal for of in stiffness])
+        self._kappa = STIFF * _shares(contacts) * np.concatenate([of.normal for of in stiffness])
         self._anderson = Anderson(self._kappa.size, KEPT, body.total)
         self._best, self._stale = np.inf, 0
         self._take(self._worn("last", [contact.last.reaction[:, -1] for contact in contacts])[0])
@@ -112,3 +112,11 @@ class Wearing:
         for contact in self._contacts:
             contact.let_wear(depth[first : first + contact.nodes.size])
             first += contact.nodes.size
+
+
+def _shares(contacts: Sequence[ContactLike]) -> np.ndarray:
+    """Part of its node that each node of each contact has, by area, ``shape=(n,)``: contacts of one face share their common edge.  Collective."""
+    nodes, area = (np.concatenate([getattr(c, name) for c in contacts]) for name in ("nodes", "area"))  # fmt: skip
+    _, at = np.unique(nodes, return_inverse=True)
+    whole = np.bincount(at, area)[at] if nodes.size else area
+    return np.divide(area, whole, np.ones_like(area), where=whole > 0.0)

@@ -12,7 +12,7 @@ ALL = {(name, said): (way, change, tol) for name, said, way, change, tol in pair
 # What has disagreed without a word, and was mended.
 MENDED = [
     ("plane", "stiff springs"), ("circle", "stiff springs"), ("plane, textured surface", "the surface moves"), ("circle", "FixedPoint"),
-    ("plane, mixed", "two contacts of one"),
+    ("plane, mixed", "two contacts of one"), ("ball, worn", "two contacts of one"),
 ]  # fmt: skip
 SAMPLE = [("plane, 2-D", said) for name, said in ALL if name == "plane, 2-D"]
 
