@@ -297,23 +297,25 @@ def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
     if not contacts or contacts[0].points.dim == 3 or all(c.weighted for c in contacts):
         return
     cells = [part.integrand() for part in F.integrals() if part.integral_type() == "cell"]
-    if any(_has_radius(integrand) for integrand in cells):
+    which = sorted(k for integrand in cells for k in _radius(integrand))
+    if which:
+        name = ("first", "second", "third")[which[0]]
         warnings.warn(
-            "F is multiplied by the first coordinate, as with axial symmetry, and a contact has no weight: its pressures, worn depths "
+            f"F is multiplied by the {name} coordinate, as with axial symmetry, and a contact has no weight: its pressures, worn depths "
             "and friction that follows the pressure are those of a body of unit thickness. Give dc.Contact(..., weight=2 * ufl.pi * r), "
-            "or whatever F has.",
+            "or whatever F has; the radius must be the first coordinate.",
             stacklevel=3,
         )
 
 
-def _has_radius(integrand: Any) -> bool:
-    """Whether a factor of an integrand is the first coordinate itself."""
+def _radius(integrand: Any) -> list[int]:
+    """Which coordinates themselves are factors of an integrand."""
     factors = [integrand]
     for factor in factors:
         if isinstance(factor, Product):
             factors.extend(factor.ufl_operands)
     of = [f.ufl_operands for f in factors if isinstance(f, Indexed)]
-    return any(isinstance(a, SpatialCoordinate) and int(i[0]) == 0 for a, i in of)
+    return [int(i[0]) for a, i in of if isinstance(a, SpatialCoordinate)]
 
 
 def check_axial(contacts: Sequence[ContactLike]) -> None:

@@ -25,7 +25,7 @@ TYPES = {
     (1, 2, 2): 3, (2, 3, 3): 5, (2, 4, 4): 9, (3, 4, 4): 10, (3, 8, 8): 12, (3, 6, 6): 13,
     (1, 2, 3): 21, (2, 3, 6): 22, (2, 4, 9): 28, (3, 4, 10): 24, (3, 8, 27): 29,
 }  # fmt: skip
-TRIANGLE6 = 22
+LINE3, TRIANGLE6 = 21, 22
 
 # VTK's order of vertices, and the vertices (in that order) in whose middle each further node is.
 SQUARE = (0, 1, 3, 2)
@@ -217,6 +217,8 @@ class SurfaceMesh:
         values["gap"], values["displacement"] = gathered(self._comm, gap, padded(moved))
         if TRIANGLE6 in self._cells:
             recovered(self._x, self._cells[TRIANGLE6], values)
+        if LINE3 in self._cells:
+            recovered_on_axis(self._cells[LINE3], values)
         return Mesh(self._x, self._cells, values, {})
 
     def _placed(self, values: np.ndarray) -> np.ndarray:
@@ -235,6 +237,22 @@ class SurfaceMesh:
             x = contact.displacements.x[self._owned[others], :dim] + moved[others]
             gaps[others] = contact.surface.distances(x)
         return gaps
+
+
+def recovered_on_axis(lines: np.ndarray, values: dict[str, np.ndarray]) -> None:
+    """Give nodes on an axis of symmetry, which carry nothing, the pressure and depth of a parabola with its top there, in place.
+
+    Args:
+        lines: Nodes of second-order edges, ends first, ``shape=(m, 3)``.
+        values: By name; ``contact_node`` says which nodes stay as they are.
+    """
+    free = values["contact_node"] == 0
+    for first, other, middle in np.concatenate((lines, lines[:, [1, 0, 2]])):
+        if free[first] and not (free[other] or free[middle]):
+            for name in ("pressure", "wear_depth"):
+                top = (4.0 * values[name][middle] - values[name][other]) / 3.0
+                values[name][first] = max(top, 0.0)
+            values["status"][first] = values["status"][middle]
 
 
 def recovered(x: np.ndarray, triangles: np.ndarray, values: dict[str, np.ndarray]) -> None:

@@ -327,3 +327,27 @@ def test_areas_turn_with_the_body():
     put(np.pi / 2, 0.2)
     area = contact.area
     assert contact.wear_depth - worn == pytest.approx(1e-4 * (contact.dissipation - work) / area)
+
+
+def test_the_axis_has_the_pressure_of_its_neighbours():
+    """A cylinder of second order squeezed evenly: in a profile from the axis outwards the pressure is even, though the axis is no contact node."""
+    body = mesh.create_rectangle(COMM, [[0, 0], [10, 10]], [5, 5], mesh.CellType.quadrilateral)
+    V = functionspace(body, ("Lagrange", 2, (2,)))
+    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(body)[0]
+
+    def strain(w):
+        g = ufl.sym(ufl.grad(w))
+        return ufl.as_tensor([[g[0, 0], g[0, 1], 0], [g[0, 1], g[1, 1], 0], [0, 0, w[0] / r]])
+
+    F = 1000 * ufl.inner(strain(u), strain(v)) * 2 * np.pi * r * ufl.dx
+    foot, head, axis = (boundary(body, lambda x, i=i, at=at: np.isclose(x[i], at)) for i, at in ((1, 0), (1, 10), (0, 0)))  # fmt: skip
+    bcs = [
+        fem.dirichletbc(value, fem.locate_dofs_topological(V.sub(i), 1, facets), V.sub(i))
+        for i, facets, value in ((1, head, -0.01), (0, axis, 0.0))
+    ]
+    plane = dc.RigidPlane((0, 0), (0, 1))
+    contact = dc.Contact(V, foot, plane, dc.Friction(0.0), weight=2 * np.pi * r)
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
+    problem.solve()
+    line = np.column_stack((np.linspace(0, 10, 21), np.zeros(21)))
+    assert dc.profile(problem, line)["pressure"] == pytest.approx(1.0, rel=1e-8)
