@@ -14,11 +14,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
+from dolfinx_contact.contact.fields import turn_of_nodes
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
 from dolfinx_contact.contact.mortar import BY_FACET, Rows, Side, rows_of
 from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
@@ -28,8 +30,6 @@ from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
-    from mpi4py import MPI
-
     from dolfinx_contact.contact.displacements import Displacements
     from dolfinx_contact.solvers.protocols import ContactLike
 
@@ -71,14 +71,14 @@ class MortarPlacement(Placement):
         if self._projected[0] is u:
             return self._projected[1]
         compat.free_garbage(self._comm)  # rows of earlier steps
-        slaves, _ = self._slave.moved(u)
+        slaves, moved = self._slave.moved(u)
         masters, there = self._master.moved(u)
         mine = [side.some(near) for side, near in zip(slaves, self._near)]
         with raised_together(self._comm):
             rows = _sorted_rows(mine, masters, self._mine)
             rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, _mean_normals(mine, self._mine))
-            frames = frames_along(normals, self.surface.axis)
+            frames = frames_along(normals, self._axis(moved))
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
@@ -90,6 +90,13 @@ class MortarPlacement(Placement):
         found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
         self._projected = u, found
         return found
+
+    def _axis(self, moved: np.ndarray) -> np.ndarray | None:
+        """The axis turned with the slave's facets as a whole, whose nodes are at ``moved``, ``shape=(m, gdim)``."""
+        axis = self.surface.axis
+        if axis is None:
+            return None
+        return turn_of_nodes(self._slave.x, moved, MPI.COMM_SELF) @ axis  # all ranks know all nodes
 
     def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
         """See ``Placement``; rows stay as they are at the start of a step, and are renewed within it."""

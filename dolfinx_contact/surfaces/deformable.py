@@ -29,8 +29,8 @@ class DeformableSurface(Surface):
     Args:
         V: The space of displacements, that of the contact.
         facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
-        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node;
-            needed unless friction is isotropic or bodies two-dimensional.
+        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node; it
+            is the slave's, and turns with its facets as a whole; needed unless friction is isotropic or bodies two-dimensional.
         sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end; "small" pairs them once,
             in the undeformed state, which saves time as long as nothing slides farther than a part of a facet.
 

@@ -349,3 +349,39 @@ def test_a_body_that_is_tipped():
         with warnings.catch_warnings(record=True):
             warnings.simplefilter("always")
             assert scene.problem.solve().geometry_error <= 1e-3
+
+
+def test_a_texture_turns_with_both_bodies():
+    """Rubber blocks turned together by a right angle, then slid along what were the grooves: friction is that along the grooves."""
+    domain, top, bottom, upper, lower, above = pair(
+        "hexahedron", ((2, 2, 1), (3, 3, 1)), (1.0, 2.0)
+    )
+    V = functionspace(domain, ("Lagrange", 1, (3,)))
+    u, way = fem.Function(V), fem.Function(V)
+    G = ufl.Identity(3) + ufl.grad(u)
+    log = ufl.ln(ufl.det(G))
+    energy = 50 * (ufl.tr(G.T * G) - 3 - 2 * log) + 50 * log**2
+    F = ufl.derivative(energy * ufl.dx(metadata={"quadrature_degree": 2}), u, ufl.TestFunction(V))
+    ends = np.concatenate((top, bottom))
+    bc = fem.dirichletbc(way, fem.locate_dofs_topological(V, 2, ends))
+    surface = dc.DeformableSurface(V, lower, axis=(1, 0, 0))
+    contact = dc.Contact(V, upper, surface, dc.Friction((0.3, 0.1)))
+    problem = dc.ContactProblem(F, u, [contact], bcs=[bc])
+    x = V.tabulate_dof_coordinates()
+    middle = np.array([1.0, 1.0, 0.0])
+
+    def put(angle, slid):
+        turn = np.array(
+            [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+        )
+        moved = x - middle + np.where(x[:, 2:] > 0.5, [slid, 0.0, -0.05], 0.0)
+        way.x.array[:] = (moved @ turn - x + middle).ravel()
+        problem.solve()
+        return turn @ contact.force()
+
+    for angle in np.linspace(0.0, np.pi / 2, 5):
+        put(angle, 0.0)
+    for slid in (0.1, 0.3):
+        force = put(np.pi / 2, slid)
+    assert abs(force[0]) == pytest.approx(0.3 * abs(force[2]), rel=0.06)
+    assert abs(force[1]) < 0.03 * abs(force[2])
