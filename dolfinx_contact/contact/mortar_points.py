@@ -55,7 +55,10 @@ class MortarPlacement(Placement):
         self._mine = np.searchsorted(self._slave.numbers, numbers)
         self._near = [np.isin(side.nodes, self._mine).any(axis=1) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
-        self._projected: tuple = (None, None)  # a displacement, and what was placed for it
+        self._projected: tuple = (
+            None,
+            None,
+        )  # a displacement with the nodes that have left, and what was placed for it
         self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
         self._owned = owned
         super().__init__(
@@ -68,8 +71,9 @@ class MortarPlacement(Placement):
 
     def placed(self, u: np.ndarray) -> Placed:
         """Frames, gaps and rows of the state with a displacement of owned degrees of freedom.  Collective."""
-        if self._projected[0] is u:
-            return self._projected[1]
+        (known, found), key = self._projected, np.append(u, self._left)
+        if self._comm.allreduce(known is not None and np.array_equal(known, key), op=MPI.LAND):
+            return found
         compat.free_garbage(self._comm)  # rows of earlier steps
         slaves, moved = self._slave.moved(u)
         masters, there = self._master.moved(u)
@@ -88,7 +92,7 @@ class MortarPlacement(Placement):
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
         found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
-        self._projected = u, found
+        self._projected = key, found
         return found
 
     def _axis(self, moved: np.ndarray) -> np.ndarray | None:
