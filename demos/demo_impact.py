@@ -105,7 +105,9 @@ class Block:
         u[:], last[:] = here, here
         tangential, normal = np.split(self.contact.reaction, [-1], axis=1)
         landing = COMM.allreduce((normal[:, 0] * gap).sum())
-        friction = -COMM.allreduce((tangential * self.contact.slip_increment).sum())
+        # In implicit Euler a force acts all along its step; slip counts from the landing on.
+        way = moved.reshape(-1, 2)[self.contact.nodes] @ self.contact.frame[0]
+        friction = -COMM.allreduce((tangential[:, 0] * way).sum())
         return dict(force=self.contact.force(), lost=method + landing + friction, friction=friction)
 
 
