@@ -26,9 +26,8 @@ class FreeState(NamedTuple):
             fixed: Fixed degrees of freedom, which hold boundary values.
             comm: MPI communicator.
         """
-        if comm.allreduce(
-            np.array_equal(b, self.load), op=MPI.LAND
-        ):  # asked again in the same step
+        asked_again = comm.allreduce(np.array_equal(b, self.load), op=MPI.LAND)
+        if asked_again:  # in the same step
             return self.displacement.copy()
         factor = max(comm.allgather(_ratio(b, self.load)))[1]
         sizes = np.abs([b - factor * self.load, b])

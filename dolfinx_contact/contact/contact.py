@@ -579,7 +579,7 @@ class Contact(Guarded):
         slip = self.slip_kept + self.slip_increment
         sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
-        work = sum(self._works(slip, self.reaction))
+        work = self._work(slip)
         touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
         path = touched * np.linalg.norm(slip, axis=1)
         work, path = self.repeats * work, self.repeats * path
@@ -627,6 +627,14 @@ class Contact(Guarded):
             force = np.maximum(state.reaction[:, -1:], 0.0)
             begun = self._begun(0.5 * (start + force * end))
         return begun * self._rate(start), begun * self._rate(end)
+
+    def _work(self, slip: np.ndarray) -> np.ndarray:
+        """Work of friction of the step along each principal direction, for its slip, ``shape=(n, gdim - 1)``."""
+        if self._laws.begun is not None:
+            return sum(self._works(slip, self.reaction))
+        last = self.last
+        slipped = last.status == int(Status.SLIP)
+        return work_of_friction(self.friction, last.reaction, slipped, self.reaction, slip, self.law_before)  # fmt: skip
 
     def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Shares of the frictional work of a step that the forces at its start and at its end have, ``shape=(n, gdim - 1)`` each."""
@@ -838,8 +846,7 @@ class Contact(Guarded):
                 "contact.moment on a deformable surface needs the displacement: contact.moment(problem.u)."
             )
         else:
-            nodes = self.displacements.dofs(self.nodes)
-            arms = self.x[:, : nodes.shape[1]] + u.x.array[nodes]
+            _, arms = self._placement.ended_at(u.x.array)
         if arms.shape[1] == 2:
             moments = (arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]).sum(axis=0)
         else:
@@ -858,10 +865,11 @@ class Contact(Guarded):
         return frozen(self._area * self.covered) if self.surface.deformable else self._area
 
     def _facing_areas(self) -> np.ndarray:
-        flat = not (self.surface.curved or self.surface.deformable)
         x = self.x[:, : self.points.dim]
-        turn, none = fields.turn_of_nodes(x, self.arms, self.comm), np.eye(x.shape[1])
-        if not flat or np.abs(turn - none).max() <= TILTED:
+        turn = none = np.eye(x.shape[1])
+        if not (self.surface.curved or self.surface.deformable):
+            turn = fields.turn_of_nodes(x, self.arms, self.comm)
+        if np.abs(turn - none).max() <= TILTED:
             turn = none
         return fields.facing_areas(self, self._weight, turn)
 
