@@ -132,7 +132,7 @@ def of_finest(options: dict, prefix: str, levels: int) -> dict:
     own = {key[len(FINEST) :]: value for key, value in options.items() if key.startswith(FINEST)}
     of_all = {key: value for key, value in options.items() if key.startswith("mg_levels_")}
     said = any(MULTIGRID.get(key) != value for key, value in of_all.items())
-    if said or any(database.hasName(f"mg_levels_{key}") for key in own):
+    if levels == 1 or said or any(database.hasName(f"mg_levels_{key}") for key in own):
         return {}
     return {f"mg_levels_{levels - 1}_{key}": value for key, value in own.items()}
 
@@ -238,9 +238,9 @@ class LinearSolver:
             self.ksp.setFromOptions()
             self.ksp.setUp()  # reads the options of the levels, which must still be there
         pc = self.ksp.getPC()
-        if pc.getType() != "gamg" or pc.getMGLevels() == 1:
+        finest = of_finest(options, prefix, pc.getMGLevels()) if pc.getType() == "gamg" else {}
+        if not finest:
             return unread
-        finest = of_finest(options, prefix, pc.getMGLevels())
         with options_given(prefix, finest) as of_smoother:
             smoother = pc.getMGSmoother(pc.getMGLevels() - 1)
             smoother.setFromOptions()
@@ -249,9 +249,8 @@ class LinearSolver:
 
     def of_levels(self) -> dict:
         """Options by which smoothers like these are made, the finest level's by its number."""
-        levels = self.ksp.getPC().getMGLevels()
-        finest = of_finest(self._options, self.ksp.getOptionsPrefix(), levels) if levels > 1 else {}
-        return without_finest(self._options) | finest
+        prefix, levels = self.ksp.getOptionsPrefix(), self.ksp.getPC().getMGLevels()
+        return without_finest(self._options) | of_finest(self._options, prefix, levels)
 
     def destroy(self) -> None:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""

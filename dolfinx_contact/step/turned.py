@@ -131,6 +131,5 @@ def _left(body: BodyLike, rows: np.ndarray) -> np.ndarray:
 
 def _turning(arms: np.ndarray) -> np.ndarray:
     """Velocities of arms in rotations about each axis, ``shape=(n, gdim, 3)``, in 2-D ``(n, 2, 1)``."""
-    if arms.shape[1] == 2:
-        return np.column_stack((-arms[:, 1], arms[:, 0]))[:, :, None]
-    return np.stack([np.cross(axis, arms) for axis in np.eye(3)], axis=2)
+    axes = np.eye(1 if arms.shape[1] == 2 else 3)
+    return np.stack([cross(axis, arms) for axis in axes], axis=2)

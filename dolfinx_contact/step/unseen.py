@@ -267,8 +267,7 @@ def _check_strayed(contact: ContactLike) -> bool:
 def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
     """Warn of a wavy face that is steep where nodes press on it, whose reactions are along the plane's normal; whether it is.  Collective."""
     step, force = ALONG * body.extent, contact.reaction[:, -1]
-    dofs = contact.displacements.dofs(contact.nodes)
-    x, squares = contact.x[:, : dofs.shape[1]] + u[dofs], np.zeros(len(force))
+    (_, x), squares = contact.placement.ended_at(u), np.zeros(len(force))
     with raised_together(contact.comm):
         for along in contact.frame[:-1]:
             ends = [contact.surface.distances(x + side * step * along) for side in (1.0, -1.0)]
