@@ -66,8 +66,13 @@ def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
     return points() if callable(points) else points
 
 
-def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int = 3) -> Any:
-    """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10)."""
+def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int | None = None) -> Any:
+    """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10).
+
+    Without ``gdim`` vectors have as many components as the model has dimensions; DOLFINx's own function makes it three then.
+    """
+    if gdim is None:
+        gdim = comm.bcast(model.getDimension() if comm.rank == rank else None, root=rank)
     try:
         from dolfinx.io import gmsh
     except ImportError:

@@ -10,13 +10,13 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ufl.classes import Indexed, Product, SpatialCoordinate
+from ufl.classes import Indexed, Product, ScalarValue, SpatialCoordinate, Sum
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
-from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import agree, from_first, raised_together
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def checked_options(name: str, options: Any) -> dict | None:
     return options
 
 
-def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3) -> None:
+def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3, told: float = 0) -> None:
     """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
 
     Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
@@ -178,6 +178,7 @@ def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3) -> Non
         contacts: The contacts.
         body: The body.
         level: Of the caller in whose name is warned.
+        told: Number of nodes left out of which a warning has told before.
     """
     left_out = [np.zeros((0, 3))]
     for contact in contacts:
@@ -192,13 +193,14 @@ def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3) -> Non
     if len(where) == 0:
         return
     ends = np.array([where.min(axis=0), where.max(axis=0)])
-    ends[np.abs(ends) < 1e-12 * np.abs(ends).max()] = 0.0
-    low, high = (f"({', '.join(f'{x:.6g}' for x in end)})" for end in ends)
+    low, high = place(ends, 0), place(ends, 1)
     if len(where) == nodes:
         raise ValueError(
             f"the normal displacement of all {nodes} contact nodes, from {low} to {high}, is fixed by boundary "
             "conditions: contact and conditions contradict each other, take the facets out of one."
         )
+    if len(where) <= told:
+        return
     warnings.warn(
         f"{len(where)} of {nodes} contact nodes, between {low} and {high}, are left out: boundary conditions give "
         "their displacement along the normal, so that they cannot touch. Take their facets out of the contact, or "
@@ -222,9 +224,7 @@ def support(body: BodyLike, contacts: Sequence[ContactLike], bcs: Any) -> None:
         hold(contacts, body, level=5)  # who assigned them
     except Exception:
         body.support(before)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of what was said when these were given
-            hold(contacts, body)
+        hold(contacts, body, told=np.inf)
         raise
 
 
@@ -238,7 +238,7 @@ def _held_directions(contact: ContactLike, fixed: np.ndarray) -> tuple:
     if partly[:, -1].any():
         node = np.argmax(partly[:, -1])
         raise ValueError(
-            f"the contact node at {contact.x[node].tolist()} is held by a boundary condition along a direction that is "
+            f"the contact node at {place(contact.x, node)} is held by a boundary condition along a direction that is "
             "oblique to the plane: what the node still can do is neither sliding nor lifting off. Hold it along the plane, or "
             "take it out of the condition."
         )
@@ -267,7 +267,8 @@ def follow(
             contact.follow(u, start)
     changed = [c for c, points in zip(contacts, known) if c.points is not points]
     if changed:
-        hold(changed, body)
+        closed = [points.closed.sum() for c, points in zip(contacts, known) if c in changed]
+        hold(changed, body, told=body.comm.allreduce(int(sum(closed))))
     known[:] = [contact.points for contact in contacts]
     return bool(changed)
 
@@ -293,29 +294,57 @@ def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
 
 
 def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
-    """Warn of a volume form that is multiplied by the radius while contacts have no weight: areas are those of plane strain."""
-    if not contacts or contacts[0].points.dim == 3 or all(c.weighted for c in contacts):
+    """Warn of a volume form that is multiplied by the radius while contacts have no weight, or one without its 2 pi.  Collective."""
+    if not contacts or contacts[0].points.dim == 3:
         return
     cells = [part.integrand() for part in F.integrals() if part.integral_type() == "cell"]
-    which = sorted(k for integrand in cells for k in _radius(integrand))
-    if which:
-        name = ("first", "second", "third")[which[0]]
+    found = [_radius(term) for integrand in cells for term in _terms(integrand)]
+    which = sorted((k, factor) for k, factor in found if k is not None)
+    if not which:
+        return
+    if not all(contact.weighted for contact in contacts):
+        name = ("first", "second", "third")[which[0][0]]
         warnings.warn(
             f"F is multiplied by the {name} coordinate, as with axial symmetry, and a contact has no weight: its pressures, worn depths "
             "and friction that follows the pressure are those of a body of unit thickness. Give dc.Contact(..., weight=2 * ufl.pi * r), "
             "or whatever F has; the radius must be the first coordinate.",
             stacklevel=3,
         )
+    for contact in contacts:
+        if not (contact.weighted and contact.axial):
+            continue
+        x, weight = contact.displacements.x[:, 0], contact.density
+        far = int(
+            np.argmax(x)
+        )  # moduli may be among the factors of F, but hardly make exactly 2 pi
+        turns = [factor * x[far] / weight[far] for _, factor in which]
+        if np.isclose(turns, 2 * np.pi, rtol=1e-9).any() or np.isclose(turns, 0.5 / np.pi, rtol=1e-9).any():  # fmt: skip
+            warnings.warn(
+                "F and the weight of a contact are multiplied by the radius, but only one of them by 2 pi: pressures and worn depths are "
+                "wrong by this factor. Give dc.Contact(..., weight=...) the factor that F has.",
+                stacklevel=3,
+            )
 
 
-def _radius(integrand: Any) -> list[int]:
-    """Which coordinates themselves are factors of an integrand."""
-    factors = [integrand]
+def _terms(integrand: Any) -> list[Any]:
+    """The terms of a sum."""
+    terms = [integrand]
+    for term in terms:
+        if isinstance(term, Sum):
+            terms.extend(term.ufl_operands)
+    return terms
+
+
+def _radius(term: Any) -> tuple[int | None, float]:
+    """Which coordinate itself is a factor of a term, None if none is; the size of its numbers."""
+    factors = [term]
     for factor in factors:
         if isinstance(factor, Product):
             factors.extend(factor.ufl_operands)
     of = [f.ufl_operands for f in factors if isinstance(f, Indexed)]
-    return [int(i[0]) for a, i in of if isinstance(a, SpatialCoordinate)]
+    which = [int(i[0]) for a, i in of if isinstance(a, SpatialCoordinate)]
+    size = np.prod([abs(float(f)) for f in factors if isinstance(f, ScalarValue)])
+    return min(which, default=None), float(size)
 
 
 def check_axial(contacts: Sequence[ContactLike]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dolfinx_contact.support.checks import place
 from dolfinx_contact.support.collective import from_first, raised_together
 
 if TYPE_CHECKING:
@@ -28,9 +29,8 @@ def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
     diagonal = displacements.rows(diagonal)
     if not (diagonal > 0.0).all():
         node = int(np.argmin(diagonal.min(axis=1)))
-        x = displacements.x[node]
         raise ValueError(
-            f"the stiffness of the node at {x.tolist()} is {diagonal[node].min():g}, which must be positive: check the sign "
+            f"the stiffness of the node at {place(displacements.x, node)} is {diagonal[node].min():g}, which must be positive: check the sign "
             "of F (internal minus external work) and the moduli (0 < E, nu < 0.5)."
         )
 

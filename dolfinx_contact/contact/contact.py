@@ -38,7 +38,7 @@ from dolfinx_contact.law.supported import supported
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
-from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
@@ -471,7 +471,7 @@ class Contact(Guarded):
             if not (stiffness.normal > 0.0).all():
                 node = int(np.argmin(stiffness.normal))
                 raise ValueError(
-                    f"the stiffness of the contact node at {self.x[node].tolist()} along the normal is "
+                    f"the stiffness of the contact node at {place(self.x, node)} along the normal is "
                     f"{stiffness.normal[node]:g}, which must be positive: check the sign of F (internal minus "
                     "external work) and the moduli."
                 )

@@ -14,7 +14,7 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import finite, place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def facing_areas(contact: ContactLike, weight: Any, turn: np.ndarray) -> np.ndar
         if not np.isfinite(found).all() or (found < -ZERO * largest).any():
             node = int(np.argmin(np.nan_to_num(found, nan=-np.inf)))
             raise ValueError(
-                f"the area of the contact node at {contact.x[node].tolist()} is {found[node]:.3g}: weight must be positive "
+                f"the area of the contact node at {place(contact.x, node)} is {found[node]:.3g}: weight must be positive "
                 "on the facets, or zero on an axis."
             )
     found[found <= ZERO * largest] = 0.0
@@ -180,7 +180,7 @@ def contact_nodes(
             node = int(np.argmin(weights))
             raise ValueError(
                 f"V has degree {compat.lagrange_degree(V)}, and the integral of the shape function of the node at "
-                f"{V.tabulate_dof_coordinates()[nodes[node]].tolist()} over the facets is negative: under an even pressure "
+                f"{place(V.tabulate_dof_coordinates(), nodes[node])} over the facets is negative: under an even pressure "
                 "it would have to pull, which contact cannot. Take degree 1 or 2."
             )
     kept = weights > zero

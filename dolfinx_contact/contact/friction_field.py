@@ -14,7 +14,7 @@ from dolfinx import fem
 from dolfinx_contact import compat
 from dolfinx_contact.law.friction import Friction, is_field, rough
 from dolfinx_contact.law.wear import Wear
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import finite, place
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import ContactLike
@@ -159,7 +159,7 @@ def axes_at(
     if not (length > ALONG * full).all():
         node = int(np.argmin(length - ALONG * full))
         raise ValueError(
-            f"axes has no direction along the plane at {contact.x[node].tolist()}: {values[:, node].tolist()}."
+            f"axes has no direction along the plane at {place(contact.x, node)}: {values[:, node].tolist()}."
         )
     return (along / length).T.copy()
 

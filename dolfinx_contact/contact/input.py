@@ -123,7 +123,7 @@ def check_law(
 
 def warn_of_percent(friction: Friction | float) -> None:
     """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
-    largest = friction.mu.max() if friction.mu.ndim == 1 else 0.0  # not per node
+    largest = friction.mu.max(initial=0.0)
     if PERCENT[0] < largest < PERCENT[1]:
         warnings.warn(
             f"a coefficient of friction of {largest:g}: it is force over force, so that 30 % is 0.3 and an angle of 30 degrees is "

@@ -47,8 +47,11 @@ class Laws:
             friction = self._evaluated(contact, field, empty)
         else:
             check_law(contact.surface, friction, contact.V.mesh.geometry.dim)
-            warn_of_percent(friction)
             friction = at_most_rough(friction)
+        if field is None or not followed(
+            field
+        ):  # what follows the pressure may be large without any
+            warn_of_percent(friction)
         self._field, self.begun, self._rested = field, None, None
         self._take(contact, friction)
 

@@ -42,6 +42,8 @@ def draw(seen: Any, picture: str, title: str) -> None:
     looks = {"color": "#d8d8d8"}
     if "colour" in seen:
         looks = {"scalars": seen["colour"], "lighting": False, "scalar_bar_args": bar}
+    if "between" in seen:
+        looks["opacity"] = 0.3
     plotter.add_mesh(grid, show_edges=True, edge_opacity=0.25, **looks)
     size = float(np.clip(PIXELS / np.sqrt(len(seen["nodes"])), SMALLEST, LARGEST))
     for status, (name, colour) in STATUS.items():

@@ -37,7 +37,8 @@ def plot(
 ) -> None:
     """Draw the body, its contact nodes by status, and the rigid surfaces in their present positions.  Collective.
 
-    Needs PyVista, ``pip install pyvista``, and no display.  A body in space is seen from below the contact, through the surface.
+    Needs PyVista, ``pip install pyvista``, and no display.  A body in space is seen from below the contact, through the surface;
+    two bodies in contact are translucent.
 
     Args:
         problem: The ContactProblem.
@@ -95,6 +96,8 @@ def _seen(
 ) -> dict[str, np.ndarray]:
     """What ``draw.py`` draws, arrays by name."""
     seen = {"x": _standing(body, factor), "view": np.zeros(0)}
+    if any(contact.surface.deformable for contact in contacts) and contacts[0].points.dim == 3:
+        seen["between"] = np.ones(1)  # the nodes are between two bodies
     for kind, cells in body.cells.items():
         seen[f"cells{kind}"] = cells
     for values in (body.at_nodes, body.at_cells):

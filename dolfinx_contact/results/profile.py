@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.results.meshes import Mesh, SurfaceMesh
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import finite, place
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ def _nearest(corners: np.ndarray, point: np.ndarray) -> tuple[int, np.ndarray]:
     k = int(away.argmin())
     if away[k] > np.linalg.norm(sides[k], axis=1).max():
         raise ValueError(
-            f"points: {point.tolist()} is {away[k]:.3g} away from the contact surface, farther than a facet is large."
+            f"points: {place(point[None], 0)} is {away[k]:.3g} away from the contact surface, farther than a facet is large. Give points "
+            f"on the undeformed surface; the nearest is {place((weights[k] @ corners[k])[None], 0)}."
         )
     return k, weights[k]
 

@@ -275,7 +275,7 @@ class Statics:
             return False
         self.said = (
             f"In the best state found the loads drive {self._body.loose.words(driven)} by more than friction carries with its "
-            "normal forces"
+            f"normal forces{', of which there are none' if self._unpressed() else ''}"
         )
         return True
 
@@ -292,6 +292,19 @@ class Statics:
         carried = self._body.total([self._pressures() @ (friction - velocity[:, -1])])[0]
         least = ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
         return bool(self.loads @ along - carried > least)
+
+    def _needed(self) -> str:
+        """Whether friction or a normal force is missing where no reaction changes with a motion, in words.  Collective."""
+        if self._unpressed():
+            return (
+                "Friction holds nothing, since no node with friction is pressed: add a normal force"
+            )
+        return "No reaction changes with them: add friction"
+
+    def _unpressed(self) -> bool:
+        """Whether there is friction, but only at nodes that are not pressed.  Collective."""
+        mu, largest = self._mu.max(axis=1, initial=0.0), self._body.largest
+        return largest(mu) > 0.0 >= largest(mu * self._pressures())
 
     def _pressures(self) -> np.ndarray:
         """Present normal reactions of all contacts."""
@@ -349,8 +362,8 @@ class Statics:
             return x
         if choice == "refused":
             raise ValueError(
-                f"{self._body.loose.refusal(motions)} No reaction changes with them: fix them by Dirichlet conditions, add "
-                'friction or a soft spring, or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
+                f"{self._body.loose.refusal(motions)} {self._needed()} or a soft spring, fix them by Dirichlet conditions, "
+                'or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
             )
         Z = self._modes @ motions
         weighed = times_volume(

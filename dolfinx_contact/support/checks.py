@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+# Part of a coordinate, over the largest one, that is rounding of a mesh generator.
+ROUNDING = 1e-12
+
+
 class RoundingWarning(UserWarning):
     """The answer is as accurate as double precision allows, but not to the requested tolerance.
 
@@ -50,6 +54,12 @@ def vector(name: str, value: ArrayLike, size: int | None = None) -> np.ndarray:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, got {value!r}.")
     return array.astype(np.float64)
+
+
+def place(x: np.ndarray, node: int) -> str:
+    """The position of one of some nodes, ``shape=(n, 2 or 3)``, in words: coordinates that are rounding beside theirs are zero."""
+    at = np.where(np.abs(x[node]) < ROUNDING * np.abs(x).max(), 0.0, x[node])
+    return f"({', '.join(f'{c:.6g}' for c in at)})"
 
 
 def number(name: str, value: Any) -> float:

@@ -48,7 +48,7 @@ def ring_mesh(around: int = 16, through: int = 16):
         model.synchronize()
         gmsh.model.addPhysicalGroup(2, surfaces)
         gmsh.model.mesh.generate(2)
-    found = model_to_mesh(gmsh.model, COMM, 0, gdim=2).mesh
+    found = model_to_mesh(gmsh.model, COMM, 0).mesh
     gmsh.finalize()
     return found
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Areas: pressures, worn depths and friction that follows the pressure are those of the surface that touches."""
 
+import warnings
+
 import numpy as np
 import pytest
 import ufl
@@ -146,6 +148,30 @@ def test_areas_without_a_weight_are_warned_of():
         make(*given, **options)
     _, make, given, options = ring(1, "ufl")
     make(*given, **options)
+
+
+def test_a_weight_without_the_2_pi_of_the_form_is_told():
+    """The weight r beside a form times 2 pi r, in a sum or not, and the other way round; silent with a modulus or a thickness before both."""
+    body = mesh.create_rectangle(COMM, [[1, 0], [2, 1]], [2, 2], mesh.CellType.quadrilateral)
+    V = functionspace(body, ("Lagrange", 1, (2,)))
+    u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(body)[0]
+    foot, head = (boundary(body, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1))
+    bc = fem.dirichletbc(np.zeros(2), fem.locate_dofs_topological(V, 1, head), V)
+    energy, turn = ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))), 2 * np.pi
+    for integrand, weight, told in (
+        (energy * 2 * np.pi * r, r, True),
+        (turn * (energy * r - v[1] * r), r, False),  # hidden: nothing is claimed
+        (energy * turn * r - v[1] * turn * r, lambda x: 3 * x[0], False),
+        (energy * turn * r - v[1] * turn * r, r, True),
+        (energy * r, turn * r, True),
+        (210e3 * energy * r, turn * r, False),
+        (energy * turn * r, turn * r, False),
+    ):
+        contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), 0.3, weight=weight)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            dc.ContactProblem(integrand * ufl.dx, u, [contact], bcs=[bc])
+        assert len([w for w in said if "only one of them by 2 pi" in str(w.message)]) == told
 
 
 @pytest.mark.parametrize("wrong", ["turned", "free to turn", "driven along r"])

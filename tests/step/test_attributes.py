@@ -284,6 +284,22 @@ def test_nodes_held_along_the_normal_are_left_out():
         problems[0].solve()
 
 
+def test_nodes_left_out_are_told_once_on_curved_surfaces():
+    """Frames that follow a ball are asked anew in each step what supports hold: what was said is not said again."""
+    scene = scenes.block(cells=(3, 3, 2))
+    side = mesh.locate_entities_boundary(scene.mesh, 2, lambda x: np.isclose(x[0], -0.5))
+    clamp = fem.dirichletbc(np.zeros(3), fem.locate_dofs_topological(scene.V, 2, side), scene.V)
+    ball = dc.RigidSphere((0, 0, -5), 5.0)
+    contact = dc.Contact(scene.V, scene.facets, ball, 0.3)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        problem = dc.ContactProblem(scene.F, scene.u, [contact], bcs=[clamp])
+        for k in range(1, 4):
+            ball.displacement = (0.01 * k, 0, 0.001 * k)
+            problem.solve()
+    assert len([w for w in said if "are left out" in str(w.message)]) == 1
+
+
 def test_a_copied_surface_is_driven_by_itself():
     """Forces and free motions of a copy are its own, and those of the first one stay."""
     first = dc.RigidPlane((0, 0, 0), (0, 0, 1))

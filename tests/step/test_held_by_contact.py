@@ -214,12 +214,14 @@ def integral(of):
 @pytest.mark.parametrize("kind", SOLVERS)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_undetermined_motions_are_refused_or_nearest_to_the_last_state(dim, kind):
-    """Without friction: refused, the motions named; or nearest by volume, as small cells on one side must not draw it
+    """Without friction: refused, the motions and friction named; or nearest by volume, as small cells on one side must not draw it
     there: no part of the change along them; pushed along: refused always."""
     down = np.zeros(dim)
     down[-1] = -1e-3
     scene = Loose(dim, kind, mu=0.0, grade=2.0)
-    with pytest.raises(ValueError, match=f"{2 * dim - 3} rigid motion.*translation along"):
+    with pytest.raises(
+        ValueError, match=f"{2 * dim - 3} rigid motion.*translation along.*add friction"
+    ):
         scene.load(*down)
     assert not scene.u.x.array.any()
     scene.problem.undetermined = "nearest"
@@ -240,9 +242,11 @@ def test_undetermined_motions_are_refused_or_nearest_to_the_last_state(dim, kind
 
 
 def test_a_body_without_load_stays_where_it_is():
-    """No load and nothing pressed: every position is a solution, so it is refused, or the block stays."""
+    """No load and nothing pressed: every position is a solution, so it is refused for want of a normal force, or the block stays."""
     scene = Loose(2)
-    with pytest.raises(ValueError, match="3 rigid motion"):
+    with pytest.raises(
+        ValueError, match="3 rigid motion.*no node with friction is pressed: add a normal"
+    ):
         scene.load(0.0, 0.0)
     scene.problem.undetermined = "nearest"
     assert scene.load(0.0, 0.0).error < 1e-15

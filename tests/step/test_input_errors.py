@@ -283,8 +283,13 @@ def test_friction_in_per_cent_is_told(scene):
         contact = dc.Contact(scene.V, scene.facets, plane(), mu)
     with pytest.warns(UserWarning, match="a coefficient of friction of 30: it is force over force"):
         dc.Contact(scene.V, scene.facets, plane(), dc.Friction((30.0, 0.3)))
-    with pytest.warns(UserWarning, match="a coefficient of friction of 30"):
-        contact.friction = 30
+    rows = np.full((len(contact.nodes), 2), 30.0)
+    for law in (30, dc.Friction(rows), dc.Friction(lambda x: 30 + 0 * x[0])):
+        if len(rows) or law == 30:  # a rank without nodes has no coefficients
+            with pytest.warns(UserWarning, match="a coefficient of friction of 30"):
+                contact.friction = law
+        else:
+            contact.friction = law
 
 
 def test_orthotropic_friction_needs_an_axis(scene):
