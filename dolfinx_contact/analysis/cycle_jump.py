@@ -177,13 +177,13 @@ class _Run:
         self.problem, self._cycle = problem, cycle
         self._accuracy, self._longest = accuracy, longest
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
-        self._area = np.concatenate([contact.area for contact in self._worn])
+        self._area = np.concatenate([area for c in self._worn for area in (c.whole_area, c.opposite_area)])  # fmt: skip
         self.fine = self.coarse = self.present()
         self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST), "table": []}  # fmt: skip
 
     def present(self) -> tuple:
         """Snapshot and depths of the present state."""
-        depths = [contact.wear_depth for contact in self._worn]
+        depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
         return self.problem.snapshot(), np.concatenate(depths)
 
     def show(self) -> None:

@@ -30,7 +30,7 @@ from dolfinx_contact.contact.input import (
 from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.laws import Laws, rows
 from dolfinx_contact.contact.placement import Placement, carried
-from dolfinx_contact.contact.state import KEPT, History, State, Status
+from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
@@ -67,7 +67,7 @@ class Contact(Guarded):
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
         friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.  Coefficients may be given per
             node, ``shape=(n, 2)`` for this rank's n nodes, or as fields, which the contact evaluates at its nodes.
-        wear: Archard's law, whose worn depth opens the gap; None is no wear.
+        wear: Archard's law, whose worn depth opens the gap; None is no wear.  Between two deformable bodies a law for each, see ``Wear``.
         weight: Factor of the surface measure, the one in the forms: ``2 * pi * r`` with axial symmetry, or a thickness.  A
             number, a UFL expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and thus pressures, worn depths
             and pressure-dependent friction; reactions follow from the forms, which contain it.
@@ -108,7 +108,7 @@ class Contact(Guarded):
             check_space(V)
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             check_law(surface, friction, gdim)
-            check_wear(wear)
+            check_wear(wear, surface)
         self.V, self.comm, self.surface = V, mesh.comm, surface
         self.displacements = Displacements(V)
         with raised_together(mesh.comm):
@@ -117,6 +117,7 @@ class Contact(Guarded):
         self.nodes, self.left_out = map(frozen, nodes)
         self.x = frozen(self.displacements.x[self.nodes])
         self._area: np.ndarray | None = None
+        self._opposite_area: np.ndarray | None = None
         self._repeats, self._wearing = 1.0, None
         self._axial: bool | None = None
         self._dragged: np.ndarray | None = None
@@ -198,7 +199,7 @@ class Contact(Guarded):
 
     @wear.setter
     def wear(self, wear: Wear | None) -> None:
-        check_wear(wear)
+        check_wear(wear, self.surface)
         with raised_together(self.comm):
             self._wear_field = wear_on_nodes(self, wear)
         self._laws.wear = wear
@@ -257,7 +258,7 @@ class Contact(Guarded):
     def meet(self, fixed: np.ndarray) -> None:
         """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
         if self._placement.meet(fixed):
-            self._history.last = self._placement.turned(self._settled, self.wear_depth)
+            self._history.last = self._placement.turned(self._settled, self.opening)
             self._history.restore()
             self._settle_here()
 
@@ -398,7 +399,7 @@ class Contact(Guarded):
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
         """
         values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
-        self.take(**self._placement.moved(values, self.last, self.wear_depth))
+        self.take(**self._placement.moved(values, self.last, self.opening))
 
     def may_land(self, u: np.ndarray) -> bool:
         """Whether nodes of this rank are open at the last displacement, and there is friction if they land.
@@ -413,7 +414,7 @@ class Contact(Guarded):
 
     def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
-        slips = self._placement.before_touching(u, self.last, self.wear_depth)
+        slips = self._placement.before_touching(u, self.last, self.opening)
         return np.where(at[:, None], slips, 0.0)
 
     @property
@@ -441,7 +442,7 @@ class Contact(Guarded):
 
     def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Estimate of the rounding in each gap and slip for the displacement moved to last, see ``Placement.motion_rounding``."""
-        return self._placement.motion_rounding(u, self.present, self.last, self.wear_depth)
+        return self._placement.motion_rounding(u, self.present, self.last, self.opening)
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
@@ -569,7 +570,7 @@ class Contact(Guarded):
 
     def _settle_here(self) -> None:
         """The last state of the history is that of the last converged step, in the present frames."""
-        self._placement.settle()
+        self._placement.settle(self._history.sums.get(OPPOSITE))
         self._settled, self._wearing = self._history.last, None
         self._forget_supported()
 
@@ -588,6 +589,11 @@ class Contact(Guarded):
         else:
             depth = np.zeros_like(path) if self.wear is None else self._depth(work)
         self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
+        if self.wear is not None and self.wear.opposite.any():
+            other = depth * self.wear.opposite_share(work, self._wear_field)
+            taken = self._placement.taken(self.whole_area * other, self.opposite_area)
+            self._history.wear_opposite(taken)
+            depth = depth - other
         if self.surface.spin is not None:
             self.take(displacement=self._placement.turned_past(self.displacement))
         self._history.settle(law, work.sum(axis=1), path, depth, kept)
@@ -645,7 +651,7 @@ class Contact(Guarded):
         return start, work_of_friction(self.friction, none, slipped, reaction, slip)
 
     def _rate(self, work: np.ndarray) -> np.ndarray:
-        return self.wear.depth(work, self.area, self._wear_field)
+        return self.wear.depth(work, self.whole_area, self._wear_field)
 
     def _depth(self, work: np.ndarray) -> np.ndarray:
         """Depth that the work of a step wears, ``shape=(n,)``."""
@@ -654,7 +660,7 @@ class Contact(Guarded):
 
     def _begun(self, work: np.ndarray) -> np.ndarray:
         """Part of the work of a step that is above the threshold of wear, ``shape=(n,)``."""
-        return self.wear.part(work.sum(axis=1), self.dissipation, self.area)
+        return self.wear.part(work.sum(axis=1), self.dissipation, self.whole_area)
 
     @property
     def law_before(self) -> Friction | None:
@@ -774,9 +780,24 @@ class Contact(Guarded):
 
     @property
     def wear_depth(self) -> np.ndarray:
-        """Worn depth, ``shape=(n,)``, length; never decreases, zero without ``wear``."""
-        worn = self._history.sums["wear_depth"]
-        return worn if self._wearing is None else worn + self._wearing
+        """Depth worn off the contact's own nodes, ``shape=(n,)``, length; never decreases, zero without ``wear``.  Times ``whole_area`` it is volume."""
+        return self._history.sums["wear_depth"]
+
+    @property
+    def opposite_wear_depth(self) -> np.ndarray:
+        """Depth worn off a deformable surface, at its nodes ``opposite``, ``shape=(k,)``, length.  Times ``opposite_area`` it is volume."""
+        return self._history.sums.get(OPPOSITE, np.zeros(self.opposite.size))
+
+    @property
+    def opening(self) -> np.ndarray:
+        """Depth by which wear opens the gap at each node, ``shape=(n,)``: of both sides, and that of the step at hand."""
+        return self.opening_at(self.points)
+
+    def opening_at(self, points: ContactPoints) -> np.ndarray:
+        """The same with nodes opposite others."""
+        own, other = self.wear_depth, self._placement.opened(points)
+        worn = own if self._wearing is None else own + self._wearing
+        return worn if other is None else worn + other
 
     @property
     def slip_kept(self) -> np.ndarray:
@@ -860,9 +881,34 @@ class Contact(Guarded):
         The integral of the node's shape function times ``weight`` over the facets, projected on the surface; facets facing away
         do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
         """
+        whole = self.whole_area
+        return frozen(whole * self.covered) if self.surface.deformable else whole
+
+    @property
+    def whole_area(self) -> np.ndarray:
+        """The same with what is opposite nothing of a deformable surface, ``shape=(n,)``; worn depth is volume over it."""
         if self._area is None:
             self._area, self._area_of = frozen(self._facing_areas()), self.surface.rotation  # fmt: skip
-        return frozen(self._area * self.covered) if self.surface.deformable else self._area
+        return self._area
+
+    @property
+    def opposite_area(self) -> np.ndarray:
+        """Area of a deformable surface that belongs to its nodes ``opposite``, ``shape=(k,)``.  The first call is collective."""
+        if self._opposite_area is None:
+            V, found = self.displacements.V, np.zeros(0)
+            if self.surface.deformable:
+                every = fields.areas(V, self.surface.facets, weight=self._weight)
+                found = every[V.mesh.geometry.dim * self.opposite]
+            self._opposite_area = frozen(found)
+        return self._opposite_area
+
+    def worn_volume(self) -> tuple[float, float]:
+        """Volume that both sides have lost, the contact's own and the opposite one.  Collective."""
+        own, other = 0.0, 0.0
+        if self.wear is not None:
+            own = float(self.wear_depth @ self.whole_area)
+            other = float(self.opposite_wear_depth @ self.opposite_area)
+        return tuple(self.comm.allreduce(np.array([own, other])).tolist())
 
     def _facing_areas(self) -> np.ndarray:
         x = self.x[:, : self.points.dim]

@@ -142,7 +142,9 @@ class Laws:
                 texture = {"texture": directions(contact, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else np.inf if self.wear.field else self.wear.coefficient
-        parts = (contact.surface.described(), np.broadcast_to(wear, 2))
+        parts = [contact.surface.described(), np.broadcast_to(wear, 2)]
+        if self.wear is not None and self.wear.opposite.any():
+            parts.append(np.broadcast_to(self.wear.opposite, 2))
         return {
             "laws": rows(law, contact.nodes.size),
             "rigid_plane": np.concatenate(parts),

@@ -22,7 +22,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import turn_of_nodes
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
-from dolfinx_contact.contact.mortar import BY_FACET, Rows, Side, rows_of
+from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, rows_of
 from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
@@ -148,7 +148,40 @@ class MortarPlacement(Placement):
         there.points.add_forces(reaction, forces)
         now.points.add_forces(-state.reaction, forces)
         gap = there.flat + there.points.motion(u)[:, -1]
-        return Ended(gap, missed[:, :-1], forces, there.home, there.frame, there.points.alone)
+        return Ended(
+            gap, missed[:, :-1], forces, there.home, there.frame, there.points.alone, there.points
+        )
+
+    def settle(self, worn: np.ndarray | None = None) -> None:
+        """See ``Placement``.  Collective where the other side is worn."""
+        super().settle()
+        self._worn = None if worn is None else self._master.everywhere(worn[:, None])[:, 0]
+
+    def opened(self, points: MortarPoints) -> np.ndarray | None:
+        """See ``Placement``."""
+        return None if self._worn is None else points.m @ self._worn
+
+    def taken(self, volume: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """See ``Placement``: node b loses ``sum_a m_ab V_a``, but no negative volume, the sum as it is.  Collective.
+
+        Vertices of triangles of second order, which have no area, are worn as the nodes beside them.
+
+        Args:
+            volume: ``V_a``.
+            area: Of this rank's nodes of the other side, ``shape=(k,)``.
+        """
+        volumes, area = self._comm.allreduce(self.now.points.m.T @ volume), self._master.everywhere(area[:, None])[:, 0]  # fmt: skip
+        bears = area > NOTHING * area.max(initial=0.0)
+        kept = np.where(bears, np.maximum(volumes, 0.0), 0.0)
+        if kept.any():
+            kept *= volumes.sum() / kept.sum()
+        depth = np.divide(kept, area, out=np.zeros_like(area), where=bears)
+        sums = np.zeros((2, area.size))
+        for side in self._master.sides:
+            some = bears[side.nodes]
+            mean = (depth[side.nodes] * some).sum(axis=1) / np.maximum(some.sum(axis=1), 1)
+            np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
+        return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
     @property
     def changes(self) -> bool:
@@ -211,6 +244,7 @@ class Ended(NamedTuple):
     home: np.ndarray  # where on the undeformed surface nodes are, (n, gdim)
     frame: np.ndarray  # (n, gdim, gdim)
     alone: np.ndarray  # opposite nothing, (n,)
+    points: MortarPoints
 
 
 class Skin:
@@ -225,6 +259,7 @@ class Skin:
     Attributes:
         sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
+        mine: Their numbers here.
         smallest: The shortest edge of a facet.
         size: Length of edges at each node, mean of its facets, ``shape=(m,)``.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
@@ -254,9 +289,10 @@ class Skin:
         self._own = of.dofs(self.nodes)
         given = comm.allgather(_numbers(index_map, self.nodes))
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
-        self.dofs = self._everywhere(of.owned[1] + self._own)
+        self.mine = np.searchsorted(self.numbers, given[comm.rank])
+        self.dofs = self.everywhere(of.owned[1] + self._own)
 
-    def _everywhere(self, rows: np.ndarray) -> np.ndarray:
+    def everywhere(self, rows: np.ndarray) -> np.ndarray:
         """Rows of this rank's nodes and of all others'.  Collective."""
         found = np.zeros((self.numbers.size, rows.shape[1]), dtype=rows.dtype)
         found[self._at] = np.concatenate(self._comm.allgather(rows))
@@ -264,7 +300,7 @@ class Skin:
 
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
         """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
-        there = self.x + self._everywhere(u[self._own])
+        there = self.x + self.everywhere(u[self._own])
         return [side.moved(there[side.nodes]) for side in self.sides], there
 
 

@@ -168,9 +168,17 @@ class Placement:
         """Frames are the surface's, whatever supports hold: whether they are others now."""
         return False
 
-    def settle(self) -> None:
-        """These are the frames of the last step that converged."""
+    def settle(self, worn: np.ndarray | None = None) -> None:
+        """These are the frames of the last step that converged; ``worn`` depths of the nodes of a deformable surface, ``shape=(k,)``."""
         self.settled = self.now
+
+    def opened(self, points: ContactPoints) -> np.ndarray | None:
+        """By what wear of a deformable surface has opened gaps, ``shape=(n,)``, length; None is nothing."""
+        return None
+
+    def taken(self, volume: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Depths of the nodes of a deformable surface that have lost the volumes, ``shape=(n,)``, worn off opposite contact nodes."""
+        raise NotImplementedError
 
     def end(self, rotation: np.ndarray | None = None) -> None:
         """The step ends, and its way, where the surface has turned to at present, or to another rotation."""

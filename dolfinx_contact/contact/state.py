@@ -42,6 +42,7 @@ class State(NamedTuple):
 SAVED = State._fields[:-1]  # of a state, in checkpoints
 SUMS = ("dissipation", "slip_path", "wear_depth")
 KEPT = "slip_kept"
+OPPOSITE = "opposite_wear_depth"  # at nodes of a deformable surface that wears
 
 
 class History:
@@ -86,9 +87,13 @@ class History:
     ) -> None:
         """Make the present state the last converged one, and add to the sums what the step did; ``kept`` is the new ``slip_kept``."""
         added = dict(zip(SUMS, (work, path, depth)))
-        self.sums = {name: frozen(self.sums[name] + added[name]) for name in SUMS}
+        self.sums = self.sums | {name: frozen(self.sums[name] + added[name]) for name in SUMS}
         self.sums[KEPT] = frozen(kept)
         self.last, self.settled_by = self.present._replace(known=None), by
+
+    def wear_opposite(self, depth: np.ndarray) -> None:
+        """Add depths that the step wears off a deformable surface, ``shape=(k,)``."""
+        self.sums = self.sums | {OPPOSITE: frozen(self.sums.get(OPPOSITE, 0.0) + depth)}
 
     def kept(self) -> tuple:
         """Last converged state and sums, and the law that was slipped by, for ``go_back``."""
@@ -101,7 +106,8 @@ class History:
 
     def save(self) -> dict[str, np.ndarray]:
         """Last converged state and sums as arrays by name; this rank's nodes."""
-        return {name: getattr(self.last, name) for name in SAVED} | self.sums
+        sums = {name: of for name, of in self.sums.items() if name != OPPOSITE}  # of other nodes
+        return {name: getattr(self.last, name) for name in SAVED} | sums
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size."""
@@ -126,4 +132,6 @@ class History:
         self.replace_last(*(np.array(saved[name]) for name in SAVED))
         none = np.zeros_like(self.last.slip_increment)
         self.sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
+        if OPPOSITE in saved:
+            self.sums[OPPOSITE] = frozen(np.array(saved[OPPOSITE]))
         self.restore()

@@ -33,6 +33,8 @@ class Wear(Guarded):
             space, evaluated at the contact nodes when the contact takes the law.
         explicit: Whether the depth worn in a step opens the gap of the next one only.
         threshold: Frictional work per area that a node takes before it wears, force per length.
+        opposite: Coefficient of the other side, a ``DeformableSurface``, in the same forms but no field.  The gap opens by the depths of both,
+            each of which stays with its own body; a rigid surface does not wear.
 
     Raises:
         ValueError: a coefficient or threshold that is negative, not finite or not real, or more than two coefficients.
@@ -44,30 +46,33 @@ class Wear(Guarded):
 
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
 
-    def __init__(
-        self, coefficient: ArrayLike | Field, *, explicit: bool = False, threshold: float = 0.0
-    ) -> None:
+    def __init__(self, coefficient: ArrayLike | Field, *, explicit: bool = False, threshold: float = 0.0, opposite: ArrayLike = 0.0) -> None:  # fmt: skip
         self.explicit, self.threshold = bool(explicit), number("wear threshold", threshold)
         if self.threshold < 0.0:
             raise ValueError(f"wear threshold must be a number >= 0, got {threshold!r}.")
         self.field = is_field(coefficient)
         self.coefficient = coefficient if self.field else _checked(coefficient)
+        self.opposite = _checked(opposite)
         self._made = True
 
     def depth(
         self, work: np.ndarray, area: np.ndarray, coefficient: np.ndarray | None = None
     ) -> np.ndarray:
-        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``; length.  None where there is no area.
+        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``, of both sides; length.  None where there is no area.
 
         Args:
             work, area: Of the nodes.
             coefficient: Values of a field at the nodes, ``shape=(n, 2)``.
         """
-        k = np.broadcast_to(
-            self.coefficient if coefficient is None else coefficient, (len(work), 2)
-        )
-        volume = (k[:, : work.shape[1]] * work).sum(axis=1)
+        k = self.coefficient if coefficient is None else coefficient
+        volume = _volume(k + self.opposite, work)
         return np.divide(volume, area, out=np.zeros_like(volume), where=area > 0.0)
+
+    def opposite_share(self, work: np.ndarray, coefficient: np.ndarray | None = None) -> np.ndarray:
+        """Part of the depth that ``work`` wears which the other side loses, ``shape=(n,)``; arguments as ``depth`` has them."""
+        k = self.coefficient if coefficient is None else coefficient
+        both, other = _volume(k + self.opposite, work), _volume(self.opposite, work)
+        return np.divide(other, both, out=np.zeros_like(both), where=both > 0.0)
 
     def part(self, work: np.ndarray, before: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Part of the work of a step, beyond ``before``, that is above the threshold; all arrays ``shape=(n,)``."""
@@ -78,7 +83,13 @@ class Wear(Guarded):
         said = "field" if self.field else self.coefficient.tolist()
         options = ", explicit=True" * self.explicit
         options += f", threshold={self.threshold:g}" * (self.threshold > 0.0)
+        options += f", opposite={self.opposite.tolist()}" * bool(self.opposite.any())
         return f"Wear({said}{options})"
+
+
+def _volume(k: np.ndarray, work: np.ndarray) -> np.ndarray:
+    k = np.broadcast_to(k, (len(work), 2))
+    return (k[:, : work.shape[1]] * work).sum(axis=1)
 
 
 def _checked(coefficient: ArrayLike) -> np.ndarray:

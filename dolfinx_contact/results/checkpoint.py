@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import FreeState
+from dolfinx_contact.contact.state import OPPOSITE
 from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.support.numbering import original_cells, original_nodes
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 VERSION = 1
 
 # Ends of the names of arrays that not every history has, and of those that files without a version may lack.
-LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed", "fixed")
+LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed", "_worn", "fixed")
 NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
 
 ANEW = "Take another one, or write it anew with problem.save."
@@ -100,6 +101,9 @@ def _arrays(
         if contacts[k].surface.deformable:
             at = contacts[k].placement.now.at
             mine[f"{k}_placed"] = body.displacements.rows(at)
+            worn = np.zeros(len(mine[f"{k}_placed"]))
+            worn[contacts[k].opposite] = contacts[k].opposite_wear_depth
+            mine[f"{k}_worn"] = worn
     return mine
 
 
@@ -179,6 +183,8 @@ def load(
     for k, saved in enumerate(own):
         if f"{k}_placed" in mine:
             saved["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
+        if f"{k}_worn" in mine:
+            saved[OPPOSITE] = mine[f"{k}_worn"][contacts[k].opposite]
     with raised_together(comm):
         for contact, saved in zip(contacts, own):
             contact.check_saved(saved)
@@ -362,7 +368,7 @@ def _part(
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
         of_body = {"u", "before", "fixed", "load", "free", "rough"}
-        of_body |= {name for name in file if name.endswith("_placed")}
+        of_body |= {name for name in file if name.endswith(("_placed", "_worn"))}
         names = of_body if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]

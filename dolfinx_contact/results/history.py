@@ -119,12 +119,11 @@ class History:
     def _totals(self, contact: ContactLike):
         for axis, force in zip("xyz", contact.force()):
             yield f"force_{axis}", float(force)
-        volume = contact.wear_depth @ contact.area if contact.wear is not None else 0.0
         tangential = np.linalg.norm(contact.reaction[:, :-1], axis=1).sum()
-        sums = np.array([tangential, contact.dissipation.sum(), volume])
+        sums = np.array([tangential, contact.dissipation.sum()])
         self.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
         names = ("tangential_reaction_sum", "dissipation", "worn_volume")
-        yield from zip(names, sums.tolist())
+        yield from zip(names, (*sums.tolist(), sum(contact.worn_volume())))
 
     def _state(self, node: Any):
         contact = self._tracked

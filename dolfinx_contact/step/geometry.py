@@ -103,7 +103,7 @@ def _missed(
     way = placement.way(surface, y, own, distance, contact.settled)
     missed = way - (0.0 if placement.now.way is None else placement.now.way)
     return (
-        _pressed(contact, stiffness, distance, contact.points.closed),
+        _pressed(contact, stiffness, distance + contact.opening, contact.points.closed),
         np.hypot(size * angle, friction * contact.texture_turned(y, own)),
         _dragged(contact, stiffness, missed),
     )
@@ -120,17 +120,21 @@ def _missed_by_rows(
     with raised_together(contact.comm):  # the user's functions
         turned = friction * contact.texture_turned(ended.home, ended.frame)
     return (
-        _pressed(contact, stiffness, ended.gap, contact.points.closed & ~came),
+        _pressed(
+            contact,
+            stiffness,
+            ended.gap + contact.opening_at(ended.points),
+            contact.points.closed & ~came,
+        ),  # fmt: skip
         np.append(ended.forces, turned),
         _dragged(contact, stiffness, ended.slip),
     )
 
 
 def _pressed(
-    contact: ContactLike, stiffness: NodalStiffness, distance: np.ndarray, closed: np.ndarray
+    contact: ContactLike, stiffness: NodalStiffness, exact: np.ndarray, closed: np.ndarray
 ) -> np.ndarray:
-    """Normal forces that distances at the end of a step, ``shape=(n,)``, would make beside the gaps used, but at ``closed`` nodes."""
-    exact = distance + contact.wear_depth
+    """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
     presses = contact.reaction[:, -1] > 0.0
     off = np.where(presses, np.abs(exact - contact.gap), np.maximum(-exact, 0.0))
     off[closed] = 0.0

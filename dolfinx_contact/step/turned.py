@@ -114,7 +114,7 @@ def _moved(
     surface, there = contact.placement.ended_at(u)
     y = surface.relative(there)
     frames = surface.turned(surface.frames(y))
-    return frames @ motions[contact.points.dofs], surface.distance(y) + contact.wear_depth
+    return frames @ motions[contact.points.dofs], surface.distance(y) + contact.opening
 
 
 def _left(body: BodyLike, rows: np.ndarray) -> np.ndarray:
