@@ -181,10 +181,7 @@ def load(
         for prefix in (f"contact{k}_" for k in range(len(contacts)))
     ]
     for k, saved in enumerate(own):
-        if f"{k}_placed" in mine:
-            saved["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
-        if f"{k}_worn" in mine:
-            saved[OPPOSITE] = mine[f"{k}_worn"][contacts[k].opposite]
+        saved |= _of_body(mine, body, k, contacts[k])
     with raised_together(comm):
         for contact, saved in zip(contacts, own):
             contact.check_saved(saved)
@@ -196,6 +193,16 @@ def load(
     if body.displacements.mixed:
         return [_of_cells(body, mine[f"mixed_{name}"]) for name in ("u", "before")], past
     return [mine["u"].ravel(), mine["before"].ravel()], past
+
+
+def _of_body(mine: dict[str, np.ndarray], body: BodyLike, k: int, contact: ContactLike) -> dict:
+    """What a contact with a deformable surface has of other nodes than its own."""
+    found = {}
+    if f"{k}_placed" in mine:
+        found["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
+    if f"{k}_worn" in mine:
+        found[OPPOSITE] = mine[f"{k}_worn"][contact.opposite]
+    return found
 
 
 def _free_state(mine: dict[str, np.ndarray], comm: MPI.Comm) -> FreeState | None:

@@ -71,10 +71,8 @@ def test_a_worn_track_stays_with_its_body():
     for way in ((0.4, 0.1), (1.15, 0.1), (1.15, -1e-4)):
         scene.way.value[:] = way
         scene.problem.solve()
-    assert (
-        largest(contact.opening - contact.wear_depth) == 0.0
-        and largest(contact.opposite_wear_depth) > 0.0
-    )
+    assert largest(contact.opening - contact.wear_depth) <= 1e-6 * largest(own)
+    assert largest(contact.opposite_wear_depth) > 0.1 * largest(own)
 
 
 def test_sides_swapped_lose_the_same():
