@@ -16,7 +16,7 @@
 RANKS = -m "ranks and not slow" $(shell grep -l mark.ranks tests/*/test_*.py)
 CORE = tests/surfaces/test_force.py tests/results/test_history.py tests/solvers/test_multigrid.py \
 	tests/step/test_problem.py
-made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt \
+made_from = tools/setup tools/probe.py pyproject.toml CMakeLists.txt dolfinx_contact/_kernel.pyi \
 	$(wildcard cpp/src/*.cpp cpp/src/*/*.cpp cpp/src/*/*.h cpp/include/dolfinx_contact/*.h \
 	cpp/include/dolfinx_contact/*/*.h)
 

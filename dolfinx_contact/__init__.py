@@ -5,6 +5,7 @@ A name is imported where it is first used: those of arrays, such as ``solve_cond
 """
 
 from ast import ImportFrom, parse
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
@@ -14,7 +15,7 @@ except ImportError:
     pass
 
 try:
-    from dolfinx_contact import _kernel  # noqa: F401
+    from dolfinx_contact import _kernel
 except ImportError as error:
     if error.name != __name__:  # it is there, and cannot be loaded
         raise
@@ -23,6 +24,12 @@ except ImportError as error:
         "present directory, before an installed dolfinx_contact: start Python in another directory, or make the "
         "kernel here by 'make .venv/ready' and use .venv/bin/python."
     ) from error
+_stubs = sha256(Path(__file__).with_name("_kernel.pyi").read_bytes()).hexdigest()
+if getattr(_kernel, "stubs", str)() != _stubs:
+    raise ImportError(
+        f"the compiled kernel {_kernel.__file__} does not fit the Python files in {Path(__file__).parent}: compile it again, by "
+        "'make .venv/ready' in a clone, by 'pip install .' in your own environment."
+    )
 
 
 # Name of each public object, and module that has it, as the stub beside this file says.

@@ -23,6 +23,7 @@ __all__: list[str] = [
     "common_integrals",
     "instruction_sets",
     "make_law",
+    "stubs",
 ]
 
 class Law2D:
@@ -386,4 +387,9 @@ def make_law(
 ) -> typing.Any:
     """
     The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).
+    """
+
+def stubs() -> str:
+    """
+    SHA-256 of the type stubs that it was compiled with.
     """

@@ -19,6 +19,8 @@ PYBIND11_MODULE(_kernel, m) {
     bind_condensed(m);
     bind_mortar(m);
     m.def(
+        "stubs", [] { return STUBS; }, "SHA-256 of the type stubs that it was compiled with.");
+    m.def(
         "instruction_sets",
         [] {
             std::vector<std::string> sets;

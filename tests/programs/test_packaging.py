@@ -14,6 +14,8 @@ import dolfinx_contact  # before MPI, which one of DOLFINx's wheels needs
 import pytest
 from mpi4py import MPI
 
+from dolfinx_contact import _kernel
+
 PROBE = Path(__file__).parents[2] / "tools" / "probe.py"
 
 pytestmark = pytest.mark.skipif(
@@ -93,6 +95,20 @@ def test_source_without_kernel_says_what_to_do(tmp_path):
     assert (
         f"{folder} has no compiled kernel" in result.stderr and "make .venv/ready" in result.stderr
     )
+
+
+def test_a_kernel_of_other_sources_is_refused(tmp_path):
+    """Beside type stubs that are not those it was compiled with, the kernel is refused by a sentence with what to do."""
+    folder = tmp_path / "dolfinx_contact"
+    folder.mkdir()
+    for name in ("__init__.py", "_kernel.pyi"):
+        (folder / name).write_text(Path(dolfinx_contact.__file__).with_name(name).read_text())
+    (folder / Path(_kernel.__file__).name).symlink_to(_kernel.__file__)
+    with (folder / "_kernel.pyi").open("a") as stubs:
+        stubs.write("def newer() -> None: ...\n")
+    result = run("-S", "-c", "import dolfinx_contact", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "does not fit the Python files" in result.stderr and "make .venv/ready" in result.stderr
 
 
 def stand_in(folder, scalar="float", release="0.9.0", petsc=True):
