@@ -17,7 +17,7 @@ from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.support.checks import place, positive
-from dolfinx_contact.support.collective import agree, from_first, raised_together
+from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
     import ufl
@@ -394,10 +394,9 @@ def check_alive(problem: ContactProblem, body: BodyLike, contacts: Sequence[Cont
 def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[ContactLike]) -> None:
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
     check_axial(contacts)
-    first = from_first(comm, [contact.described() for contact in contacts])
+    for contact in contacts:
+        contact.check()
     with raised_together(comm):
-        for contact, described in zip(contacts, first):
-            contact.check(described)
         for contact in contacts[:1]:  # of one mesh, all of them
             check_mesh(contact)
         if not np.isfinite(u.x.array).all():

@@ -39,7 +39,7 @@ from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import place, positive
-from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
 if TYPE_CHECKING:
@@ -137,9 +137,8 @@ class Contact(Guarded):
         self._laws.assign(self, friction, empty=True)
         self.wear = wear
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
-        described = mesh.comm.bcast(self.described(), root=0)
+        self.check()
         with raised_together(mesh.comm):
-            self.check(described)
             if total == 0:
                 raise ValueError(
                     "facets is empty on all ranks: name the facets that may touch. If they come from tags, "
@@ -228,19 +227,12 @@ class Contact(Guarded):
         self._laws.renew(self, begin)
         self._forget_supported()
 
-    def described(self) -> dict[str, str]:
-        """Surface and laws, but coefficients per node, in words: the same on all ranks."""
-        return self._laws.described(self.surface)
-
-    def check(self, first: dict[str, str]) -> None:
-        """Raise a ``ValueError`` if a law does not fit this rank's nodes, or what is ``described`` on rank 0."""
-        for name, value in self.described().items():
-            if value != first[name]:
-                raise ValueError(
-                    f"{name} differs between ranks: here {value}, on rank 0 {first[name]}. Planes and laws must not "
-                    "differ between ranks."
-                )
-        check_coefficients(self.friction, self.nodes.size)
+    def check(self) -> None:
+        """Raise a ``ValueError`` on all ranks if a law does not fit their nodes, or surface or laws differ.  Collective."""
+        if self.comm.size > 1:
+            agree(self.comm, **self._laws.described(self.surface))
+        with raised_together(self.comm):
+            check_coefficients(self.friction, self.nodes.size)
 
     # -- nodes that supports hold --------------------------------------------------------------
 
@@ -576,19 +568,17 @@ class Contact(Guarded):
 
     def advance(self) -> None:
         """Accept the present state as the last converged one, from which the next slip counts."""
-        before, law = self.last.reaction, self.friction
-        slip = self.slip_kept + self.slip_increment
+        law, slip = self.friction, self.slip_kept + self.slip_increment
         sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
-        work = self._work(slip)
-        touched = (before[:, -1] > 0.0) | (self.reaction[:, -1] > 0.0)
-        path = touched * np.linalg.norm(slip, axis=1)
-        work, path = self.repeats * work, self.repeats * path
+        pressed = np.maximum(self.last.reaction[:, -1], self.reaction[:, -1])
+        path = (pressed > 0.0) * np.linalg.norm(slip, axis=1)
+        work, path = self.repeats * self._work(slip), self.repeats * path
         if self._wearing is not None:
             depth = self._wearing
         else:
             depth = np.zeros_like(path) if self.wear is None else self._depth(work)
-        self._unloads = depth, np.maximum(before[:, -1], self.reaction[:, -1])
+        self._unloads = depth, pressed
         if self.wear is not None and self.wear.opposite.any():
             other = depth * self.wear.opposite_share(work, self._wear_field)
             taken = self._placement.taken(self.whole_area * other, self.opposite_area)

@@ -117,7 +117,7 @@ class Laws:
             self._take(contact, self._rested)
 
     def described(self, surface: Surface) -> dict[str, str]:
-        """Surface and laws, but coefficients per node, in words: the same on all ranks."""
+        """Surface and laws, but coefficients per node, in words, which have to be the same on all ranks."""
         driven = surface.driver.driven() if surface.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         moved, turned = (repr(v.tolist()) for v in (surface.displacement, surface.rotation))

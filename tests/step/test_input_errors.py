@@ -180,9 +180,9 @@ def test_planes_that_differ_between_ranks_are_refused(scene):
     """Plane and friction must be the same on all ranks, and a difference is noticed."""
     if COMM.size == 1:
         pytest.skip("needs more than one rank")
-    with pytest.raises(ValueError, match="differ between ranks"):
+    with pytest.raises(ValueError, match="differs between ranks"):
         dc.Contact(scene.V, scene.facets, plane(point=(0, 0, COMM.rank)), FRICTION)
-    with pytest.raises(ValueError, match="differ between ranks"):
+    with pytest.raises(ValueError, match="differs between ranks"):
         dc.Contact(scene.V, scene.facets, plane(), dc.Friction(mu=0.1 * (1 + COMM.rank)))
 
 
@@ -209,9 +209,9 @@ def test_coefficients_per_node_on_some_ranks_only_are_refused(scene):
     field = dc.Friction(np.tile([0.3, 0.15], (len(scene.contact.nodes), 1)))
     for exception in (0, COMM.size - 1):
         friction = dc.Friction((0.3, 0.15)) if COMM.rank == exception else field
-        with pytest.raises(ValueError, match="differ between ranks"):
+        with pytest.raises(ValueError, match="differs between ranks"):
             dc.Contact(scene.V, scene.facets, plane(), friction)
-    with pytest.raises(ValueError, match="differ between ranks"):
+    with pytest.raises(ValueError, match="differs between ranks"):
         dc.Contact(scene.V, scene.facets, plane(point=(0, 0, COMM.rank)), field)
 
 
