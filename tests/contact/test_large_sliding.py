@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, mesh
-from two_bodies import COMM, E, blocks, box, dc, joined, pair, rubber, stress
+from two_bodies import COMM, E, blocks, dc, rubber, stress
 
 from dolfinx_contact.compat import cell_points, functionspace
+from mechanics.two_blocks import box, joined, pair
 
 pytestmark = pytest.mark.ranks
 
@@ -385,3 +386,30 @@ def test_a_texture_turns_with_both_bodies():
         force = put(np.pi / 2, slid)
     assert abs(force[0]) == pytest.approx(0.3 * abs(force[2]), rel=0.06)
     assert abs(force[1]) < 0.03 * abs(force[2])
+
+
+def test_gaps_of_bodies_apart():
+    """A block moves along a slope without touching it: gaps are those at its place, also of nodes that stay open while others press."""
+    domain, top, bottom, upper, lower, _ = pair("quadrilateral", ((4, 2), (12, 2)), (1.0, 3.0), 0.1)
+    x = domain.geometry.x
+    ground = np.abs(x[:, 1]) < 1e-9
+    x[ground, 1] = 0.05 * (x[ground, 0] - 1.5)
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, way = fem.Function(V), fem.Constant(domain, np.zeros(2))
+    F = ufl.inner(stress(u, E / 2, E / 2), ufl.grad(ufl.TestFunction(V))) * ufl.dx
+    bcs = [fem.dirichletbc(value, fem.locate_dofs_topological(V, 1, ends), V) for value, ends in ((way, top), (np.zeros(2), bottom))]  # fmt: skip
+    contact = dc.Contact(V, upper, dc.DeformableSurface(V, lower), dc.Friction(0.0))
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs)
+    for along in (0.4, 0.7):
+        way.value[:] = (along, 0.0)
+        problem.solve()
+        slope = 0.05 * (contact.x[:, 0] + along - 1.5)
+        assert largest(contact.gap - (0.1 - slope)) < 1e-12
+    found = []
+    for begin in (problem.solve, problem.reset):
+        begin()
+        way.value[:] = (0.2, -0.095)
+        problem.solve()
+        found.append(np.where(contact.reaction[:, -1] > 0.0, 0.0, contact.gap))
+    assert largest(found[0]) > 0.01
+    assert largest(found[0] - found[1]) < 1e-3 * largest(found[0])

@@ -9,9 +9,10 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import locate_entities_boundary
-from two_bodies import COMM, E, blocks, dc, pair, patch
+from two_bodies import COMM, E, blocks, dc, patch
 
 from dolfinx_contact.compat import functionspace
+from mechanics.two_blocks import pair
 
 pytestmark = pytest.mark.ranks
 
