@@ -67,6 +67,9 @@ LOG = logging.getLogger("dolfinx_contact")
 # How often friction is made to follow the pressure, and the largest factor by which its changes are taken to fall.
 MOST, SLOWEST = 50, 0.9
 
+# How many times as far as supports move bodies may be expected to move in a step.
+FARTHER = 2.0
+
 # Tolerance of a solution on the way: at most ROUGH, and this part of the last change of the reactions.
 ROUGH, PART = 1e-3, 0.03
 
@@ -314,6 +317,8 @@ class ContactProblem(Guarded):
                 self.body.values(found.x),
                 [contact.reaction for contact in self.contacts],
             )
+        for contact in self.contacts:
+            contact.renew_gaps(found.x)
         if any(contact.has_history for contact in self.contacts):
             from dolfinx_contact.step.touching import opening
 
@@ -341,6 +346,9 @@ class ContactProblem(Guarded):
             from dolfinx_contact.surfaces.driven import approach
 
             approach(body, self.contacts, here)
+        b, external = body.load()
+        if at is None:
+            here = self._predicted(b)
         turned = follow(self.contacts, body, here, self._states.last, self._points)
         if turned or assembled != self._assembled:
             self._assembled = assembled
@@ -348,7 +356,6 @@ class ContactProblem(Guarded):
                 self._unbind()
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
         self._renew_laws(begin=True)  # in the frames of this step
-        b, external = body.load()
         last, before = self._states.last, self._states.before
         starts = [body.taken(self.u.x.array), 2 * last - before] if at is None else [at]
         if holding is None and driven:
@@ -362,6 +369,31 @@ class ContactProblem(Guarded):
         kind = NonlinearStep if body.nonlinear else LoadStep
         given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
         return kind(body, self.contacts, *given)
+
+    def _predicted(self, b: np.ndarray) -> np.ndarray:
+        """Where a step is likely to end, for rows between bodies that slide: under the new loads, with the last reactions.  Collective.
+
+        Where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts, it is
+        the last displacement.
+        """
+        body, last = self.body, self._states.last
+        sliding = [c for c in self.contacts if c.surface.deformable and c.changes and c.has_history]
+        if not sliding or body.nonlinear or body.loose is not None:
+            return last
+        x = last.copy()
+        x[body.fixed] = b[body.fixed]
+        given = x - last
+        forces = b - body.multiply(x)
+        for contact in self.contacts:
+            contact.assemble_reaction(forces)
+        forces[body.fixed] = 0.0
+        x += body.solve(forces)
+        slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
+        if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
+            return last
+        for contact in sliding:
+            contact.placement.begin(last)
+        return x
 
     def _may_land(self) -> bool:
         """Whether nodes that are open may land with friction.  Collective."""

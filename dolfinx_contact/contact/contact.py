@@ -436,6 +436,12 @@ class Contact(Guarded):
         """Estimate of the rounding in each gap and slip for the displacement moved to last, see ``Placement.motion_rounding``."""
         return self._placement.motion_rounding(u, self.present, self.last, self.opening)
 
+    def renew_gaps(self, u: np.ndarray) -> None:
+        """Let gaps of open nodes on a deformable surface be those at a displacement, not of the rows that a step used.  Collective."""
+        if self.surface.deformable and self.changes:
+            gap = self._placement.gap_at(u) + self.wear_depth
+            self.take(gap=np.where(self.reaction[:, -1] > 0.0, self.gap, gap))
+
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
         self._history.take(**arrays)

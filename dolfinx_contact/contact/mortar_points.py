@@ -28,6 +28,7 @@ from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import frames_along
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
 LEAVES = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
-
-AXIS = 1e-8  # part of an axis along the surface, of a direction that is none
 
 
 class MortarPlacement(Placement):
@@ -82,7 +81,7 @@ class MortarPlacement(Placement):
             rows = _sorted_rows(mine, masters, self._mine)
             rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, _mean_normals(mine, self._mine))
-            frames = frames_along(normals, self._axis(moved))
+            frames = frames_along(normals, self._axis(moved), self.x, self.surface)
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
@@ -103,10 +102,9 @@ class MortarPlacement(Placement):
         return turn_of_nodes(self._slave.x, moved, MPI.COMM_SELF) @ axis  # all ranks know all nodes
 
     def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
-        """See ``Placement``; rows stay as they are at the start of a step, and are renewed within it."""
+        """See ``Placement``; rows are those where the step is likely to end, then those where it has ended."""
         if u is start:
-            self._start, self._used, self._renewed = start, self.settled.points, 0
-            self._left[:] = False
+            self.begin(start)
             self.now = self.settled
             return
         self.now, self._renewed = self.placed(u), self._renewed + 1
@@ -114,6 +112,11 @@ class MortarPlacement(Placement):
         if self._renewed > LEAVES:
             self._left |= alone & ~self._used.alone
         self._used = self.now.points
+
+    def begin(self, start: np.ndarray) -> None:
+        """A step begins at a displacement, and its first rows are no renewal."""
+        self._start, self._used, self._renewed = start, self.settled.points, -1
+        self._left[:] = False
 
     def carried(self, last: State) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
@@ -183,6 +186,12 @@ class MortarPlacement(Placement):
             np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
+    def gap_at(self, u: np.ndarray) -> np.ndarray:
+        """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length; what is opposite nothing is open.  Collective."""
+        there = self.placed(u)
+        gap = there.flat + there.points.motion(u)[:, -1]
+        return np.where(there.points.alone, np.maximum(gap, self._apart), gap)
+
     @property
     def changes(self) -> bool:
         """See ``Placement``."""
@@ -197,6 +206,12 @@ class MortarPlacement(Placement):
     def covered(self) -> np.ndarray:
         """See ``Placement``."""
         return self.now.points.share
+
+    def slid(self, motion: np.ndarray) -> float:
+        """How far a motion of owned degrees of freedom slides nodes that are opposite something, over the smallest facet.  Collective."""
+        points = self.settled.points
+        along = points.motion(motion)[~points.alone, :-1]
+        return float(np.linalg.norm(along, axis=1).max(initial=0.0)) / self._master.smallest
 
     def strayed(self, state: State) -> tuple[float, float]:
         """See ``Placement``: from the opposite point of the undeformed state, and half of the smallest facet."""
@@ -477,24 +492,6 @@ class MortarPoints(ContactPoints):
         for rows, part in self._comm.allgather((own, C)):
             found[rows] = part
         return found
-
-
-def frames_along(normals: np.ndarray, axis: np.ndarray | None) -> np.ndarray:
-    """Rows (t1, t2, n), in two dimensions (t, n), of unit normals, ``shape=(n, gdim, gdim)``.
-
-    Raises:
-        ValueError: an axis that is along a normal.
-    """
-    if normals.shape[1] == 2:
-        return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
-    most_across = np.abs(normals).round(6).argmin(axis=1)  # rounding does not choose
-    given = np.eye(3)[most_across] if axis is None else axis
-    along = given - (given * normals).sum(axis=1, keepdims=True) * normals
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    if not (length > AXIS).all():
-        raise ValueError(f"axis {axis} is along the normal of a contact node: it has no direction on the surface.")  # fmt: skip
-    along /= length
-    return np.stack((along, np.cross(normals, along), normals), axis=1)
 
 
 def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip

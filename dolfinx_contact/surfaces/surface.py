@@ -23,8 +23,8 @@ PARALLEL = 1e-12
 # Part of a direction that has to be tangential.
 ALONG = 1e-8
 
-# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent.
-TIES = 9
+# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent, nor what solvers leave.
+TIES = 6
 
 
 def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
@@ -239,6 +239,38 @@ class Surface(Guarded):
         return f"{type(self).__name__}({', '.join(map(str, self.described().tolist()))})"
 
 
+def frames_along(
+    normals: np.ndarray, axis: np.ndarray | None, at: np.ndarray, surface: Surface
+) -> np.ndarray:
+    """Rows (t1, t2, n), in two dimensions (t, n), of unit normals, ``shape=(n, gdim, gdim)``; t1 is an axis, made orthogonal.
+
+    Without an axis it is the coordinate direction that is most tangential.
+
+    Args:
+        normals: ``shape=(n, gdim)``, in the frame of the axis.
+        axis: ``shape=(gdim,)``, or None.
+        at: Positions, ``shape=(n, gdim)``, and the surface, for the message.
+
+    Raises:
+        ValueError: an axis along a normal.
+    """
+    if normals.shape[1] == 2:
+        return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
+    most = np.abs(normals).round(TIES).argmin(axis=1)
+    t1 = np.eye(3)[most] if axis is None else np.broadcast_to(axis, normals.shape)
+    for _ in range(2):  # once more, for a nearly parallel axis
+        t1 = t1 - (t1 * normals).sum(axis=1, keepdims=True) * normals
+        length = np.linalg.norm(t1, axis=1, keepdims=True)
+        if (length < ALONG).any():
+            place = at[length.argmin()].tolist()
+            raise ValueError(
+                f"axis {axis} of {surface} is along the normal at the contact node at {place}, relative to it: give "
+                "another first principal friction direction."
+            )
+        t1 = t1 / length
+    return np.stack((t1, np.cross(normals, t1), normals), axis=1)
+
+
 class CurvedSurface(Surface):
     """A surface with a normal at every position."""
 
@@ -251,31 +283,10 @@ class CurvedSurface(Surface):
     def frames(self, y: np.ndarray) -> np.ndarray:
         """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
 
-        Without an axis t1 is the coordinate direction that is most tangential, made orthogonal.
-
         Raises:
             ValueError: an axis along the normal of a position.
         """
-        n = self.normals(y)
-        if n.shape[1] == 2:
-            return np.stack((np.column_stack((n[:, 1], -n[:, 0])), n), axis=1)
-        axis = (
-            np.eye(3)[np.argmin(np.round(np.abs(n), TIES), axis=1)]
-            if self.axis is None
-            else self.axis
-        )
-        t1 = axis - (n @ axis if self.axis is not None else (n * axis).sum(axis=1))[:, None] * n
-        length = np.linalg.norm(t1, axis=1)
-        if (length < ALONG).any():
-            at = y[np.argmin(length)].tolist()
-            raise ValueError(
-                f"axis {self.axis} of {self} is along the normal at the contact node at {at}, relative to it: give "
-                "another first principal friction direction."
-            )
-        t1 /= length[:, None]
-        t1 -= (t1 * n).sum(axis=1)[:, None] * n  # once more, for a nearly parallel axis
-        t1 /= np.linalg.norm(t1, axis=1)[:, None]
-        return np.stack((t1, np.cross(n, t1), n), axis=1)
+        return frames_along(self.normals(y), self.axis, y, self)
 
 
 def rotation_less_one(angle: np.ndarray) -> np.ndarray:
