@@ -74,9 +74,9 @@ def test_an_even_pressure_slides_along(cell, degree, cells, sides, swapped):
         assert largest(moved[:, -1] + p / E * (height + 1)) <= 1e-7 * p / E
 
 
-def ironed(steps, cell="quadrilateral", degree=1, cells=((4, 2), (15, 2)), far=0.8, press=0.02, **options):  # fmt: skip
+def ironed(steps, cell="quadrilateral", degree=1, cells=((4, 2), (15, 2)), far=0.8, press=0.02, size=(1.0, 3.0), **options):  # fmt: skip
     """A block pressed on a longer one and slid over its facets, of length 0.2; the force on it, and the scene."""
-    scene = blocks(cell, degree, cells, size=(1.0, 3.0), sliding="large", **options)
+    scene = blocks(cell, degree, cells, size=size, sliding="large", **options)
     d = len(cells[0])
     for part in np.linspace(0.0, 1.0, steps + 1):
         scene.way.value[:] = [far * part, *[0.0] * (d - 2), -press]
@@ -93,6 +93,13 @@ def test_ironing(degree, swapped):
     scene.contact.assemble_reaction(left)
     assert np.abs(total(left.reshape(-1, 2))).max() <= 1e-12 * np.abs(coarse).max()
     fine, _ = ironed(40, degree=degree, swapped=swapped)
+    assert np.abs(coarse - fine).max() <= 0.01 * np.abs(fine).max()
+
+
+@pytest.mark.parametrize("cell, degree", [("hexahedron", 1), *[pytest.param(cell, 2, marks=pytest.mark.slow) for cell in ("hexahedron", "tetrahedron")]])  # fmt: skip
+def test_ironing_in_space(cell, degree):
+    """As in the plane, with edges across and along the way that cover facets in part, as the block reaches the end of the other one."""
+    coarse, fine = (ironed(n, cell, degree, ((2, 2, 1), (9, 5, 1)), size=(1.0, 2.0))[0] for n in (4, 40))  # fmt: skip
     assert np.abs(coarse - fine).max() <= 0.01 * np.abs(fine).max()
 
 
