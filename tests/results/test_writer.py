@@ -9,6 +9,7 @@ import scenes
 import ufl
 from dolfinx import fem
 from patches import CELLS, PRESSURE, pressed
+from two_bodies import pair
 
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.results.meshes import recovered
@@ -241,3 +242,35 @@ def test_a_recovered_pressure_keeps_the_resultant():
         assert np.array_equal(found[30:], p[30:])
         if np.allclose(p, 2 + x[:, 0] - x[:, 1]):
             assert found == pytest.approx(p, rel=1e-12)
+
+
+@pytest.mark.parametrize("cell, degree", [("hexahedron", 1), ("triangle", 2)])
+def test_two_bodies_on_a_plane(cell, degree, folder):
+    """Of a block that slides on a block that lies on a plane the file has both contacts, each with the sum of its own forces."""
+    d = 2 if cell == "triangle" else 3
+    domain, top, bottom, upper, lower, _ = pair(cell, [[2] * d, [3] * d], size=(0.7, 1.0))
+    V = functionspace(domain, ("Lagrange", degree, (d,)))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    held = fem.Constant(domain, np.zeros(d))
+    bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, d - 1, top), V)
+    contacts = [
+        dc.Contact(V, upper, dc.DeformableSurface(V, lower), 0.2),
+        dc.Contact(V, bottom, dc.RigidPlane(-np.eye(d)[-1], np.eye(d)[-1]), 0.3),
+    ]
+    problem = dc.ContactProblem(scenes.elasticity(u, v, 210e3, 0.3), u, contacts, bcs=[bc])
+    for way in (0.0, 0.01):
+        held.value = (way, *np.zeros(d - 2), -0.01)
+        problem.solve()
+    dc.Writer(problem, folder / "a.pvd").write(0.0)
+    forces, count = [contact.force() for contact in contacts], V.dofmap.index_map.size_global
+    assert forces[0] == pytest.approx(forces[1], rel=1e-6, abs=1e-6 * forces[0][-1])
+
+    def check():
+        for read in (by_meshio, by_pyvista):
+            assert len(read(folder / "a_data" / "body000000.vtu")[0]) == count
+            _, _, values, _ = read(folder / "a_data" / "contact000000.vtu")
+            for k, force in enumerate(forces):
+                found = values["reaction"][values["contact"] == k].sum(axis=0)[:d]
+                assert found == pytest.approx(force, rel=1e-9, abs=1e-9 * np.abs(force).max())
+
+    on_first(check)
