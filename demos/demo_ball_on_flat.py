@@ -15,13 +15,13 @@
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad
 #    g = |x + u - c| - R \ge 0, \quad p \ge 0, \quad g\, p = 0 \quad \text{on the top}, $$
 #
-# without friction. The gap is that to the plane which touches the sphere below each node, `docs/surfaces.md`.
+# without friction. The gap is measured to the tangent plane of the sphere below each node, `docs/surfaces.md`.
 # The **closed form** [H. Hertz 1881; K. L. Johnson, Contact Mechanics, 1985, Section 4.2] is
 #
 # $$ a = \sqrt{R \delta}, \qquad F = \tfrac{4}{3} E^* \sqrt{R}\, \delta^{3/2}, \qquad
 #    p(r) = p_0 \sqrt{1 - r^2/a^2}, \quad p_0 = \frac{2 E^* a}{\pi R}. $$
 #
-# It takes the sphere for a paraboloid, which neglects $(a/R)^2$, here $10^{-4}$. The block ends at $L = 8 a$. There it is given the
+# It replaces the sphere by a paraboloid, which neglects $(a/R)^2$, here $10^{-4}$. The block ends at $L = 8 a$. There it is given the
 # displacement of a half space under a point force $F$ [J. Boussinesq 1885], as `demo_hertz.py` explains; what is left is of
 # the order $(a/L)^3$.
 #
@@ -31,8 +31,8 @@
 #
 # ## Code
 #
-# A quarter of the block, its cells fine at the contact (`quarter_block` in `helpers.py`). On the two planes of symmetry the normal displacement is zero:
-# supports that fix a tangential direction of contact nodes, along which `axis` and what is across it lie.
+# A quarter of the block, its cells fine at the contact (`quarter_block` in `helpers.py`). On the two planes of symmetry the normal displacement is zero.
+# These supports fix a tangential direction of contact nodes, which is along `axis` or across it.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -93,7 +93,7 @@ def press(cells: int):
 #    most of it in the cells at the edge.
 # 4. The reaction of every node is along the normal of the sphere there: the force along $x$ on the quarter is
 #    $\sum r_n x / R$, to $(a/R)^2$.
-# 5. `ball.free = ("z",)` leaves the ball to its weight $F$: that is then the force, and the way down is $\delta$ to 1 %.
+# 5. With `ball.free = ("z",)` the ball sinks under its weight $F$: the force is $F$, and the depth is $\delta$ to 1 %.
 
 
 # %%
@@ -109,14 +109,14 @@ def main(cells: int = 20):
     expected = P0 * np.sqrt(np.maximum(1 - (r / A) ** 2, 0))
     peak = pressure.max() / P0 - 1
     within = np.sqrt(((pressure - expected) ** 2)[r < A].mean()) / P0
-    say(f"force {-4 * force[2]:.3f} N, of Hertz {FORCE:.3f} ({100 * off:+.2f} %); radius {100 * radius:+.2f} %; "
+    say(f"force {-4 * force[2]:.3f} N, by Hertz {FORCE:.3f} ({100 * off:+.2f} %); radius {100 * radius:+.2f} %; "
         f"largest pressure {100 * peak:+.2f} %, root mean square error of all {100 * within:.2f} % of it")  # fmt: skip
     assert abs(off) < 0.01 and abs(radius) < 0.01
     assert abs(peak) < 0.01 and within < 0.05
     assert np.allclose(force[:2], normal @ x[:, :2] / R, rtol=1e-3)
     next(states)
     weighed, way = -4 * contact.force()[2] / FORCE - 1, -contact.surface.displacement[2] / DELTA - 1
-    say(f"under its weight: force {weighed:+.1e}, way down {100 * way:+.2f} %")
+    say(f"under its weight: error of the force {weighed:+.1e}, of the depth {100 * way:+.2f} %")
     assert abs(weighed) < 1e-8 and abs(way) < 0.01
     return r / A, pressure / P0
 

@@ -76,8 +76,8 @@ def brick(mu: float, cells=(3, 3, 2)):
 # ## Result
 #
 # 1. Without friction the pressure at every node of every wall, edges and corner among them, is that of the face opposite, to $10^{-7}$.
-# 2. With friction of the floor forces are in balance to $10^{-7}$ in every step, while the pressure from one side goes up and down.
-# 3. The floor keeps some of the force, at most $\mu q_3 A_3$: on the way down the wall carries more than on the way up.
+# 2. With friction on the floor, forces balance to $10^{-7}$ in every step, while the pressure from one side rises and falls.
+# 3. The floor carries part of the force, at most $\mu q_3 A_3$: on unloading the wall carries more than on loading.
 
 
 # %%

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Fretting under dead weight: the loop of force and slip
 #
-# The cylinder of `demo_partial_slip.py`, loaded as a rig does it: a weight presses the plane on the cylinder, a force
+# The cylinder of `demo_partial_slip.py`, loaded as in a test rig: a weight presses the plane on the cylinder, a force
 # pushes it to and fro. Neither motion is prescribed; `plane.displacement` holds what a step has found.
 #
 # ## Notation
@@ -23,7 +23,7 @@
 # $$ \delta = C Q + s(Q), \qquad C = \frac{2}{\pi E^*} \ln\frac{2L}{a}, \qquad
 #    s(Q) = \frac{1}{\pi E^*} \left[ Q + (F - Q) \ln\left(1 - \frac{Q}{F}\right) \right], $$
 #
-# an elastic compliance $C$ of the body, and slip, which knows nothing of the body's size. When $Q$ falls again from $Q_1$
+# an elastic compliance $C$ of the body, and slip, which does not depend on the body's size. When $Q$ falls again from $Q_1$
 # the same happens with twice the force [R. D. Mindlin, H. Deresiewicz 1953]: $\delta = \delta(Q_1) - 2\,
 # \delta(\frac{Q_1 - Q}{2})$. A cycle between $-Q_1$ and $Q_1$ encloses
 #
@@ -35,7 +35,7 @@
 #
 # ## Code
 #
-# Two lines make the plane driven by force: `plane.free` names its free directions, `plane.force` is the force of
+# Two lines let force drive the plane: `plane.free` names its free directions, `plane.force` is the force of
 # the plane on the body.
 
 # %%
@@ -88,7 +88,7 @@ def loop(quarter: int, cells: int = 64):
 # ## Result
 #
 # 1. The force of the plane on the body is the given one after every step, to $10^{-8}$ of the weight.
-# 2. From $Q_1$ down to $-Q_1$ and up again the plane comes back to where it was, to 0.1 % of the range.
+# 2. From $Q_1$ down to $-Q_1$ and up again the plane returns to its position, to 0.1 % of the range.
 # 3. The width of the loop, $\delta$ on the way down minus that on the way up at the same $Q$, in which the compliance $C$
 #    drops out, is that of the closed form, $2 s(Q_1) - 2 s(\frac{Q_1 - Q}{2}) - 2 s(\frac{Q_1 + Q}{2})$, to 1.5 % of its
 #    largest value.

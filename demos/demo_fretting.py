@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Fretting: cyclic partial slip that wears
 #
-# The cylinder of `demo_partial_slip.py`, now of a common material, stands on a plane that goes to and fro by a
-# prescribed stroke too small to slide it as a whole. Where it slips it wears, worn depth opens the gap, and the
+# The cylinder of `demo_partial_slip.py`, now of an ordinary material, stands on a plane that moves to and fro by a
+# prescribed stroke, too small for gross slip. Where it slips it wears, worn depth opens the gap, and the
 # pressure moves to where it sticks.
 #
 # ## Notation
@@ -15,15 +15,15 @@
 # $$ -\operatorname{div} \sigma(u) = 0, \qquad x_n = \frac{x^2}{2R} + u_n + w \ge 0, \quad p \ge 0, \quad x_n\, p = 0,
 #    \quad |q| \le \mu p, \qquad \dot w = -k\, q\, \dot u_t , $$
 #
-# the last being Archard's law with $k = K / \mu H$, which `dc.Wear(k, explicit=True)` takes after every step: what a step
-# wears opens the gap of the next, and the volume is that of the work $D$. The rig keeps the load: after every step the approach of the far boundary is corrected by what
-# is missing in $P$ over the stiffness of the contact.
+# the last being Archard's law with $k = K / \mu H$. `dc.Wear(k, explicit=True)` applies it after every step: the depth that a step
+# wears opens the gap of the next, and the volume is $k D$. The load is kept: after every step the approach of the far
+# boundary is corrected by the missing part of $P$ over the stiffness of the contact.
 #
 # ## What must come out
 #
 # No closed form, but balances. Worn volume is $k D$. Over a cycle that repeats itself elastic energy does not change,
 # so the plane's work $\oint Q \,\mathrm{d}s$, a quantity of the whole body, is the dissipation, a sum over slipping
-# nodes. Nothing wears where nothing slips, and there the pressure has to grow, as the load stays.
+# nodes. Where nothing slips nothing wears, and there the pressure has to grow, since the load stays.
 #
 # ## Weak form
 #
@@ -86,8 +86,8 @@ def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
 # ## Result
 #
 # Without wear the second and the third cycle are alike: that is shakedown into a steady loop. There,
-# $\oint Q \,\mathrm{d}s = D$ as steps become small. $Q$ is known at the ends of steps, and turns around within one:
-# the trapezoidal rule for $\oint Q \,\mathrm{d}s$ lacks 5.6 % with two steps a quarter and 1.5 % with four. $D$, the
+# $\oint Q \,\mathrm{d}s = D$ as steps become small. $Q$ is known only at the ends of steps, and reverses within one:
+# the trapezoidal rule for $\oint Q \,\mathrm{d}s$ is 5.6 % too small with two steps a quarter, 1.5 % with four. $D$, the
 # sum of $\frac12 (P_0 + P_1) \mu |\Delta u_t|$ over nodes and steps, changes by less than 0.1 % between the two.
 #
 # With wear, over four cycles:

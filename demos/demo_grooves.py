@@ -23,11 +23,11 @@
 #    \frac{1}{2 R_2} = \frac{p_0}{E^*} \frac{b}{e^2 a^2} \left[\frac{a^2}{b^2} E - K\right], \quad
 #    F = \tfrac{2}{3} \pi a b p_0, \quad \delta = \frac{p_0}{E^*} b K . $$
 #
-# Dragged along a direction, all nodes slip alike, and whatever the pressure friction is, by the slip rule [dSFMH07, Section 1],
+# Dragged in one direction, all nodes slip alike. Whatever the pressure, the slip rule [dSFMH07, Section 1] gives the friction
 #
 # $$ T = -F \frac{P^2 d}{|M^{-1} P^2 d|} , $$
 #
-# aside from the way: grooves guide.
+# which is not opposite to the motion: grooves guide.
 #
 # ## Weak form
 #
@@ -35,7 +35,7 @@
 #
 # ## Code
 #
-# A quarter of the block, of $9 a$, far away with the displacement of a half space under a point force, as in
+# A quarter of the block, $9 a$ wide; its far boundary has the displacement of a half space under a point force, as in
 # `demo_ball_on_flat.py`. The radii are those that belong to $a$, $b$ and $F$.
 
 # %%
@@ -144,7 +144,7 @@ def main(cells: int = 16):
     ]
     off = np.array(found) - 1
     say(f"off by {100 * off[0]:+.2f} % in a, {100 * off[1]:+.2f} % in b, {100 * off[2]:+.2f} % in p0, {100 * off[3]:+.2f} % "
-        f"in the way down; weight off by {-4 * contact.force()[2] / FORCE - 1:.1e}")  # fmt: skip
+        f"in the depth; weight off by {-4 * contact.force()[2] / FORCE - 1:.1e}")  # fmt: skip
     assert np.abs(off).max() < 0.02
     for angle, grooves in ((0.0, 0.5), (1.0, 0.5), (0.7, 0.0)):
         dragged, expected = drag(angle, grooves), guided(angle, grooves)

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Hertz: a ball on a plane
 #
-# A ball of radius $R$ is pressed on a rigid plane without friction. The closed form is that of an elastic half space;
-# here it is the far field, not the contact, that a mesh has to be told about. The demo measures both errors by
-# themselves: that of the mesh, and that of the body's finite size.
+# A ball of radius $R$ is pressed on a rigid plane without friction. The closed form is that of an elastic half space, so the
+# far boundary of the mesh needs the displacement of a half space. The demo measures two errors separately: that of the
+# mesh, and that of the body's finite size.
 #
 # ## Notation
 #
@@ -34,16 +34,16 @@
 # $$ b_r = \frac{(1+\nu) F}{2 \pi E \rho} \left( \frac{r z}{\rho^2} - \frac{(1 - 2\nu)\, r}{\rho + z} \right), \qquad
 #    b_z = \frac{(1+\nu) F}{2 \pi E \rho} \left( 2 (1 - \nu) + \frac{z^2}{\rho^2} \right). $$
 #
-# A body of size $L$ whose far boundary is *held rigidly*, $u = (0, -\delta)$, is therefore too stiff: its contact
-# feels an approach that is too large by something between $b_z(L, 0) = F / (\pi E^* L)$, beside the contact, and
-# $b_z(0, L)$, above it, which is $\frac{3 - 2\nu}{2 - 2\nu}$ times as much. In parts of $\delta$ the first is
-# $c = \frac{4}{3\pi} \frac{a}{L}$ for the force of the closed form; and since force grows like approach to the power
-# 3/2, it is too large by a factor $1 + e$ with
+# A body of size $L$ whose far boundary is *held rigidly*, $u = (0, -\delta)$, is therefore too stiff: the
+# approach at its contact is too large by a value between $b_z(L, 0) = F / (\pi E^* L)$, the displacement beside the contact, and
+# $b_z(0, L)$ above it, which is $\frac{3 - 2\nu}{2 - 2\nu}$ times as large. For the force of the closed form, the first value over
+# $\delta$ is $c = \frac{4}{3\pi} \frac{a}{L}$. The force grows with the power 3/2 of the approach, so it is too large by a
+# factor $1 + e$ with
 #
 # $$ (1 + e)^{2/3} = 1 + c\,(1 + e). $$
 #
-# At $L = 16 a$ these are 4 to 7 %, halved when $L$ is doubled: nobody refines that away. If $u = (0, -\delta) + b$ is
-# prescribed instead, what is left is the next moment of the pressure, of the order $(a/L)^3$.
+# At $L = 16 a$ the force is 4 to 7 % too large. Doubling $L$ halves this error; a finer mesh does not reduce it. If
+# $u = (0, -\delta) + b$ is prescribed instead, the error left is that of the next moment of the pressure, of the order $(a/L)^3$.
 #
 # ## Weak form
 #
@@ -52,16 +52,15 @@
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \; 2 \pi r \,\mathrm{d}r\,\mathrm{d}z
 #    = \sum_{\text{contact nodes}} r_i \cdot v_i, $$
 #
-# so that a nodal reaction is the force of a whole ring. On the axis $u_r = 0$: a support that fixes the tangential
+# so a nodal reaction is the force on a whole ring. On the axis $u_r = 0$: this support fixes the tangential
 # displacement of a contact node.
 #
 # ## Code
 #
-# `far_field` is what the far boundary is given, as a function of the coordinates; `press` solves on one mesh. The
+# `far_field` gives the displacement of the far boundary as a function of the coordinates; `press` solves on one mesh. The
 # pressure of a node is its force over the area of its ring, $\int 2 \pi r\, \varphi_i \,\mathrm{d}s$, which the contact
-# knows by its `weight`. The radius is
-# found twice: as the place of the last node that touches, which cannot be better than the mesh, and from the second
-# moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
+# computes with its `weight`. The radius is measured twice: by the position of the last node that touches, which is no more
+# accurate than a cell is wide, and by the second moment of the reactions, which is $\frac{2}{5} a^2$ for the closed form.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -143,17 +142,17 @@ def compare(contact: dc.Contact) -> dict:
 # %% [markdown]
 # ## Result
 #
-# **Convergence**, with $u = (0, -\delta) + b$ on the far boundary at $L = 16 a$, three meshes. They have a node at
-# $r = a$, so that errors fall evenly; with the edge inside a cell they depend on where it is. The order is measured
+# **Convergence**, with $u = (0, -\delta) + b$ on the far boundary at $L = 16 a$, three meshes. Each has a node at
+# $r = a$, so errors fall evenly; with the edge inside a cell they depend on its position there. The order is measured
 # against the number of cells:
 #
-# - force, and radius by the second moment: second order, as is usual for quantities of work;
-# - pressure, in the mean square: first order, because it ends like a square root, and the mesh replaces that by a
-#   polygon in the one cell where it ends;
-# - the last node that touches is at the edge, to less than one cell.
+# - force, and radius by the second moment: second order, as usual for integrals;
+# - pressure, in the mean square: first order, because the pressure ends like a square root, which the mesh replaces by a
+#   polygon in the cell where it ends;
+# - the last node that touches is less than one cell from the edge.
 #
-# **Finiteness**, on one mesh: the force of a rigidly held body minus that with $b$ lies between the two estimates,
-# for three sizes.
+# **Finite size**, on one mesh, for three sizes: the excess of the force of a rigidly held body over that with $b$ lies between
+# the two estimates.
 
 
 # %%

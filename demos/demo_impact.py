@@ -1,24 +1,23 @@
 # %% [markdown]
 # # A block that hits the ground and slides
 #
-# Dynamics is a matter of the form: one implicit step in time adds inertia to `F`, and contact stays what it is. A block
-# falls on a plane obliquely, is compressed by a wave, slides, and rebounds. The balance of energy is exact, step by step:
-# contact makes none.
+# In dynamics the form changes and contact does not: an implicit time step adds inertia to `F`. A block falls obliquely on a
+# plane, is compressed by a wave, slides, and rebounds. Energy balances exactly in every step, and contact never adds any.
 #
 # ## Notation
 #
 # $u$ displacement, $v$ velocity, $\varrho$ density, $E$ Young's modulus (Poisson's ratio is zero), $H$ height of the block, $m$ its
 # mass, $w$ its width, $c = \sqrt{E/\varrho}$ speed of the wave, $v_0 = (v_t, -v_n)$ velocity of the fall, $\mu$ coefficient of friction, $r$ reactions, $g$ gaps,
-# $\Delta w_t$ slips, $h$ time step. Units: mm, N, MPa, ms, so g for masses.
+# $\Delta w_t$ slips, $h$ time step. Units: mm, N, MPa, ms; masses in g.
 #
 # ## Strong form
 #
 # $$ \varrho\, \dot v - \operatorname{div} \sigma(u) = 0, \quad v = \dot u, \qquad
 #    g \ge 0,\; r_n \ge 0,\; g\, r_n = 0, \qquad |r_t| \le \mu r_n \text{ with friction against slip} . $$
 #
-# The **closed form** of the bar that hits a rigid wall: the pressure is $\varrho c v_n$ while the wave goes up and comes back, for
-# $2H/c$; then the bar leaves as fast as it came. While all nodes slide friction is $\mu$ times the normal reaction, so the momentum
-# lost along the plane is $\mu$ times the one gained across it.
+# The **closed form** of the bar that hits a rigid wall: the pressure is $\varrho c v_n$ while the wave travels up and back, for
+# $2H/c$; then the bar leaves with the speed of impact. While all nodes slide, friction is $\mu$ times the normal reaction, so the
+# momentum lost along the plane is $\mu$ times that gained across it.
 #
 # ## Weak form
 #
@@ -31,12 +30,12 @@
 #
 # $$ \Delta (T + U) = - T(\Delta v) - U(\Delta u) - \sum r_n\, g^k + \sum r_t \cdot \Delta w_t , $$
 #
-# of which no term is positive: the first two are what the method in time takes away, the third is what a node loses that had a
-# gap $g^k$ before the step in which it lands, the last one is the work of friction.
+# in which no term is positive: the first two are the numerical dissipation of implicit Euler, the third is the energy lost by nodes
+# that land and had a gap $g^k$ before the step, the last is the work of friction.
 #
 # ## Code
 #
-# The mass holds the body: no support is needed. The stiffness with its inertia is constant and factorised once.
+# Inertia holds the body, so no support is needed. The matrix of stiffness and inertia is constant and factorised once.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -114,10 +113,10 @@ class Block:
 # %% [markdown]
 # ## Result
 #
-# 1. The balance of energy closes to $10^{-10}$ of the energy, in every step; no step makes any.
+# 1. The balance of energy closes to $10^{-10}$ of the energy, in every step; no step gains any.
 # 2. The impulse of the forces is the change of momentum, to $10^{-10}$; along the plane it is $\mu$ times that across it.
-# 3. The pressure's plateau is $\varrho c v_n$ to 0.1 %. The force is above half of it for $2H/c$, to 5 %: implicit Euler smears the
-#    wave.
+# 3. The plateau of the pressure is $\varrho c v_n$ to 0.1 %. The force exceeds half of it for $2H/c$, to 5 %, since implicit Euler
+#    smears the wave.
 
 
 # %%
@@ -143,8 +142,8 @@ def main(cells: int = 24, steps: int = 450):
     lasted = (forces[:, 1] > plateau / 2).sum() * step / duration
     assert abs(reached - 1) < 1e-3 and abs(lasted - 1) < 0.05
     lost = 1 - np.array([energy[-1], energy[-1] + friction]) / energy[0]
-    say(f"plateau {reached:.5f} of rho c v; on the ground for {lasted:.3f} of 2 H / c; the block leaves at "
-        f"{block.momentum()[1] / MASS:.3f} mm/ms; of the energy friction took {lost[0] - lost[1]:.3f}, implicit Euler {lost[1]:.3f}")  # fmt: skip
+    say(f"plateau {reached:.5f} rho c v_n; contact lasts {lasted:.3f} times 2 H / c; the block leaves at "
+        f"{block.momentum()[1] / MASS:.3f} mm/ms; parts of the energy lost: friction {lost[0] - lost[1]:.3f}, implicit Euler {lost[1]:.3f}")  # fmt: skip
     return step * np.arange(1, steps + 1), forces
 
 

@@ -2,7 +2,7 @@
 # # A flat punch on a plastic half-plane
 #
 # A rigid flat punch without friction is pressed into von Mises' material, deeper and deeper, until the material flows beside it;
-# then it is taken off, and its imprint stays. The material is written in plain UFL: no derivative is given, none is coded.
+# then it is lifted off and leaves an imprint. The material is written in UFL alone, which also finds its derivative.
 #
 # ## Notation
 #
@@ -15,7 +15,7 @@
 # $$ \operatorname{div} \sigma = 0, \quad \sigma = K \operatorname{tr}\varepsilon\, I + 2 G (\operatorname{dev} \varepsilon - \varepsilon^p), \quad
 #    |s| \le \sqrt{2/3}\, (\sigma_y + H \alpha), \quad \dot\varepsilon^p = \dot\gamma\, s / |s|, \quad \dot\alpha = \sqrt{2/3}\, \dot\gamma , $$
 #
-# unilateral contact with the punch, no friction. The **closed form** of Prandtl, without hardening: the mean pressure comes to $(2 + \pi)\, k$.
+# unilateral contact with the punch, no friction. The **closed form** of Prandtl, without hardening: the mean pressure tends to $(2 + \pi)\, k$.
 #
 # ## Weak form
 #
@@ -25,7 +25,7 @@
 #
 # ## Code
 #
-# `InternalVariables` names the Functions that are state, and `after_step`, which moves them on after a step that converged.
+# `InternalVariables` names the Functions that hold the state, and the function `after_step`, which updates them after a converged step.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -130,9 +130,9 @@ def indent(scene, depths, **options):
 # %% [markdown]
 # ## Result
 #
-# 1. The first step is elastic; then the force grows less and less. The punch is as wide as half a cell more than its nodes: extrapolated from
-#    two meshes its pressure is $(2 + \pi)\, k$ to 2 %.
-# 2. Taken off, the punch leaves more than half of its depth.
+# 1. The first step is elastic; then the force grows ever more slowly. The punch acts as if half a cell wider than its nodes:
+#    extrapolated from two meshes, its pressure is $(2 + \pi)\, k$ to 2 %.
+# 2. The imprint that is left is more than half as deep as the punch was pressed in.
 
 
 # %%
@@ -149,7 +149,7 @@ def main(cells=(10, 20)) -> dict:
     x, u = everywhere(x, u)
     left = -u[:, 1].min() / depths[deepest]
     say(
-        f"pressure over (2 + pi) k: {coarse:.3f}, {fine:.3f}, extrapolated {found:.3f}; imprint {left:.2f} of the depth"
+        f"pressure over (2 + pi) k: {coarse:.3f}, {fine:.3f}, extrapolated {found:.3f}; imprint {left:.2f} times the depth"
     )
     assert 1 < fine < coarse < 1.2 and abs(found - 1) < 0.02
     assert fine > 3 * pressures[-1][0]

@@ -1,4 +1,4 @@
-"""Predictor and corrector in a loop of one's own.
+"""Predictor and corrector in a loop of your own.
 
 With plain DOLFINx and PETSc, for those who have a solver already and want contact in it: ``contact.update`` turns displacements
 into reactions, ``contact.assemble_reaction`` adds them to a residual. Without acceleration the loop

@@ -20,15 +20,15 @@
 # $$ a^2 = \frac{4 P R}{\pi E^*}, \qquad p = p_0 \sqrt{1 - x^2/a^2}, \qquad
 #    \frac{c}{a} = \sqrt{1 - \frac{Q}{\mu P}}, $$
 #
-# and $q$ is $\mu p$ minus the like distribution over $|x| < c$. When $Q$ falls again from $Q_1$, slip starts anew
-# from the edges, against the former, and the sticking part is $c'/a = \sqrt{1 - (Q_1 - Q) / 2 \mu P}$.
+# and $q$ is $\mu p$ minus a distribution of the same shape over $|x| < c$. When $Q$ falls again from $Q_1$, slip in the
+# opposite direction starts from the edges, and the sticking part is $c'/a = \sqrt{1 - (Q_1 - Q) / 2 \mu P}$.
 #
 # **What it assumes.** Tangential tractions must not change the pressure, nor pressure move the surface sideways. On a
 # rigid plane this is true for $\nu = 1/2$ only: the coupling is Dundurs' $\beta = (1 - 2\nu) / (2 - 2\nu)$. Here
-# $\nu = 0.499$ and $\beta = 0.002$, and elements must not lock: first-order triangles do not, if they are the four
-# into which the diagonals cut a quadrilateral. A body of finite size $L$ adds a uniform strain to the field of the
-# contact, of first order in $a/L$; it makes tractions that are odd in $x$, and so changes neither $Q$ nor,
-# noticeably, $P(a)$, if these and not the displacements are compared.
+# $\nu = 0.499$ and $\beta = 0.002$, so elements must not lock: first-order triangles do not, if the
+# diagonals of a quadrilateral cut it into four of them. A body of finite size $L$ adds a uniform strain to the field of the
+# contact, of first order in $a/L$. Its tractions are odd in $x$, so they change neither $Q$ nor, noticeably, $P(a)$;
+# therefore forces are compared, not displacements.
 #
 # ## Weak form
 #
@@ -36,9 +36,9 @@
 #
 # ## Code
 #
-# The sticking part is measured twice. By the status of the nodes it is known to the width of a cell, here $a/11$ in
-# the middle and $a/7$ near the edge. By second moments it is known better: for the closed form
-# $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. A change of $q$ by slip that has turned round is twice as much.
+# The sticking part is measured twice. The status of the nodes gives it to the width of a cell, here $a/11$ in
+# the middle and $a/7$ near the edge. Second moments are more accurate: for the closed form
+# $\int q x^2 = \mu\, (1 - c^4/a^4) \int p x^2$. After slip has reversed, $q$ changes by twice as much.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -92,9 +92,9 @@ def sticking_part(now: dict, before: dict, times: int) -> tuple[float, float]:
 #
 # 1. The half width by the second moment of the pressure, $a^2/4$, is that of the closed form to 1 %. Pressing alone
 #    makes tangential tractions, where the closed form has none: $\int |q|$ is below a tenth of $\mu P$. The part that
-#    alternates from node to node is the mesh's: it falls with refinement (0.05, 0.03 and 0.01 for 32, 64 and 128
-#    cells, in the mean over the place of the edge). The smooth part does not (0.04, 0.03, 0.03); it is the body's
-#    finite size, and half as much or less in a body of twice the size.
+#    alternates from node to node comes from the mesh: it falls with refinement (0.05, 0.03 and 0.01 for 32, 64 and 128
+#    cells, averaged over positions of the edge within its cell). The smooth part (0.04, 0.03, 0.03) comes from the finite
+#    size of the body: in a body twice as large it is half as large or less.
 # 2. Shearing does not change $P$ by more than 0.1 %: the two directions are not coupled.
 # 3. For three displacements of the plane, and on the way back, the sticking part by second moments is that of the
 #    closed form to $0.005\, a$, and by the nodes' status to the width of a cell.

@@ -1,12 +1,12 @@
 # %% [markdown]
 # # The paper's punch
 #
-# A steel cylinder stands on a plane with grooves; its top face goes down and up again. Poisson's effect drives the
-# contact nodes outwards against a friction that differs along and across the grooves. Stick zones, slip outwards and,
-# when unloading, reverse slip are what [dSFMH07, Section 3] shows. This demo writes numbers, a picture and ParaView
+# A steel cylinder stands on a plane with grooves; its top face moves down and up again. Poisson's effect drives the
+# contact nodes outwards, against friction that differs along and across the grooves. As in [dSFMH07, Section 3], there are
+# stick zones, outward slip and, on unloading, reverse slip. This demo writes numbers, a picture and ParaView
 # files; the scene itself is in `studies/punch`, so it runs from the root of the clone: `python -m demos.demo_punch`,
 # with options (try `--help`), on any number of MPI ranks. As a notebook it needs that root on the path: start Jupyter
-# there with `PYTHONPATH= PWD`. In an environment of your own: `pip install -e .` first.
+# there with `PYTHONPATH=$PWD`. In an environment of your own: `pip install -e .` first.
 #
 # ## Notation
 #

@@ -2,7 +2,7 @@
 # # A cube pushed across a table
 #
 # A cube lies on a table. Nothing but its weight and friction holds it: no support, no spring. A side force pushes it,
-# below what friction carries, and then above.
+# at first less than friction can carry, then more.
 #
 # ## Notation
 #
@@ -70,7 +70,7 @@ def reactions(problem):
 #
 # 1. Sums of forces and moments of the reactions are those of statics, to $10^{-7}$ of the weight.
 # 2. Up to $0.999\, \mu W$ the cube rests; the part of its foot that slips grows.
-# 3. $1.001\, \mu W$ is refused, with the motion named: a translation along the force. The state before is in place.
+# 3. $1.001\, \mu W$ is refused. The message names the motion, a translation along the force; the last state is kept.
 
 
 # %%

@@ -2,8 +2,8 @@
 # # A rubber ring between two plates
 #
 # A thick ring of incompressible rubber is pressed flat between two rigid plates, with friction and without. Strains are
-# large, the part that touches grows from a line to a strip. The pressure in the rubber is an unknown of its own, in
-# Taylor-Hood's elements. Body, pressure and contact converge together in one Newton's method.
+# large, and the contact grows from a line to a strip. The pressure in the rubber is a separate unknown, in Taylor-Hood
+# elements. Newton's method solves for body, pressure and contact together.
 #
 # ## Notation
 #
@@ -21,7 +21,7 @@
 # and Coulomb friction with the upper plate. A rigid plane has the same normal everywhere, so the gap
 # $x_n = (X + u - a) \cdot n$ is exact for any displacement, and so is slip, which is measured on the plane.
 #
-# Without friction nothing is lost, and the force is the derivative of the stored energy: the **exact balance**
+# Without friction no energy is lost, so the force is the derivative of the stored energy: the **exact balance**
 #
 # $$ N = \mathrm{d} E_s / \mathrm{d} \delta . $$
 #
@@ -33,8 +33,8 @@
 # = \sum_{\text{contact nodes}} r \cdot v. $$
 #
 # $F$ is the derivative of $E_s = \int \psi$ with respect to both, found by UFL, and is given as it stands.
-# `ContactProblem` sees for itself that it is not linear, and which part of the mixed space are displacements. Rubber
-# of bulk modulus $K$ has the term $-p^2 / 2K$ more in $\psi$.
+# `ContactProblem` detects that it is nonlinear, and which part of the mixed space holds displacements. For rubber of bulk
+# modulus $K$, add the term $-p^2 / 2K$ to $\psi$.
 #
 # ## Code
 
@@ -127,7 +127,7 @@ def solved(problem) -> tuple[dc.Step, str]:
 # %% [markdown]
 # ## Result
 #
-# 1. Errors of the last iterates of a step fall as squares: body and contact in the same iteration.
+# 1. In the last iterations of a step errors fall quadratically, those of body and contact together.
 # 2. Without friction $N$ is the derivative of the stored energy, by central differences to 1e-5, and does not depend
 #    on the number of steps.
 # 3. With friction the work of the plate, by the trapezoidal rule, is stored or dissipated, to 1 %.

@@ -22,7 +22,7 @@
 # $$ a^2 = \frac{4 P R}{\pi E^*}, \qquad p = p_0 \sqrt{1 - x^2/a^2}, \quad p_0 = \frac{2P}{\pi a}, \qquad
 #    q = \mu p - \mu p_0 \tfrac{c}{a} \sqrt{1 - x^2/c^2}, \quad \frac{c}{a} = \sqrt{1 - \frac{Q}{\mu P}}. $$
 #
-# Slip is $s(x) = \frac{\mu}{R} \int_c^x \sqrt{t^2 - c^2} \, \mathrm{d}t$ at first, and twice as much on every way
+# Slip is $s(x) = \frac{\mu}{R} \int_c^x \sqrt{t^2 - c^2} \, \mathrm{d}t$ at first, and twice as much on every stroke
 # from $Q$ to $-Q$ or back, against the traction $\mu p$. A cycle dissipates
 #
 # $$ W = 8 \mu \int_c^a p\, s \,\mathrm{d}x. $$
@@ -40,7 +40,7 @@
 # ## Code
 #
 # Both bodies are parts of one mesh: a rectangle without its middle row of cells, whose halves are graded towards the
-# contact, differently. Either face may carry the unknowns.
+# contact in different ways. Either face may be the slave, which carries the unknowns.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -148,7 +148,7 @@ def closed_work(P: float, Q: float) -> float:
 # %% [markdown]
 # ## Result
 #
-# 1. The largest pressure is $p_0$ to 1 %. If the other side carries the unknowns, forces and the largest pressure differ
+# 1. The largest pressure is $p_0$ to 1 %. With the other side as slave, forces and the largest pressure differ
 #    by less than 0.5 %.
 # 2. Shear tractions are those of the closed form to 4 % in $L_2$.
 # 3. A cycle dissipates what the closed form says to 2 %.
@@ -158,7 +158,7 @@ def closed_work(P: float, Q: float) -> float:
 # %%
 def cycle(cells: int, swapped: bool) -> dict:
     """Press, shear, go through a cycle, slide; print and assert what is claimed of each side."""
-    say(f"the {'lower' if swapped else 'upper'} face carries the unknowns:")
+    say(f"the {'lower' if swapped else 'upper'} face is the slave:")
     problem, held = problem_of(cells, swapped)
     contact, stroke = problem.contacts[0], A**2 / (2 * R)
     held.value[:] = 0.0, -3.4 * stroke

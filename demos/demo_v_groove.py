@@ -108,10 +108,10 @@ def moment(contact) -> float:
 #
 # 1. Forces and moments of the reactions balance weight and torque, to $10^{-7}$ of the weight.
 # 2. Close to the largest torque, at $0.999\, T_{\max}$, both normal forces are those of the closed form to 1 %.
-# 3. $2\, T_{\max}$ is refused, and the motion is named: a rotation. The state before is in place.
+# 3. $2\, T_{\max}$ is refused. The message names the motion, a rotation; the last state is kept.
 #
-# A little above $T_{\max}$ there still are states: geometry is linear, and a rotation of some degrees then moves the contact along
-# the faces, where normal forces have a lever. Twice the torque is more than any nodes of the faces can carry.
+# A little above $T_{\max}$ there still are static states: geometry is linear, so a rotation of some degrees moves the contact along
+# the faces, where normal forces have a lever. Twice the torque exceeds what any nodes of the faces can carry.
 
 
 # %%

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A million cycles of wear
 #
-# A pad under a dead weight is rubbed to and fro on a plane. It wears until its pressure is even in the mean of a cycle, and then evenly.
-# `dc.cycle_jump` simulates few of the cycles.
+# A pad under a dead weight is rubbed to and fro on a plane. It wears until its pressure is even on average over a cycle, then evenly.
+# `dc.cycle_jump` simulates only a few of the cycles.
 #
 # ## Notation
 #
@@ -16,7 +16,7 @@
 #
 # ## Closed form
 #
-# In gross slip $\int w = k \mu N s\, n$ at any time. Where more is worn pressure falls, so it becomes even, $p = N / b$, and depth grows
+# In gross slip $\int w = k \mu N s\, n$ at any time. Where more is worn, the pressure falls, so it becomes even, $p = N / b$, and depth grows
 # by $k \mu p s$ a cycle everywhere [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 #
 # ## Weak form
@@ -84,7 +84,7 @@ def rub(problem):
 # ## Result
 #
 # 1. The worn volume is $k \mu N s\, n$ to 2 %, the accuracy asked for. (The pad follows the plane at each turn, which is less than 1 % of the way.)
-# 2. Depth is that of an even pressure to 2 % everywhere: pressure is even in the mean of a cycle. At the end of a stroke the moment of
+# 2. Depth is that of an even pressure to 2 % everywhere: pressure is even on average over a cycle. At the end of a stroke the moment of
 #    friction tilts it.
 # 3. At most one cycle of 5,000 is simulated.
 

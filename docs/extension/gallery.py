@@ -15,6 +15,15 @@ COMMANDS = {
     "demo_punch": (["-m", "demos.demo_punch", "--output", "{folder}"], "punch.png"),
     "demo_own_loop": (["-m", "demos.demo_own_loop"], None),
 }
+# Themes of the index and their demos, the picture that says most first.
+THEMES = {
+    "The paper's punch": ("punch", "quarter_punch", "own_loop"),
+    "Pressed": ("hertz", "ball_on_flat", "grooves"),
+    "Partial slip, fretting, wear": ("partial_slip", "two_cylinders", "dead_weight", "fretting", "wear"),
+    "Sliding": ("turning_path", "turntable", "impact"),
+    "Held by contact alone": ("pushed_cube", "box", "v_groove"),
+    "Large strains, plasticity": ("seal", "ironing", "indentation"),
+}  # fmt: skip
 
 
 def cells(text: str) -> list[tuple[bool, str]]:
@@ -81,19 +90,22 @@ def write_pages(app) -> None:
     shutil.rmtree(PAGES, ignore_errors=True)
     PAGES.mkdir(parents=True)
     helpers = (ROOT / "demos" / "helpers.py").read_text()
-    cards, names = [], []
-    for file in sorted((ROOT / "demos").glob("demo_*.py")):
-        name, text = file.stem, file.read_text()
+    cards, names = {}, [f"demo_{name}" for theme in THEMES.values() for name in theme]
+    for name in names:
+        text = (ROOT / "demos" / f"{name}.py").read_text()
         folder = KEPT / "gallery" / name
         result = kept(folder, fingerprint(text, helpers), lambda: run(name, folder))  # noqa: B023
         (PAGES / f"{name}.md").write_text(page(name, text, result))
-        cards.append(card(name, text, result["picture"]))
-        names.append(name)
-    cards.sort(key=lambda one: "![]" not in one)  # those without a picture last
+        cards[name] = card(name, text, result["picture"])
     tree = "\n".join(["```{toctree}", ":hidden:", "", *names, "```"])
     says = "Each demo is a script in `demos`. It states its problem, solves it, and asserts what it claims."
-    grid = "\n".join([":::::{container} cards", *cards, ":::::"])
-    (PAGES / "index.md").write_text(f"# Gallery\n\n{says}\n\n{grid}\n\n{tree}\n")
+    parts = [f"# Gallery\n\n{says}"]
+    for theme, of in THEMES.items():
+        grid = "\n".join(
+            [":::::{container} cards", *(cards[f"demo_{name}"] for name in of), ":::::"]
+        )
+        parts.append(f"## {theme}\n\n{grid}")
+    (PAGES / "index.md").write_text("\n\n".join([*parts, tree]) + "\n")
 
 
 def setup(app) -> dict:

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from test_packaging import clean_environment
 
 import dolfinx_contact as dc
-from docs.extension.gallery import cells
+from docs.extension.gallery import THEMES, cells
 from docs.extension.headers import HEADERS, declarations, without_bodies
 from docs.extension.links import dead_links, opened
 from docs.extension.runs import APART, blocks, run
@@ -297,7 +297,9 @@ def test_formulas_are_grouped_as_tex_does():
 
 
 def test_cells_of_demos():
-    """Every demo begins with a heading, which is its title in the gallery, and has code."""
+    """Every demo has a theme in the gallery, begins with a heading, which is its title there, and has code."""
+    named = sorted(f"demo_{name}" for theme in THEMES.values() for name in theme)
+    assert named == sorted(file.stem for file in (ROOT / "demos").glob("demo_*.py"))
     for file in (ROOT / "demos").glob("demo_*.py"):
         found = cells(file.read_text())
         assert found[0][0] and found[0][1].startswith("# "), file
