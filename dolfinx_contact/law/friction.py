@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.support.attributes import Guarded, frozen
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import finite, number
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
 
@@ -147,6 +147,39 @@ class Friction(Guarded):
         if not self.field:
             self._take(mu, p, k, axes)
         self._made = True
+
+    @staticmethod
+    def of_pair(first: Friction | float, second: Friction | float, angle: float = 0.0) -> Friction:
+        """The law of two sides with a texture each: the mean of both in the sense of works, see ``law/pair.py``.
+
+        Sliding along axes that both sides share works as the mean of theirs, with ``mu`` the mean of both.  In other directions the law works at most as the mean, in the
+        worst one 5 % less for ``mu`` 2 : 1 across 1 : 2, and 11 % less for 3 : 1 across 1 : 3: no orthotropic law is exact there.  A rule of your own is a function of two
+        laws that returns a ``Friction``.
+
+        Args:
+            first, second: Laws of numbers or of arrays per node, no fields; a number is isotropic friction.
+            angle: From the first principal direction of the first side to that of the second, in radians about the normal.  Where bodies turn against each other, assign
+                the pair anew between steps.
+
+        Raises:
+            ValueError: fields, or another angle than one finite number.
+
+        Example:
+            >>> crossed = dc.Friction.of_pair(dc.Friction((0.3, 0.1)), dc.Friction((0.3, 0.1)), angle=np.pi / 2)
+        """
+        from dolfinx_contact.law.pair import mean
+
+        first, second = as_friction(first), as_friction(second)
+        for law in (first, second):
+            if not isinstance(law, Friction) or law.field:
+                raise ValueError(f"of_pair takes laws of numbers or arrays per node, not {law!r}.")
+        turned = float(number("angle", angle))
+        sides = [(law.mu, law.Q, by + _angle(law.axes)) for law, by in ((first, 0.0), (second, turned))]  # fmt: skip
+        mu, p, axes = mean(*sides)
+        if axes.ndim == 2:
+            return Friction(np.broadcast_to(mu, axes.shape), np.broadcast_to(p, axes.shape), axes=axes)  # fmt: skip
+        straight = axes[0] == 1.0
+        return Friction(mu, p, axes=None if straight else _Direction(axes))
 
     def _take(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
         given, mu = (mu, p, k), _cone(mu)
@@ -307,6 +340,20 @@ class Friction(Guarded):
             p = None if self.associated else np.where(self.mu > 0, self.p, 1.0)
             self._laws[dim] = _kernel.make_law(mu, p, dim, self.axes)
         return self._laws[dim]
+
+
+class _Direction:
+    """One direction in the frames of all nodes, as a field."""
+
+    def __init__(self, axis: np.ndarray):
+        self._axis = axis
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        return np.repeat(self._axis[:, None], x.shape[1], axis=1)
+
+
+def _angle(axes: np.ndarray | None) -> Any:
+    return 0.0 if axes is None else np.arctan2(axes[:, 1], axes[:, 0])
 
 
 def at_most_rough(friction: Friction) -> Friction:

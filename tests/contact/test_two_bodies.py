@@ -126,6 +126,25 @@ def test_sliding_carries_mu_n(degree):
     assert (scene.contact.area > 0).all()
 
 
+@pytest.mark.parametrize("along, angle", [((1, 0), 0.0), ((0, 1), np.pi / 2), pytest.param((1, 0), np.pi / 2, marks=pytest.mark.slow)])  # fmt: skip
+def test_two_textures_work_as_the_mean(along, angle):
+    """Where all slides, work of friction over force and way is the mean of what both sides would work."""
+    laws = dc.Friction((0.3, 0.1), (0.1, 0.2)), dc.Friction((0.15, 0.25))
+    scene = blocks("hexahedron", 1, ((2, 2, 1), (3, 3, 1)), size=(1.0, 2.0), axis=(1, 0, 0), sliding="large")  # fmt: skip
+    scene.contact.friction = dc.Friction.of_pair(*laws, angle)
+    for way in (0.0, 0.2, 0.4):
+        before = scene.contact.dissipation.copy()
+        scene.way.value[:] = (*np.multiply(way, along), -1e-4)
+        step = scene.problem.solve()
+    assert step.counts.stick == 0
+    done = total(scene.contact.dissipation - before)
+    force, slip = scene.contact.force(), np.array([along], dtype=float)
+    turned = slip @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    works = [float((law.drag(by) * by).sum()) for law, by in zip(laws, (slip, turned))]
+    assert abs(force[:2] @ along) == pytest.approx(np.mean(works) * force[2], rel=2e-3)
+    assert done == pytest.approx(np.mean(works) * force[2] * 0.2, rel=0.01)
+
+
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
 @pytest.mark.parametrize("weight", ["2 pi r", "callable", "thickness"])
 def test_an_even_pressure_of_weighted_forms(weight, swapped):

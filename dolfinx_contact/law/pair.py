@@ -1,0 +1,55 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+r"""The friction law of two textured sides: the mean of both in the sense of works.
+
+Sliding along a unit vector ``e`` an associated law works ``h(e) = |M e| = sqrt(e . A e)`` per normal force and way, with ``A = M^2`` in common axes.
+The mean ``(h_1 + h_2) / 2`` of two sides is a support function, too: that of the Minkowski mean of their ellipses, which is an ellipse only if
+their axes and ``mu_y / mu_x`` are the same.  Its square is ``(e . A_1 e + e . A_2 e + 2 h_1 h_2) / 4``; the quadratic form
+
+.. math:: A = (A_1 + A_2 + 2 A_1 \# A_2) / 4,
+
+with the geometric mean ``#`` of matrices in the place of the product, is never above it [Kubo, Ando, Math. Ann. 246, 1980: ``x . (A # B) x``
+is at most ``sqrt(x . A x  x . B x)``], and is equal to it along common axes: there ``M = (M_1 + M_2) / 2``.
+
+The slip rule is that of the mean of ``ln Q``, as far as it lies along the axes of ``A``: sides with one ``Q`` have it as a pair, two associated sides make an associated law.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Part of a matrix that is not isotropic, below which it has no axes.
+ROUND = 1e-12
+
+
+def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
+    """Coefficients ``mu`` and ``p``, and axes, of the pair, ``shape=(n, 2)`` each.
+
+    Args:
+        first, second: ``mu``, ``Q`` and the angle of the first principal direction, ``shape=(n, 2)``, ``(n, 2)`` and ``(n,)`` or what
+            broadcasts to that; zero ``mu`` is no friction.
+    """
+    A, B = (_tensor(mu**2, angle) for mu, _, angle in (first, second))
+    a, b = (np.prod(mu, axis=-1) for mu, *_ in (first, second))  # roots of the determinants
+    sums = [np.divide(of, root, np.zeros_like(of), where=root > 0) for of, root in zip((*A, *B), (a, a, a, b, b, b))]  # fmt: skip
+    mid = [one + other for one, other in zip(sums[:3], sums[3:])]
+    determinant = mid[0] ** 2 - mid[1] ** 2 - mid[2] ** 2
+    factor = np.sqrt(np.divide(a * b, determinant, np.zeros_like(a * b), where=determinant > 0))
+    iso, x, y = ((one + other + 2 * factor * of) / 4 for one, other, of in zip(A, B, mid))
+    soft = [_tensor(np.log(np.where(Q > 0, Q, 1.0)), angle) for _, Q, angle in (first, second)]
+    sides = np.maximum((a > 0) * 1.0 + (b > 0), 1.0)
+    qx, qy = ((one + other) / sides for one, other in zip(soft[0][1:], soft[1][1:]))
+    plain = np.hypot(x, y) <= ROUND * iso
+    turn = np.where(plain, np.arctan2(qy, qx), np.arctan2(y, x)) / 2
+    turn += np.pi / 2 * np.round((first[2] - turn) / (np.pi / 2))  # nearest to the first side's
+    cos, sin = np.cos(2 * turn), np.sin(2 * turn)
+    along, rule = x * cos + y * sin, qx * cos + qy * sin
+    mu = np.sqrt(np.maximum(np.stack((iso + along, iso - along), axis=-1), 0.0))
+    p = mu * np.exp(np.stack((rule, -rule), axis=-1))
+    return mu, np.where(mu > 0, p, 1.0), np.stack((np.cos(turn), np.sin(turn)), axis=-1)
+
+
+def _tensor(values: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Half the trace, and the rest along doubled angles, of tensors with these principal values."""
+    iso, rest = (values[..., 0] + values[..., 1]) / 2, (values[..., 0] - values[..., 1]) / 2
+    return iso + 0.0 * angle, rest * np.cos(2 * angle), rest * np.sin(2 * angle)
