@@ -578,7 +578,8 @@ class Contact(Guarded):
         sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
         pressed = np.maximum(self.last.reaction[:, -1], self.reaction[:, -1])
-        path = (pressed > 0.0) * np.linalg.norm(slip, axis=1)
+        # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
+        path = ((pressed > 0.0) & (self.covered > 0.0)) * np.linalg.norm(slip, axis=1)
         work, path = self.repeats * self._work(slip), self.repeats * path
         if self._wearing is not None:
             depth = self._wearing

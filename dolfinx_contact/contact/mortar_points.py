@@ -59,6 +59,7 @@ class MortarPlacement(Placement):
             None,
         )  # a displacement with the nodes that have left, and what was placed for it
         self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
+        self._leaving = False  # whether nodes of any rank leave the other side in the step
         self._owned = owned
         super().__init__(
             contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
@@ -112,11 +113,13 @@ class MortarPlacement(Placement):
         if self._renewed > LEAVES:
             self._left |= alone & ~self._used.alone
         self._used = self.now.points
+        left = alone & ~self.settled.points.alone
+        self._leaving = bool(self._comm.allreduce(left.any(), op=MPI.LOR))
 
     def begin(self, start: np.ndarray) -> None:
         """A step begins at a displacement, and its first rows are no renewal."""
         self._start, self._used, self._renewed = start, self.settled.points, -1
-        self._left[:] = False
+        self._left[:], self._leaving = False, False
 
     def carried(self, last: State) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
@@ -130,9 +133,17 @@ class MortarPlacement(Placement):
         return last._replace(displacement=moved, reaction=turned, gap=gap)
 
     def moved(self, u: np.ndarray, last: State, worn: np.ndarray) -> dict:
-        """See ``Placement``; what is opposite nothing does not slip."""
-        moved = super().moved(u, last, worn)
-        moved["slip_increment"][self.now.points.alone] = 0.0
+        """See ``Placement``; what is opposite nothing does not slip, but past what it has left in the step."""
+        moved, alone = super().moved(u, last, worn), self.now.points.alone
+        moved["slip_increment"][alone] = 0.0
+        if self._leaving:
+            before = self.settled
+            slip = before.points.motion(u - self._start)
+            slip[:, -1] = 0.0
+            slip = times(self.now.frame, turned_back(before.frame, slip))[:, :-1]
+            self.now.points.without_held(slip)
+            left = alone & ~before.points.alone
+            moved["slip_increment"][left] = slip[left]
         return moved
 
     def back_to(self, at: np.ndarray | None) -> None:
@@ -173,7 +184,13 @@ class MortarPlacement(Placement):
             volume: ``V_a``.
             area: Of this rank's nodes of the other side, ``shape=(k,)``.
         """
-        volumes, area = self._comm.allreduce(self.now.points.m.T @ volume), self._master.everywhere(area[:, None])[:, 0]  # fmt: skip
+        now, before = (
+            self.now.points,
+            self.settled.points,
+        )  # of what has left in the step those before
+        mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
+        volumes = self._comm.allreduce(mine)
+        area = self._master.everywhere(area[:, None])[:, 0]
         bears = area > NOTHING * area.max(initial=0.0)
         kept = np.where(bears, np.maximum(volumes, 0.0), 0.0)
         if kept.any():

@@ -96,6 +96,13 @@ def test_ironing(degree, swapped):
     assert np.abs(coarse - fine).max() <= 0.01 * np.abs(fine).max()
 
 
+@pytest.mark.parametrize("steps, off", [(1, 0.02), (4, 0.01)])
+def test_work_of_nodes_that_come_and_go(steps, off):
+    """Of a slave that is the larger body, nodes come in over the edge of the other one and leave: work of friction is that of fine steps, with four facets a step, too."""
+    long, fine = (ironed(n, swapped=True)[1].contact for n in (steps, 40))
+    assert total(long.dissipation) == pytest.approx(total(fine.dissipation), rel=off)
+
+
 @pytest.mark.parametrize("cell, degree", [("hexahedron", 1), *[pytest.param(cell, 2, marks=pytest.mark.slow) for cell in ("hexahedron", "tetrahedron")]])  # fmt: skip
 def test_ironing_in_space(cell, degree):
     """As in the plane, with edges across and along the way that cover facets in part, as the block reaches the end of the other one."""
