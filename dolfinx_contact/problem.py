@@ -60,6 +60,7 @@ from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
+    from dolfinx_contact.step.geometry import Ends
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -446,7 +447,7 @@ class ContactProblem(Guarded):
             if repeated == ends.most:
                 said = undivided(max(missed, late), self.geometry_tol, repeated)
                 break
-            step, again = self._repeated(step, ends.after(found.x))
+            step, again = self._repeated(step, ends, found.x)
             known = self._keep_one_start(known)
             found = again._replace(iterations=found.iterations + again.iterations)
         return step, found, missed, said
@@ -463,14 +464,14 @@ class ContactProblem(Guarded):
         acting = step.carried(self.geometry_tol)
         return geometry_error(self.body, contacts, stiffness, found.x, acting), said
 
-    def _repeated(self, step: LoadStep, end: np.ndarray) -> tuple[LoadStep, SolverResult]:
-        """The step with the geometry of a displacement at its end.  Collective."""
+    def _repeated(self, step: LoadStep, ends: Ends, x: np.ndarray) -> tuple[LoadStep, SolverResult]:
+        """The step with the geometry of its end, after it has ended at a displacement.  Collective."""
         for surface in {id(c.surface): c.surface for c in self.contacts}.values():
             surface.end_step()
         placed = [contact.placement.now for contact in self.contacts]
         for contact in self.contacts:
             contact.restore()
-        step = self.load_step(step.holding, end)
+        step = self.load_step(step.holding, ends.after(x))
         for contact, before in zip(self.contacts, placed):
             contact.placement.count_as(before)
         return self._worn(step)

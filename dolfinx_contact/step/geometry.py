@@ -37,27 +37,42 @@ TURNED, PLACES = 0.5, 32
 
 
 class Ends:
-    """Displacements whose geometry a step is repeated with: those at which it has ended.
+    """Displacements, and poses of surfaces, whose geometry a step is repeated with: those at which it has ended.
 
-    On deformable surfaces, after the first one, they are mixed by Anderson's method: rows follow the displacement of facets,
-    which in soft bodies follows the rows nearly as far.
+    After the first one, they are mixed by Anderson's method where they answer to the geometry: rows on deformable surfaces follow the
+    displacement of facets, which in soft bodies follows the rows nearly as far; a platen that turns freely, and pushes a slender body
+    aside by that, tilts to and fro.
 
     Attributes:
         most: How often a step is repeated.
     """
 
     def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
-        changes = any(c.surface.deformable and c.changes for c in contacts)
-        self.most, self._mix, self._at = REPEATED, None, None
-        if changes:
-            self.most, self._mix = RENEWED, Anderson(body.size, MIXED, body.total)
+        renewed = any(c.surface.deformable and c.changes for c in contacts)
+        self.most = RENEWED if renewed else REPEATED
+        self._turning = list(
+            {id(c.surface): c.surface for c in contacts if c.surface.spins}.values()
+        )
+        self._arm, self._mix, self._at = body.extent, None, None
+        if renewed or self._turning:
+            size = body.size + sum(pose.size for pose in self._poses())
+            self._mix = Anderson(size, MIXED, body.total)
+
+    def _poses(self) -> list[np.ndarray]:
+        """Displacement and rotation of each surface that turns freely, as lengths."""
+        return [np.append(s.displacement, self._arm * s.rotation) for s in self._turning]
 
     def after(self, x: np.ndarray) -> np.ndarray:
-        """The next one, after a solution with the last one ended at ``x``, owned degrees of freedom.  Collective."""
-        at, self._at = self._at, x
+        """The next one, after a solution with the last one ended at ``x``, owned degrees of freedom; surfaces take their poses.  Collective."""
+        at, self._at = self._at, np.concatenate((x, *self._poses()))
         if at is not None and self._mix is not None:
-            self._at = self._mix.step(at, x - at)[0]
-        return self._at
+            self._at = self._mix.step(at, self._at - at)[0]
+            first = x.size
+            for surface in self._turning:
+                size, angles = surface.point.size, surface.rotation.size
+                pose, first = self._at[first : first + size + angles], first + size + angles
+                surface.displacement, surface.rotation = pose[:size], pose[size:] / self._arm
+        return self._at[: x.size]
 
 
 def geometry_error(

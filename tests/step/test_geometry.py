@@ -161,6 +161,32 @@ def test_a_rocker_rolls_to_where_its_weight_is():
     assert found == pytest.approx([-0.1, -0.1], rel=2e-2)
 
 
+@pytest.mark.parametrize("mu, moment", [(0.0, [0.15]), (0.3, [0.15]), (0.0, [0.01, 0.005, 0.0])])
+def test_a_small_platen_tilts_alike_in_one_step_and_in_many(mu, moment):
+    """By 0.05 to 0.07 under a column that without friction it pushes aside by this: pose and balance are those of its end."""
+    d, found = len(moment) // 3 + 2, []
+    F = 10.0 if d == 2 else 1.0
+    for steps in (1, 4):
+        plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
+        ends = [-0.05] * (d - 1) + [0], [0.05] * (d - 1) + [0.1]
+        scene = slab(*ends, [4, 1] if d == 2 else [4, 4, 1], plane, mu)
+        plane.free, plane.force = ("n", "r") if d == 2 else ("n", "r1", "r2"), F * np.eye(d)[-1]
+        scene.step(*np.zeros(d))
+        for k in range(steps):
+            plane.moment = (k + 1) / steps * np.array(moment)
+            step = scene.step(*np.zeros(d))
+        assert step.geometry_error <= TOL
+        angle = plane.rotation
+        tilted = np.array([-np.sin(angle[0]), np.cos(angle[0])]) if d == 2 else Rotation.from_rotvec(angle.copy()).as_matrix()[:, 2]  # fmt: skip
+        contact = scene.contact
+        assert contact.force() @ tilted == pytest.approx(F * tilted[-1], rel=2 * TOL)
+        about = contact.moment()[: 2 if d == 3 else 1]
+        assert about == pytest.approx(moment[: len(about)], abs=2 * TOL * F * 0.05)
+        assert np.linalg.norm(angle) > 0.04
+        found.append(angle)
+    assert found[0] == pytest.approx(found[1], rel=5e-3, abs=1e-5)
+
+
 # -- turns -------------------------------------------------------------------------------------
 
 
