@@ -20,9 +20,9 @@ __all__: list[str] = [
     "Law2D",
     "Law3D",
     "clip",
-    "common_integrals",
     "instruction_sets",
     "make_law",
+    "mortar_rows",
     "stubs",
 ]
 
@@ -353,27 +353,6 @@ def clip(
     The common parts of pairs of convex polygons, corners in order, shape (n, k, 2) with k at most 4: (corners of shape (n, k + m, 2), how many of them count of shape (n,)), zero where there is no area.
     """
 
-def common_integrals(
-    one: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    one_local: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    one_shapes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    one_degree: typing.SupportsInt | typing.SupportsIndex,
-    other: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    other_local: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    other_shapes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    other_degree: typing.SupportsInt | typing.SupportsIndex,
-    at: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    density: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> tuple[
-    numpy.typing.NDArray[numpy.float64],
-    numpy.typing.NDArray[numpy.float64],
-    numpy.typing.NDArray[numpy.float64],
-]:
-    """
-    Integrals over the common parts of n pairs of pieces: of shape functions N of the one side, shape (n, k), of products of them, (n, k, k), and with those of the other side, (n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where these are on the reference facet; shape functions are monomials times coefficients, shape (k, k); at and weights are a rule on the unit interval; density is that of the measure, shape (n, k), at the nodes of the one side's facets, or empty.
-    """
-
 def instruction_sets() -> list[str]:
     """
     What this processor can run beyond what every one can, the widest first: _algebra_avx512, _algebra_avx2.
@@ -387,6 +366,19 @@ def make_law(
 ) -> typing.Any:
     """
     The simplest law with coefficients mu and p of shape (dim-1,) or (n, dim-1). p None: associated. axes: principal direction x (cos, sin) of each node, shape (n, 2).
+    """
+
+def mortar_rows(
+    slaves: list, masters: list, count: typing.SupportsInt | typing.SupportsIndex, rules: list
+) -> tuple[
+    numpy.typing.NDArray[numpy.float64],
+    numpy.typing.NDArray[numpy.float64],
+    numpy.typing.NDArray[numpy.float64],
+    numpy.typing.NDArray[numpy.int64],
+    numpy.typing.NDArray[numpy.int64],
+]:
+    """
+    Rows of a dual mortar method: (int N_a over the covered part, shape (count,), over all of it, and int psi_a N_b, values, columns and starts of rows). Sides are lists of facets of one shape each, (x of shape (m, k, dim), outward normals (m, dim), nodes on the reference facet (k, dim - 1), coefficients of the shape functions (k, k), a row for each monomial, density of the measure (m, k) or empty, rows or columns of the nodes (m, k), negative is none, nodes at the corners of each straight piece (parts, c), degree); rules are (points, weights) on the unit interval, with ever more points for quadrilaterals that are no parallelograms.
     """
 
 def stubs() -> str:

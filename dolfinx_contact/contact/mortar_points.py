@@ -22,7 +22,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import turn_of_nodes
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
-from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, rows_of
+from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
 from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
@@ -52,7 +52,8 @@ class MortarPlacement(Placement):
         self._master = Skin(of, contact.surface.facets, comm)
         numbers = _numbers(of.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)
-        self._near = [np.isin(side.nodes, self._mine).any(axis=1) for side in self._slave.sides]
+        self._slave.keep(self._mine)
+        self._at_nodes = [at_nodes(side, self._mine) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
         self._projected: tuple = (
             None,
@@ -77,11 +78,10 @@ class MortarPlacement(Placement):
         compat.free_garbage(self._comm)  # rows of earlier steps
         slaves, moved = self._slave.moved(u)
         masters, there = self._master.moved(u)
-        mine = [side.some(near) for side, near in zip(slaves, self._near)]
         with raised_together(self._comm):
-            rows = _sorted_rows(mine, masters, self._mine)
+            rows = rows_of(slaves, masters, self._mine, len(there))
             rows = rows._replace(covered=rows.covered & ~self._left)
-            normals = _without(self._supported, _mean_normals(mine, self._mine))
+            normals = _without(self._supported, self._mean_normals(slaves))
             frames = frames_along(normals, self._axis(moved), self.x, self.surface)
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
@@ -94,6 +94,13 @@ class MortarPlacement(Placement):
         found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
         self._projected = key, found
         return found
+
+    def _mean_normals(self, slaves: list[Side]) -> np.ndarray:
+        """Unit normals at slave nodes, towards their body: means of facets' by area, ``shape=(n, gdim)``."""
+        sums = np.zeros_like(self.x)
+        for at, side in zip(self._at_nodes, slaves):
+            sums -= at @ side.outwards
+        return sums / np.linalg.norm(sums, axis=1, keepdims=True)
 
     def _axis(self, moved: np.ndarray) -> np.ndarray | None:
         """The axis turned with the slave's facets as a whole, whose nodes are at ``moved``, ``shape=(m, gdim)``."""
@@ -308,6 +315,7 @@ class Skin:
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
+        self._inside_out = [side.inside_out for side in sides]
         ends = [side.x[:, side.corners] for side in sides]
         edges = [np.linalg.norm(x[:, 1] - x[:, 0], axis=1) for x in ends]
         self.smallest = min([edge.min(initial=np.inf) for edge in edges], default=np.inf)
@@ -333,7 +341,14 @@ class Skin:
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
         """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
         there = self.x + self.everywhere(u[self._own])
-        return [side.moved(there[side.nodes]) for side in self.sides], there
+        sides = zip(self.sides, self._inside_out)
+        return [side.moved(there[side.nodes], signs) for side, signs in sides], there
+
+    def keep(self, nodes: np.ndarray) -> None:
+        """Of the facets keep those that have any of these nodes."""
+        near = [np.isin(side.nodes, nodes).any(axis=1) for side in self.sides]
+        self.sides = [side.some(of) for side, of in zip(self.sides, near)]
+        self._inside_out = [side.inside_out for side in self.sides]
 
 
 class MortarPoints(ContactPoints):
@@ -373,15 +388,11 @@ class MortarPoints(ContactPoints):
         none = np.zeros(self.count)
         part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
         self.share = frozen(np.where(rows.covered, part, 0.0))
-        turned = block_diagonal(frames)
-        mine = (self.first + dofs).ravel()
-        away = (turned @ sparse.kron(self.m, sparse.eye(self.dim), "csr")).tocoo()
-        own = turned.tocoo()
-        columns = (mine[own.col], opposite.ravel()[away.col])
-        parts = (np.append(own.row, away.row), np.append(*columns))
-        B = sparse.coo_matrix((np.append(own.data, -away.data), parts), (dofs.size, self._whole))
-        B = B.tocsr()
-        self._B = self._petsc(B.indptr, B.indices, B.data)
+        both = sparse.hstack((sparse.eye(self.count), -self.m), "csr")
+        blocks = both.data[:, None, None] * np.repeat(frames, np.diff(both.indptr), axis=0)
+        B = sparse.bsr_matrix((blocks, both.indices, both.indptr), np.array(both.shape) * self.dim)
+        B, columns = B.tocsr(), np.concatenate((self.first + dofs, opposite)).ravel()
+        self._B = self._petsc(B.indptr, columns[B.indices], B.data)
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
@@ -540,30 +551,3 @@ def _without(held: np.ndarray, normals: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(left, axis=1, keepdims=True)
     some = length > FREE  # else the support holds the node along its normal
     return np.where(some, left / np.where(some, length, 1.0), normals)
-
-
-def _sorted_rows(slaves: list[Side], masters: list[Side], numbers: np.ndarray) -> Rows:
-    """``rows_of`` for nodes in any order."""
-    order, count = np.argsort(numbers), 1 + max((int(s.nodes.max(initial=-1)) for s in masters), default=-1)  # fmt: skip
-    rows = rows_of(slaves, masters, numbers[order], count)
-    back = np.argsort(order)
-    return Rows(rows.area[back], rows.whole[back], rows.m[back], rows.covered[back])
-
-
-def _mean_normals(sides: list[Side], numbers: np.ndarray) -> np.ndarray:
-    """Unit normals at slave nodes, towards their body: means of facets' by area, ``shape=(n, gdim)``."""
-    order = np.argsort(numbers)
-    gdim = sides[0].x.shape[2] if sides else 3
-    sums = np.zeros((numbers.size, gdim))
-    for side in sides:
-        ends = side.x[:, side.corners]
-        span = ends[:, 1:] - ends[:, :1]
-        area = np.linalg.norm(span[:, 0], axis=1)
-        if gdim == 3:
-            area = np.linalg.norm(np.cross(span[:, 0], span[:, 1]), axis=1)
-        at = np.searchsorted(numbers[order], side.nodes)
-        at[at == numbers.size] = 0
-        mine = numbers[order][at] == side.nodes
-        facet, k = np.nonzero(mine)
-        np.add.at(sums, order[at[facet, k]], -area[facet, None] * side.outwards[facet])
-    return sums / np.linalg.norm(sums, axis=1, keepdims=True)

@@ -3,11 +3,13 @@
 //
 // The geometry of two meshes that meet, on NumPy arrays.
 #include <dolfinx_contact/mortar/clip.h>
-#include <dolfinx_contact/mortar/integrate.h>
+#include <dolfinx_contact/mortar/rows.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <vector>
 
 namespace py = pybind11;
 
@@ -45,67 +47,108 @@ auto clip_all(const Corners &polygons, const Corners &by) {
     return py::make_tuple(corners, counts);
 }
 
-// One side of pairs of pieces: corners in the plane and on the reference facet, shape functions.
-struct PairedSide {
-    const Corners &corners, &local, &coefficients;
-    py::ssize_t pairs, k, dim;
-    dolfinx_contact::FacetShapes shapes;
+using Numbers = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
-    PairedSide(const Corners &corners_, const Corners &local_, const Corners &coefficients_,
-               int degree)
-        : corners(corners_), local(local_), coefficients(coefficients_),
-          pairs(checked(corners_, local_, coefficients_, degree)), k(corners_.shape(1)),
-          dim(corners_.shape(2)), shapes(int(k), degree, coefficients_.data()) {
-        if (coefficients.shape(0) != shapes.count() || coefficients.shape(1) != shapes.count())
-            throw py::value_error("coefficients must have a row and column for each monomial");
-    }
-    dolfinx_contact::FacetPiece piece(py::ssize_t i) const {
-        const py::ssize_t first = i * k * dim;
-        return {polygon_of(corners.data() + first, k, dim),
-                polygon_of(local.data() + first, k, dim)};
-    }
+// Facets of one shape of one side, as Python has them.
+struct SideArrays {
+    Corners x, outwards, local, coefficients, density;
+    Numbers numbers, cuts;
+    int degree;
 
-  private:
-    static py::ssize_t checked(const Corners &corners, const Corners &local,
-                               const Corners &coefficients, int degree) {
-        if (corners.ndim() != 3 || local.ndim() != 3 || coefficients.ndim() != 2)
-            throw py::value_error(
-                "corners and local must have shape (n, k, dim), coefficients two dimensions");
-        const py::ssize_t k = corners.shape(1), dim = corners.shape(2);
-        for (int axis = 0; axis < 3; ++axis)
-            if (corners.shape(axis) != local.shape(axis))
-                throw py::value_error("corners and local must have the same shape");
-        if (!(dim == 1 && k == 2) && !(dim == 2 && (k == 3 || k == 4)))
+    explicit SideArrays(const py::tuple &side)
+        : x(side[0].cast<Corners>()), outwards(side[1].cast<Corners>()),
+          local(side[2].cast<Corners>()), coefficients(side[3].cast<Corners>()),
+          density(side[4].cast<Corners>()), numbers(side[5].cast<Numbers>()),
+          cuts(side[6].cast<Numbers>()), degree(side[7].cast<int>()) {}
+
+    dolfinx_contact::MortarSide side() const {
+        if (x.ndim() != 3 || local.ndim() != 2 || cuts.ndim() != 2)
+            throw py::value_error("x must have shape (m, k, dim), local and cuts two dimensions");
+        const py::ssize_t m = x.shape(0), k = x.shape(1), dim = x.shape(2), c = cuts.shape(1);
+        if (!(dim == 2 && c == 2) && !(dim == 3 && (c == 3 || c == 4)))
             throw py::value_error("pieces must be intervals, triangles or quadrilaterals");
         if (degree != 1 && degree != 2)
             throw py::value_error("degree must be 1 or 2");
-        return corners.shape(0);
+        const dolfinx_contact::FacetShapes shapes(int(c), degree, coefficients.data());
+        if (shapes.count() != k || coefficients.size() != k * k || outwards.size() != m * dim ||
+            local.size() != k * (dim - 1) || numbers.size() != m * k ||
+            (density.size() > 0 && density.size() != m * k))
+            throw py::value_error("arrays of a side must have the shapes that x and cuts say");
+        for (py::ssize_t i = 0; i < cuts.size(); ++i)
+            if (cuts.data()[i] < 0 || cuts.data()[i] >= k)
+                throw py::value_error("cuts must be numbers of the k nodes of a facet");
+        return {int(dim),
+                std::size_t(m),
+                int(k),
+                int(c),
+                degree,
+                std::size_t(cuts.shape(0)),
+                x.data(),
+                outwards.data(),
+                numbers.data(),
+                local.data(),
+                cuts.data(),
+                coefficients.data(),
+                density.size() > 0 ? density.data() : nullptr};
     }
 };
 
-// Integrals of products of shape functions over the common parts of pairs of pieces.
-auto common_integrals(const Corners &one, const Corners &one_local, const Corners &one_shapes,
-                      int one_degree, const Corners &other, const Corners &other_local,
-                      const Corners &other_shapes, int other_degree, const Corners &at,
-                      const Corners &weights, const Corners &density) {
-    const PairedSide here(one, one_local, one_shapes, one_degree),
-        there(other, other_local, other_shapes, other_degree);
-    if (here.pairs != there.pairs || here.dim != there.dim || at.ndim() != 1 ||
-        weights.ndim() != 1 || at.size() != weights.size())
-        throw py::value_error("one and other must have as many pieces, at and weights points");
-    const py::ssize_t n = here.pairs, k = here.shapes.count(), m = there.shapes.count();
-    if (density.size() > 0 && density.size() != n * k)
-        throw py::value_error("density must have shape (n, k), or no entries");
-    py::array_t<double> D({n, k}), M({n, k, k}), C({n, k, m});
-    for (auto *array : {&D, &M, &C})
-        std::fill_n(array->mutable_data(), array->size(), 0.0);
-    const dolfinx_contact::LineRule rule{int(at.size()), at.data(), weights.data()};
-    for (py::ssize_t i = 0; i < n; ++i)
-        dolfinx_contact::add_common_integrals(
-            here.piece(i), here.shapes, there.piece(i), there.shapes, rule,
-            density.size() > 0 ? density.data() + k * i : nullptr, D.mutable_data() + k * i,
-            M.mutable_data() + k * k * i, C.mutable_data() + k * m * i);
-    return py::make_tuple(D, M, C);
+std::vector<SideArrays> arrays_of(const py::list &sides) {
+    std::vector<SideArrays> found;
+    for (const auto &side : sides)
+        found.emplace_back(side.cast<py::tuple>());
+    return found;
+}
+
+py::array_t<double> as_array(const std::vector<double> &values) {
+    return py::array_t<double>(py::ssize_t(values.size()), values.data());
+}
+
+// Rows of the slave nodes, each column once, in order.
+auto mortar_rows(const py::list &slaves, const py::list &masters, std::size_t count,
+                 const py::list &rules) {
+    const auto own = arrays_of(slaves), others = arrays_of(masters);
+    std::vector<Corners> kept;
+    std::vector<dolfinx_contact::LineRule> lines;
+    for (const auto &rule : rules) {
+        const auto pair = rule.cast<py::tuple>();
+        const auto at = pair[0].cast<Corners>(), weights = pair[1].cast<Corners>();
+        if (at.size() != weights.size())
+            throw py::value_error("a rule must have as many weights as points");
+        lines.push_back({int(at.size()), at.data(), weights.data()});
+        kept.insert(kept.end(), {at, weights});
+    }
+    std::vector<dolfinx_contact::MortarSide> opposite;
+    for (const auto &other : others)
+        opposite.push_back(other.side());
+    dolfinx_contact::MortarRows found(count, lines);
+    for (const auto &side : own) {
+        const auto slave = side.side();
+        for (py::ssize_t i = 0; i < side.numbers.size(); ++i)
+            if (side.numbers.data()[i] >= std::int64_t(count))
+                throw py::value_error("rows of slave nodes must be below count");
+        for (const auto &other : opposite)
+            if (other.dim != slave.dim)
+                throw py::value_error("both sides must have the same dimension");
+        found.add(slave, opposite);
+    }
+    std::vector<double> values;
+    std::vector<std::int64_t> columns, starts{0};
+    for (auto &row : found.rows) {
+        std::stable_sort(row.begin(), row.end(),
+                         [](const auto &a, const auto &b) { return a.first < b.first; });
+        for (std::size_t i = 0; i < row.size(); ++i) {
+            if (i == 0 || row[i].first != row[i - 1].first)
+                columns.push_back(row[i].first), values.push_back(0);
+            values.back() += row[i].second;
+        }
+        starts.push_back(std::int64_t(columns.size()));
+    }
+    const auto numbers = [](const std::vector<std::int64_t> &of) {
+        return py::array_t<std::int64_t>(py::ssize_t(of.size()), of.data());
+    };
+    return py::make_tuple(as_array(found.area), as_array(found.whole), as_array(values),
+                          numbers(columns), numbers(starts));
 }
 } // namespace
 
@@ -115,14 +158,19 @@ void bind_mortar(py::module_ &m) {
           "at most 4: "
           "(corners of shape (n, k + m, 2), how many of them count of shape (n,)), zero where "
           "there is no area.");
-    m.def("common_integrals", common_integrals, py::arg("one"), py::arg("one_local"),
-          py::arg("one_shapes"), py::arg("one_degree"), py::arg("other"), py::arg("other_local"),
-          py::arg("other_shapes"), py::arg("other_degree"), py::arg("at"), py::arg("weights"),
-          py::arg("density"),
-          "Integrals over the common parts of n pairs of pieces: of shape functions N of the one "
-          "side, shape (n, k), of products of them, (n, k, k), and with those of the other side, "
-          "(n, k, m). Pieces are corners in the plane or on a line, shape (n, c, dim), and where "
-          "these are on the reference facet; shape functions are monomials times coefficients, "
-          "shape (k, k); at and weights are a rule on the unit interval; density is that of the "
-          "measure, shape (n, k), at the nodes of the one side's facets, or empty.");
+    m.def(
+        "mortar_rows", mortar_rows, py::arg("slaves"), py::arg("masters"), py::arg("count"),
+        py::arg("rules"),
+        "Rows of a dual mortar method: (int N_a over the covered part, shape (count,), over all of "
+        "it, and int psi_a N_b, values, columns and starts of rows). Sides are lists of facets of "
+        "one "
+        "shape each, (x of shape (m, k, dim), outward normals (m, dim), nodes on the reference "
+        "facet "
+        "(k, dim - 1), coefficients of the shape functions (k, k), a row for each monomial, "
+        "density of "
+        "the measure (m, k) or empty, rows or columns of the nodes (m, k), negative is none, nodes "
+        "at "
+        "the corners of each straight piece (parts, c), degree); rules are (points, weights) on "
+        "the "
+        "unit interval, with ever more points for quadrilaterals that are no parallelograms.");
 }

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <utility>
 
 namespace dolfinx_contact {
 // The part that two convex polygons in the plane have in common, one edge after another [I. E.
@@ -36,6 +38,24 @@ template <int N> double twice_area(const Polygon<N> &polygon) {
     for (int k = 1; k + 1 < polygon.count; ++k)
         sum += twice_area(polygon[0], polygon[k], polygon[k + 1]);
     return sum;
+}
+
+// Whether the boxes around two polygons have no area in common: seen at once of most that have
+// none.
+template <int N, int M> bool apart(const Polygon<N> &one, const Polygon<M> &other) {
+    const auto within = [](const auto &of, double Point::*along) {
+        double low = of[0].*along, high = low;
+        for (int k = 1; k < of.count; ++k) {
+            low = std::min(low, of[k].*along);
+            high = std::max(high, of[k].*along);
+        }
+        return std::pair(low, high);
+    };
+    const auto clear = [&](double Point::*along) {
+        const auto a = within(one, along), b = within(other, along);
+        return a.second < b.first || b.second < a.first;
+    };
+    return clear(&Point::x) || clear(&Point::y);
 }
 
 // What of a polygon is to the left of the line from a to b.

@@ -86,7 +86,7 @@ struct FacetPiece {
     // Where the bilinear map of the unit square takes to `p` from: Newton's method.
     Point on_square(Point p) const {
         constexpr int steps = 20;
-        constexpr double rounding = 1e-15;
+        constexpr double last = 1e-9; // the square of it is rounding
         const Point &a = projected[0], &b = projected[1], &c = projected[2], &d = projected[3];
         const Point u{b.x - a.x, b.y - a.y}, v{d.x - a.x, d.y - a.y};
         const Point w{c.x - b.x - v.x, c.y - b.y - v.y};
@@ -99,7 +99,7 @@ struct FacetPiece {
             const double ds = (x * by_t.y - y * by_t.x) / area,
                          dt = (by_s.x * y - by_s.y * x) / area;
             s -= ds, t -= dt;
-            if (!(std::max(std::abs(ds), std::abs(dt)) > rounding))
+            if (!(std::max(std::abs(ds), std::abs(dt)) > last))
                 break;
         }
         return {s, t};
@@ -139,21 +139,28 @@ void on_common_part(const FacetPiece &one, const FacetPiece &other, const LineRu
     }
 }
 
-// Adds int N_i, int N_i N_j and int N_i N'_j over the common part, row by row. `density`, of the
-// measure, has a value for each shape function of the one side, or is null.
-inline void add_common_integrals(const FacetPiece &one, const FacetShapes &N,
+// Of the measure, which has a value for each shape function, or is one.
+inline double density_at(const double *density, const FacetShapes::Values &N, int count) {
+    if (!density)
+        return 1;
+    double factor = 0;
+    for (int i = 0; i < count; ++i)
+        factor += density[i] * N[std::size_t(i)];
+    return factor;
+}
+
+// Adds int N_i, int N_i N_j and int N_i N'_j over the common part, row by row; false where there is
+// none. `density` is that of the one side, see density_at.
+inline bool add_common_integrals(const FacetPiece &one, const FacetShapes &N,
                                  const FacetPiece &other, const FacetShapes &others,
                                  const LineRule &rule, const double *density, double *D, double *M,
                                  double *C) {
     const int k = N.count(), m = others.count();
+    bool met = false;
     on_common_part(one, other, rule, [&](Point p, double weight) {
         const auto here = N.at(one.reference(p)), there = others.at(other.reference(p));
-        if (density) {
-            double factor = 0;
-            for (int i = 0; i < k; ++i)
-                factor += density[i] * here[std::size_t(i)];
-            weight *= factor;
-        }
+        weight *= density_at(density, here, k);
+        met = true;
         for (int i = 0; i < k; ++i) {
             const double value = weight * here[std::size_t(i)];
             D[i] += value;
@@ -163,5 +170,6 @@ inline void add_common_integrals(const FacetPiece &one, const FacetShapes &N,
                 C[m * i + j] += value * there[std::size_t(j)];
         }
     });
+    return met;
 }
 } // namespace dolfinx_contact
