@@ -22,7 +22,7 @@
 #
 # ## Weak form
 #
-# $$ \int_{\Omega_1 \cup \Omega_2} P(u) : \nabla v \,\mathrm{d}x = \sum_a r_a \cdot \Big( v_a - \sum_b m_{ab} v_b \Big), $$
+# $$ \int_{\Omega_1 \cup \Omega_2} P(u) : \nabla v \,\mathrm{d}x = \sum_a r_a \cdot \left( v_a - \sum_b m_{ab} v_b \right), $$
 #
 # over the nodes $a$ of the stamp's face, each against those nodes $b$ of the block that are opposite in the present, deformed state.
 #

@@ -33,7 +33,7 @@
 # ## Weak form
 #
 # $$ \int_{\Omega_1 \cup \Omega_2} \sigma(u) : \varepsilon(v) \,\mathrm{d}x
-#    = \sum_a r_a \cdot \Big( v_a - \sum_b m_{ab} v_b \Big), $$
+#    = \sum_a r_a \cdot \left( v_a - \sum_b m_{ab} v_b \right), $$
 #
 # over nodes $a$ of the one side, each against a mean of nodes $b$ of the other one.
 #

@@ -296,6 +296,19 @@ def test_formulas_are_grouped_as_tex_does():
     assert grouped(r"\frac{a_{1}}{2} x") == r"\frac{{a_{1}}}{{2}} x"
 
 
+def test_every_displayed_formula_can_be_drawn():
+    """Those of demos and pages have no command that docutils does not know."""
+    pytest.importorskip("docutils")
+    from docs.extension.formulas import grouped, tex2mathml
+
+    texts = [body for file in (ROOT / "demos").glob("demo_*.py") for prose, body in cells(file.read_text()) if prose]  # fmt: skip
+    texts += [
+        file.read_text() for file in (ROOT / "docs").rglob("*.md") if "gallery" not in file.parts
+    ]
+    formulas = [found for text in texts for found in re.findall(r"\$\$(.+?)\$\$", text, re.DOTALL)]
+    assert len(formulas) > 50 and all(tex2mathml(grouped(found), as_block=True) for found in formulas)  # fmt: skip
+
+
 def test_cells_of_demos():
     """Every demo has a theme in the gallery, begins with a heading, which is its title there, and has code."""
     named = sorted(f"demo_{name}" for theme in THEMES.values() for name in theme)
