@@ -207,7 +207,8 @@ def polished(relation, start, law, target, reaction=None, near=0.0):
 
     It is tight when the law's own conditions hold and the last change of the reactions was small, both within
     ``target``; slips beyond what a node's force would make count by the turn of the force that explains them.
-    Where there are several solutions, one within ``near`` of ``reaction`` is looked for, else the nearest.
+    Where there are several solutions, one within ``near`` of ``reaction`` is looked for, else the nearest; as Newton's
+    method moves along them, a hundredth of ``near`` is a small change then.
     """
     best, closest = None, np.inf
     for factor in METRICS:
@@ -217,7 +218,8 @@ def polished(relation, start, law, target, reaction=None, near=0.0):
         normal, cone, slips = law_defects(r, gap, slip, law.k_n, law.K_t, law.mu, law.p)
         far = law.k_t * np.linalg.norm(slip, axis=1)
         turns = slips * np.minimum(1, np.linalg.norm(r[:, :-1], axis=1) / np.maximum(far, 1e-300))
-        if np.isfinite(left) and max(last, *map(norm, (normal, cone, turns))) <= target + 100 * floor:  # fmt: skip
+        holds = max(map(norm, (normal, cone, turns))) <= target + 100 * floor
+        if np.isfinite(left) and holds and last <= max(target, 0.01 * near) + 100 * floor:
             r = r.astype(float)
             if reaction is None or norm(r - reaction) <= near:
                 return r
