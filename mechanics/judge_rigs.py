@@ -40,6 +40,11 @@ def between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     return 2 * v if size == 0.0 else 2 * np.arcsin(size) * v / size
 
 
+def _across(vectors: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Parts of vectors across normals, rows."""
+    return vectors - (vectors * n).sum(axis=1)[:, None] * n
+
+
 class RigJudge:
     """Judges step after step of a scene of ``rigs.build_rig``.
 
@@ -66,7 +71,7 @@ class RigJudge:
         )
         self.order = [int(np.flatnonzero(scene.contact.nodes == i)[0]) for i in self.nodes]
         self.before, self.farthest = np.zeros(self.x.shape), 0.0
-        self.moved, self.angle = np.zeros(3), np.zeros(3)
+        self.moved, self.angle, self.gap = np.zeros(3), np.zeros(3), None
 
     def _geometry(self, there, moved, angle):
         """Distances and frames (t1, t2, n) of positions from the surface where it stands."""
@@ -96,6 +101,30 @@ class RigJudge:
         top = scene.point[2] + scene.radius + moved[2]
         return float((there[under, 2] + fall).min() - top)
 
+    def _along(self, there, start) -> np.ndarray:
+        """By what ways along the ball or roller, up to where it starts, are more than ways along the tangent planes there, ``shape=(n, 3)``.
+
+        Ways are arcs between nearest points; the last step left nodes as far from theirs as its tangent planes said.
+        """
+        kept = [1, 0, 1] if self.scene.kind == "roller" else [1, 1, 1]
+        began, ends = ((there - self.scene.point - at) * kept for at in (self.moved, start))
+        if self.scene.kind == "plane" or not (ends - began).any():
+            return np.zeros_like(ends)
+        (n0, far), (n, distance) = map(self._radial, (began, ends))
+        gap = far if self.gap is None else self.gap
+        chord = ends - began - distance[:, None] * n + gap[:, None] * n0
+        half_turn = 0.5 * np.arctan2(np.linalg.norm(np.cross(n0, n), axis=1), (n0 * n).sum(axis=1))
+        middle = (n0 + n) / np.linalg.norm(n0 + n, axis=1)[:, None]
+        way = _across(ends - began, n)
+        length = np.linalg.norm(way, axis=1)
+        arc = np.linalg.norm(_across(chord, middle), axis=1) / np.sinc(half_turn / np.pi)
+        return (np.divide(arc, length, np.ones_like(arc), where=length > 0) - 1)[:, None] * way
+
+    def _radial(self, arms) -> tuple[np.ndarray, np.ndarray]:
+        """Normals of a ball or roller at these arms of its middle, and distances."""
+        length = np.linalg.norm(arms, axis=1)
+        return arms / length[:, None], length - self.scene.radius
+
     def verdict(self, asked, tol: float) -> judge.Verdict:
         """Of the step that was just solved under what ``apply`` returned."""
         scene, surface = self.scene, self.scene.surface
@@ -123,7 +152,7 @@ class RigJudge:
         last = self.before.copy()
         last[self.nodes] += ended - self.moved + swung
         slipped = np.einsum("ni,nij->nj", scene.contact.slip_before_touching, np.broadcast_to(scene.contact.frame, (len(arms), 3, 3))[:, :-1])  # fmt: skip
-        last[self.nodes] += slipped[self.order]
+        last[self.nodes] += slipped[self.order] - self._along(there, start)
         reach = np.full(
             len(arms), np.abs(self.x).max() + np.abs(scene.point).max() + np.abs(ended).max()
         )
@@ -144,6 +173,7 @@ class RigJudge:
             ended - asked.moved,
             np.abs(ended).sum() + np.abs(asked.moved).sum(),
         )
+        self.gap = gap0 + np.einsum("nj,nj->n", frames[:, -1], u[self.nodes])
         self.before, self.moved, self.angle = u, ended, np.array(surface.rotation)
         self.farthest = max(self.farthest, np.abs(u).max())
         return found
