@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 # Part of a motion that has to be along normals for these to resist it.
 RESISTING = 1e-8
 
+# Stiffness of a spring over that of the contact nodes, beyond which rounding of its force hides theirs.
+STIFFEST = 1e10
+
 # Times that a curved surface far from the body comes nearer.
 APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
@@ -139,11 +142,29 @@ class DrivenSurfaces:
                 f"surface.free has {name!r}, along or about which nothing holds the plane: there is no friction. Give it "
                 "surface.stiffness, or prescribe its motion."
             )
+        if self.springs.any():
+            self._check_springs()
         pulled = None if self.plain else self._pulled()
         if pulled is not None:
             raise ValueError(
                 f"surface.force does not press {pulled} on the body: it pulls the surface off, and nothing else holds it. It "
                 "is the force of the surface on the body; a spring, surface.stiffness, also pulls."
+            )
+
+    def _check_springs(self) -> None:
+        """Raise a ``ValueError`` on all ranks for springs whose force double precision does not resolve.  Collective."""
+        sums = np.zeros(self.count)
+        for contact, axes in zip(self._contacts, self.axes):
+            sums += np.einsum("n,nim->m", contact.rho, axes**2)
+        nodes = self._body.total(sums)
+        too_stiff = (self.springs > STIFFEST * nodes) & (nodes > 0.0)
+        if too_stiff.any():
+            k = int(np.argmax(too_stiff))
+            scale = self._lengths[k] ** 2
+            raise ValueError(
+                f"surface.stiffness has {self.springs[k] * scale:.3g} for {self.names[k]!r}, {self.springs[k] / nodes[k]:.1g} times as stiff "
+                f"as the contact nodes together: rounding of its force would hide theirs. That is a support: leave {self.names[k]!r} out "
+                f"of surface.free and prescribe the motion, or take a spring of at most {1e-3 * STIFFEST * nodes[k] * scale:.0e}."
             )
 
     def _pulled(self):

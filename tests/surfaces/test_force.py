@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scenes
 from dolfinx import mesh
+from way_scenes import slab
 
 import dolfinx_contact as dc
 from dolfinx_contact.surfaces.balance import SurfaceBalance
@@ -162,6 +163,32 @@ def test_no_state_beyond_the_ellipse_of_friction(degrees, given):
     assert (scene.surface.displacement == stood).all()
     scene.push(*0.9 * most * way, load)
     assert scene.force()[:2] == pytest.approx(0.9 * most * way, rel=1e-7, abs=1e-7 * load)
+
+
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+@pytest.mark.parametrize("free", ["tn", "n", "tnr", "xy"])
+def test_springs_as_stiff_as_supports_are_right_or_refused(free, solver):
+    """Of 1e7 E they give the force of a prescribed motion; beyond what double precision resolves they are refused by name."""
+    round_, way = free == "xy", np.array([0.002 * (free != "n"), 0.01])
+    forces = []
+    for k in (0.0, 1e7, 1e13, 1e19):
+        surface = dc.RigidSphere((0, -2.0), 2.0) if round_ else dc.RigidPlane((0, 0), (0, 1))
+        scene = slab([-0.5, 0], [0.5, 0.5], [8, 4], surface, 0.3, solver=solver, tol=1e-7)
+        if k == 0.0:
+            surface.displacement = way
+        else:
+            surface.free, surface.stiffness, surface.drive = (
+                tuple(free),
+                dict.fromkeys(free, k * 1000),
+                way,
+            )
+        if k > 1e7:
+            with pytest.raises(ValueError, match="surface.stiffness has .* times as stiff.*leave"):
+                scene.step(0, 0)
+        else:
+            scene.step(0, 0)
+            forces.append(scene.contact.force())
+    assert forces[1] == pytest.approx(forces[0], abs=3e-5 * forces[0][1])
 
 
 def test_the_refusal_names_the_weak_direction():
