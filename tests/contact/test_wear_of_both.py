@@ -4,7 +4,10 @@
 
 import numpy as np
 import pytest
-from two_bodies import COMM, blocks, dc
+import ufl
+from dolfinx import fem, mesh
+from mixed_scenes import elasticity, held, taylor_hood
+from two_bodies import COMM, blocks, dc, pair, rubber
 
 pytestmark = pytest.mark.ranks
 
@@ -20,8 +23,8 @@ def largest(values) -> float:
     return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
 
 
-def rubbed(cell, degree, ways=4, swapped=False, scale=1.0, size=(1.0, 3.0), far=0.8, cells=None, **options):  # fmt: skip
-    scene = blocks(cell, degree, cells or CELLS[cell], size=size, sliding="large", swapped=swapped, tol=1e-9)  # fmt: skip
+def rubbed(cell, degree, ways=4, swapped=False, scale=1.0, size=(1.0, 3.0), far=0.8, cells=None, form=None, **options):  # fmt: skip
+    scene = blocks(cell, degree, cells or CELLS[cell], size=size, sliding="large", swapped=swapped, tol=1e-9, form=form)  # fmt: skip
     own, other = np.array(K[::-1] if swapped else K) * scale
     scene.contact.wear = dc.Wear(own, opposite=other, **options)
     for part in np.linspace(0.0, 1.0, ways + 1):
@@ -46,6 +49,39 @@ def test_each_side_loses_its_coefficient_times_the_work(cell, degree, swapped, o
     )
     assert (contact.wear_depth >= 0.0).all() and (contact.opposite_wear_depth >= 0.0).all()
     assert largest(contact.opposite_wear_depth) > 0.0
+
+
+def test_rubber_loses_it_too():
+    """Bodies of finite strain, in steps by one facet."""
+    scene, k = rubbed("quadrilateral", 1, form=rubber, explicit=True)
+    assert scene.contact.worn_volume() == pytest.approx(k * work(scene), rel=1e-12)
+
+
+@pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
+def test_incompressible_bodies(swapped):
+    """In Taylor and Hood's mixed form: an even pressure of 4 G e at a strain e is exact on meshes that do not match, and sliding wears both."""
+    domain, top, bottom, upper, lower, _ = pair("triangle", ((4, 2), (7, 2)))
+    W, G, down = taylor_hood(domain), 100.0, 0.02
+    w = fem.Function(W)
+    F = elasticity(w, ufl.TestFunction(W), G, 0.0)
+    slave, master = (lower, upper) if swapped else (upper, lower)
+    contact = dc.Contact(W, slave, dc.DeformableSurface(W, master), 0.0, wear=dc.Wear(1e-6, opposite=3e-6, explicit=True))  # fmt: skip
+    side = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0.0))
+    (press, way), (foot, _), (left, _) = held(W, top, component=1), held(W, bottom, component=1), held(W, side, component=0)  # fmt: skip
+    problem = dc.ContactProblem(F, w, [contact], bcs=[press, foot, left], tol=1e-10)
+    way.x.array[:] = -down
+    problem.solve()
+    assert contact.pressure == pytest.approx(4 * G * down / 2, rel=1e-9)
+    assert w.sub(1).collapse().x.array == pytest.approx(-G * down, rel=1e-9)
+    contact.friction = 0.3
+    (moved, way), (foot, _) = held(W, top), held(W, bottom)
+    problem.bcs = [moved, foot]
+    for slid in (0.0, 0.2, 0.3):
+        way.interpolate(lambda x, slid=slid: np.array([0 * x[0] + slid, 0 * x[0] - down]))
+        step = problem.solve()
+    done = COMM.allreduce(contact.dissipation.sum())
+    assert step.counts.slip > 0 and done > 0.0
+    assert contact.worn_volume() == pytest.approx([1e-6 * done, 3e-6 * done], rel=1e-12)
 
 
 @pytest.mark.parametrize("cell, degree", [("quadrilateral", 1), ("triangle", 2), *slow])
