@@ -1,4 +1,4 @@
-"""The drawings of docs/theory: friction cone, slip rule, projection.  From the root: python -m docs.drawings
+"""The drawings of docs/theory: friction cone, slip rule, projection, common parts of facets with dual shape functions.  From the root: python -m docs.drawings
 
 Curves are computed with the package itself; vector graphics, readable on light and dark ground.
 """
@@ -6,6 +6,7 @@ Curves are computed with the package itself; vector graphics, readable on light 
 from pathlib import Path
 
 import dolfinx_contact as dc
+from dolfinx_contact import _kernel
 
 # isort: split
 import matplotlib
@@ -115,7 +116,48 @@ def projection() -> None:
     save(figure, "projection.svg")
 
 
+def mortar() -> None:
+    """Common parts of a facet and those opposite; shape functions of two elements and their duals."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.2), layout="constrained")
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    turn, lines = np.radians(17), np.arange(-2, 4)
+    axes = 0.62 * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    corner = np.array([0.42, -0.02])
+    for i in lines[:-1]:
+        for j in lines[:-1]:
+            facet = (square + [i, j]) @ axes + corner
+            corners, count = _kernel.clip(square[None], facet[None])
+            part = corners[0, : count[0]]
+            left.fill(*facet.T, fill=False, edgecolor=SLIP, lw=0.7)
+            if len(part) > 2:
+                left.fill(*part.T, color=CONE, alpha=0.12 + 0.1 * ((i + 2 * j) % 4), lw=0)
+                left.plot(*part.mean(axis=0), ".", color=INK, ms=4)
+    left.fill(*square.T, fill=False, edgecolor=CONE, lw=2.2)
+    left.text(0.02, 1.04, "slave facet", color=CONE)
+    left.text(1.06, 0.5, "facets\nopposite", color=SLIP)
+    left.set(xlim=(-0.35, 1.55), ylim=(-0.3, 1.25), aspect="equal")
+    left.set_axis_off()
+    at = np.linspace(0, 1, 50)
+    hats = np.stack((1 - at, at))
+    M = np.array([[2, 1], [1, 2]]) / 6
+    dual = np.diag(M.sum(axis=1)) @ np.linalg.inv(M) @ hats
+    for start, node in ((0, 1), (1, 0)):
+        for of, colour, style in ((hats[node], CONE, "--"), (dual[node], FORCE, "-")):
+            right.plot(at + start, of, style, color=colour)
+    right.plot([0, 1, 2], [0, 0, 0], "o", color=INK, ms=5, clip_on=False)
+    right.text(1.34, 1.1, r"$\psi_a$", color=FORCE)
+    right.text(1.52, 0.52, "$N_a$", color=CONE)
+    right.text(1.0, -0.32, "$a$", color=INK, ha="center")
+    right.set(xlim=(-0.05, 2.05), ylim=(-1.15, 2.2), xticks=[], yticks=[-1, 0, 1, 2])
+    right.spines["bottom"].set(position="zero", color=INK)
+    right.spines["left"].set(color=INK)
+    right.tick_params(colors=INK)
+    for side in ("right", "top"):
+        right.spines[side].set_visible(False)
+    save(figure, "mortar.svg")
+
+
 if __name__ == "__main__":
     plt.rcParams |= SETTINGS
-    for draw in (cone, slip_rule, projection):
+    for draw in (cone, slip_rule, projection, mortar):
         draw()
