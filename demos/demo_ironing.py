@@ -81,7 +81,8 @@ def energy_of(u):
 
 
 # %% [markdown]
-# The block is held at its bottom, the stamp moved by its top. Sliding over facets needs nothing but small enough steps; the face of the stamp, the smaller one,
+# The block is held at its bottom, the stamp moved by its top. Sliding over facets needs nothing but small enough steps; the face of the
+# stamp, the smaller one,
 # carries the unknowns.
 #
 # ## Result
