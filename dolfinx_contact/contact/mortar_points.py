@@ -23,7 +23,7 @@ from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import turn_of_nodes
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
 from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
-from dolfinx_contact.contact.placement import Placed, Placement, carried, times, turned_back
+from dolfinx_contact.contact.placement import CLEAR, Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
@@ -260,6 +260,18 @@ class MortarPlacement(Placement):
         size, stiff = np.median(found, axis=1) if found.size else (None, None)
         return None if size is None else (float(size), float(stiff))
 
+    def clamped(self, fixed: np.ndarray) -> np.ndarray:
+        """See ``Placement``: on a plane of symmetry nodes of the other side are held as well.  Collective."""
+        master, found = self._master, np.zeros(len(self.x), dtype=bool)
+        held = master.everywhere(np.isin(master.own, fixed))
+        size = CLEAR * self._extent
+        for k, axis in enumerate(np.eye(self.x.shape[1])):
+            along = np.linalg.norm(self.now.frame[:, :-1] @ axis, axis=1) > FREE
+            planes = np.unique(master.x[held[:, k], k])
+            beside = np.abs(self.x[:, k, None] - planes).min(axis=1, initial=np.inf) > size
+            found |= self._supported[:, k] & along & beside
+        return found
+
     def follows(self, wanders: bool) -> bool:
         """See ``Placement``."""
         return self.changes
@@ -299,6 +311,7 @@ class Skin:
         sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
         nodes: Local indices of those that this rank owns.
         mine: Their numbers here.
+        own: Their degrees of freedom, ``shape=(k, gdim)``.
         smallest: The shortest edge of a facet.
         size: Length of edges at each node, mean of its facets, ``shape=(m,)``.
         numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
@@ -326,11 +339,11 @@ class Skin:
         index_map, count = of.V.dofmap.index_map, of.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
         self.nodes = np.flatnonzero(own)
-        self._own = of.dofs(self.nodes)
+        self.own = of.dofs(self.nodes)
         given = comm.allgather(_numbers(index_map, self.nodes))
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
         self.mine = np.searchsorted(self.numbers, given[comm.rank])
-        self.dofs = self.everywhere(of.owned[1] + self._own)
+        self.dofs = self.everywhere(of.owned[1] + self.own)
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
         """Rows of this rank's nodes and of all others'.  Collective."""
@@ -340,7 +353,7 @@ class Skin:
 
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
         """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
-        there = self.x + self.everywhere(u[self._own])
+        there = self.x + self.everywhere(u[self.own])
         sides = zip(self.sides, self._inside_out)
         return [side.moved(there[side.nodes], signs) for side, signs in sides], there
 

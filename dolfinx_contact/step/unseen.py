@@ -57,6 +57,9 @@ FAR, STEEP = 0.25, 0.1
 # How often points of a facet are taken about the deepest one, and by how much nearer to each other.
 CLOSER, FACTOR = 3, 0.25
 
+# Part of what friction can carry that supports may take.
+LOST = 0.005
+
 # In how many facets of a rank points are moved: the surface may be slow to ask for distances.
 DEEPEST = 64
 
@@ -103,6 +106,7 @@ class Unseen:
         self._leaps = self._apart = True  # to be looked at
         self._near = [contact for contact in contacts if contact.surface.deformable]
         self._sided = self._near  # which side carries the unknowns is to be looked at
+        self._held = self._near  # whether supports take friction from nodes
         self._turn, self._turns = None, bool(contacts)  # to be looked at
 
     def check(
@@ -130,6 +134,7 @@ class Unseen:
         self._check_wear(contacts, stiffness)
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
         self._sided = [contact for contact in self._sided if not _check_side(contact)]
+        self._held = [contact for contact in self._held if not _check_held(body, contact)]
         self._turns = self._turns and not body.nonlinear
         if self._turns:
             self._check_turn(body, contacts, stiffness, u)
@@ -249,6 +254,20 @@ def _check_side(contact: ContactLike) -> bool:
                 "The finer or softer side is better as the one that carries the unknowns: swap both, and compare."
             )
     return True
+
+
+def _check_held(body: BodyLike, contact: ContactLike) -> bool:
+    """Warn of nodes that have no friction because supports hold them along a deformable surface; whether any node presses.  Collective."""
+    force = contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
+    without = contact.placement.clamped(body.fixed)
+    all, lost, count = body.total([force.sum(), force[without].sum(), without.sum()])
+    if lost > LOST * all:
+        warnings.warn(
+            f"{count:.0f} contact nodes with {100 * lost / all:.2g} % of what friction can carry are held along the other body by boundary conditions. "
+            "They have no friction, as if on a plane of symmetry: hold the body elsewhere, or let the other side carry the unknowns.",
+            stacklevel=5,
+        )
+    return all > 0.0
 
 
 def _check_strayed(contact: ContactLike) -> bool:

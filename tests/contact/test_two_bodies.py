@@ -182,6 +182,22 @@ def test_sliding_too_far_is_told():
         assert len(said) == told and all("slid by" in str(one.message) for one in said)
 
 
+@pytest.mark.parametrize("held, told", [("slave", 1), ("both", 0), ("master", 0)])
+def test_friction_that_supports_take_is_told(held, told):
+    """Of slave nodes held along the other body, where that is not held in the same plane, as on one of symmetry."""
+    scene = blocks("quadrilateral", 1, ((4, 2), (6, 2)), swapped=held == "master")
+    low = -1.0 if held == "both" else 0.0  # else of the upper body alone
+    side = locate_entities_boundary(scene.domain, 1, lambda x: np.isclose(x[0], 0.0) & (x[1] > low - 1e-9))  # fmt: skip
+    dofs = fem.locate_dofs_topological(scene.V.sub(0), 1, side)
+    scene.problem.bcs = [*scene.bcs, fem.dirichletbc(0.0, dofs, scene.V.sub(0))]
+    scene.way.value[1] = -0.01
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            scene.problem.solve()
+    assert sum("have no friction" in str(one.message) for one in said) == told
+
+
 def test_a_gap_closes_and_opens():
     """A gap between both counts: the upper body falls by it before it presses, and no force is left when it is lifted."""
     scene = blocks("hexahedron", 1, ((2, 2, 1), (3, 3, 1)), gap=0.01)
