@@ -3,6 +3,7 @@
 Curves are computed with the package itself; vector graphics, readable on light and dark ground.
 """
 
+import re
 from pathlib import Path
 
 import dolfinx_contact as dc
@@ -25,6 +26,9 @@ ANGLE = np.linspace(0, 2 * np.pi, 400)
 def save(figure, name: str) -> None:
     figure.savefig(FOLDER / name, transparent=True, metadata={"Date": None})
     plt.close(figure)
+    text = (FOLDER / name).read_text()  # a hundredth of a point is seen by nobody
+    text = re.sub(r"\b([1-9]\d*\.\d\d)\d+", r"\1", text)
+    (FOLDER / name).write_text(re.sub(r"\n +", "\n", text))
 
 
 def axes_through_zero(axes, x: str, y: str) -> None:
