@@ -61,7 +61,6 @@ std::unique_ptr<Operator> make_operator(const Array &W, int dim, Index tied,
                             algebra);
 }
 
-/// Of W by columns, the rows of each in order, as SciPy's csc_array has them.
 VectorXd optional(const std::optional<Array> &array) {
     return array ? Eigen::Map<const VectorXd>(array->data(), array->size()) : VectorXd();
 }

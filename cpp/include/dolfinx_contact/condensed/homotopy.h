@@ -24,12 +24,13 @@ class Random {
     template <int T> VectorXd reactions(Index nodes, Index tied) {
         constexpr int D = T + 1;
         VectorXd r = VectorXd::Zero(D * nodes + tied);
-        const double size = power_of_ten(-1.0, 1.0);
+        const double size = power_of_ten(Tuning::least_start, Tuning::largest_start);
         for (Index i = 0; i < nodes; ++i) {
             const double normal = uniform() < Tuning::open_at_first ? 0.0 : size * uniform();
             r[D * i + T] = normal;
             for (int c = 0; c < T; ++c)
-                r[D * i + c] = normal * uniform(-0.7, 0.7); // within the cone in two directions
+                r[D * i + c] =
+                    normal * uniform(-Tuning::friction_at_first, Tuning::friction_at_first);
         }
         return r;
     }

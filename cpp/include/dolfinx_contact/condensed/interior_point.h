@@ -24,7 +24,8 @@ template <int T> class InteriorPoint {
     explicit InteriorPoint(const System<T> &system)
         : system_(system), linear_(system.W->algebra().solver(*system.poll)) {}
 
-    /// Reactions near a solution, or where steps have become too short.
+    /// Reactions near a solution, or where steps have become too short. Begins at r = y = e_n,
+    /// whatever starts there are: they are no use on the boundary of the cone.
     VectorXd run(Budget &budget) {
         const auto n = static_cast<double>(system_.nodes);
         r_ = VectorXd::Zero(system_.size());
@@ -44,7 +45,8 @@ template <int T> class InteriorPoint {
                 break;
             const double reach = std::min({1.0, longest(r_, dr), longest(y_, dy)});
             const double after = (r_ + reach * dr).dot(y_ + reach * dy) / n;
-            const double centre = std::clamp(std::pow(after / gap, 3.0), 1e-8, 1.0);
+            const double centre =
+                std::clamp(std::pow(after / gap, Tuning::centring), Tuning::least_centring, 1.0);
             VectorXd first = dr, second = dy;
             direction(centre * gap, first, second, dr, dy);
             const double length =

@@ -36,7 +36,7 @@ template <int P> class Judge {
                 tied_[c] = 1.0 / op.largest_in_tied_row(c);
         if (!(external_ >= 0.0 && std::isfinite(external_)))
             throw std::invalid_argument("external must be a finite force, at least zero");
-        check_tangential(scales.tangential);
+        set_tangential(scales.tangential);
         VectorXd loads = q;
         for (Index i = 0; i < n; ++i) {
             loads[D * i + P] = std::min(q[D * i + P], 0.0);
@@ -122,7 +122,8 @@ template <int P> class Judge {
         return given;
     }
 
-    void check_tangential(const VectorXd &given) {
+    /// The tangential stiffness of each contact, or W's compliance if none is given.
+    void set_tangential(const VectorXd &given) {
         blocks_.resize(static_cast<std::size_t>(op_.nodes()), Block::Zero());
         if (given_ && given.size() != P * P * op_.nodes())
             throw std::invalid_argument("tangential_stiffness must have " +

@@ -78,8 +78,8 @@ template <int T> class Newton {
     VectorXd mapped() const { return state_.mapped(); }
 
   private:
-    /// A step with the last factors, if they are those of a state nearby and leave a tenth of the
-    /// residual at most: it costs two products with W. Else one with factors of the present
+    /// A step with the last factors, which costs two products with W, if the residual has fallen
+    /// tenfold since they were made and falls as much again. Else one with factors of the present
     /// Jacobian, along which is searched.
     bool advance(VectorXd &r, VectorXd &w, double reference) {
         using Factors = typename Direction<T>::Factors;

@@ -10,10 +10,10 @@
 #include <optional>
 
 namespace dolfinx_contact::condensed {
-/// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse when
-/// that begins to pay. If it is symmetric to the last bit, one triangle is kept, and its inverse by
-/// Cholesky in the other triangle of the same array, which has one column more; else both are
-/// whole.
+/// W (D n + tied square) with what is derived from it once: its normal rows, and its inverse if the
+/// caller has asked for it. If it is symmetric to the last bit, one triangle is kept, and its
+/// inverse by Cholesky in the other triangle of the same array, which has one column more; else
+/// both are whole.
 ///
 /// The last `tied` rows are bilateral: w_c = 0, r_c of any sign. Of them W may be indefinite or
 /// zero.

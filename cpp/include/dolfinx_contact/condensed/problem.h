@@ -36,7 +36,7 @@ struct Solution {
     int iterations = 0;
     double seconds = 0.0;
     bool converged = false;
-    std::string branch;
+    std::string branch; ///< the method that found it, "free" if none was needed, "" if none did
     std::vector<Attempt> tried;
 };
 
@@ -54,8 +54,8 @@ struct Options {
     double slip_tol = 1e-8; ///< largest slip error of a solution
     double local_tol = std::numeric_limits<double>::infinity(); ///< largest error of one contact
     double max_seconds = std::numeric_limits<double>::infinity();
-    int max_iterations = 200'000; ///< Newton and fixed-point iterations of all attempts
-    int newton_iterations = 60;   ///< Newton iterations of one attempt
+    int max_iterations = 200'000;                ///< of all methods together
+    int newton_iterations = Tuning::newton_most; ///< of one run of Newton's method on the problem
     bool fallbacks = true;
     std::vector<std::string> without = {}; ///< methods that are left out, to measure what they do
     Scales scales = {};

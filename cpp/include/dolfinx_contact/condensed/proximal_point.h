@@ -8,10 +8,11 @@
 #include "newton.h"
 
 namespace dolfinx_contact::condensed {
-/// Moves r by problems w = q + W r + alpha (r - last r), until error(r), that of the problem
-/// itself, is zero. Each is solved by Newton's method; where that fails alpha, over the contact's
-/// own compliance, grows, else it falls. Ends when so many of them in turn have not halved the
-/// error.
+/// Moves r by problems w = q + W r + alpha own (r - last r), `own` a contact's compliance, each
+/// solved by Newton's method, until the judge accepts r: error(r), that of the problem itself, then
+/// returns zero. Where Newton's method fails alpha grows, else it falls, by a factor `down` that
+/// failures bring near one and successes back. Ends when so many of them in turn have not halved
+/// the error.
 template <int T, class Error>
 bool proximal_point(System<T> system, VectorXd &r, Budget &budget, Error error) {
     const VectorXd q = system.q;
@@ -37,7 +38,7 @@ bool proximal_point(System<T> system, VectorXd &r, Budget &budget, Error error) 
         const double found = error(r);
         if (found == 0.0)
             return true;
-        if (found < 0.5 * least) {
+        if (found < Tuning::proximal_progress * least) {
             least = found;
             in_vain = 0;
         }

@@ -17,10 +17,11 @@ namespace dolfinx_contact::condensed {
 /// The solver of one problem: P tangential directions, T of them with friction (T = P or 0).
 template <int T, int P> class Search {
     /// Where a method begins: at the start of the smallest residual, or where the last one ended.
+    /// interior_point and homotopy begin at reactions of their own.
     enum class From { start, last };
     /// One row of the table: when it applies, iterations at most, where it begins, the augmentation
     /// parameter of tangential directions over the usual one, and what it runs, which returns where
-    /// it ended.
+    /// a method after it may begin.
     struct Method {
         const char *name;
         bool of_friction_alone;
@@ -104,7 +105,7 @@ template <int T, int P> class Search {
         const double seconds = budget_.seconds();
         System<T> system = scaling_.make();
         system.rho_t *= method.rho_t;
-        budget_.begin(method.iterations);
+        budget_.begin(std::max(method.iterations, options_.newton_iterations));
         try {
             r = (this->*method.run)(system, r);
         } catch (const OutOfTime &) { // the best state is what was found until then
@@ -131,7 +132,8 @@ template <int T, int P> class Search {
         return r;
     }
 
-    /// Newton's method from the end of the interior point method, which is returned.
+    /// Newton's method from the end of the interior point method. Returns that end, where
+    /// proximal_point may begin.
     VectorXd interior_point(System<T> &system, const VectorXd &) {
         VectorXd end = InteriorPoint<T>(system).run(budget_);
         newton(system, end);
@@ -142,7 +144,6 @@ template <int T, int P> class Search {
         VectorXd r = start;
         system.inverse = nullptr;
         const auto error = [&](const VectorXd &mapped) {
-            last_error_ = 0.0;
             return certify(system, mapped) ? 0.0 : last_error_;
         };
         if (proximal_point(system, r, budget_, error)) {

@@ -40,11 +40,11 @@ template <int T> struct System {
     static constexpr int D = T + 1;
     using Node = Eigen::Matrix<double, D, 1>;
 
-    const Square *W;       // physical
-    const Square *inverse; // of W, or null
-    const Poll *poll;      // of long factorisations
-    VectorXd q;            // physical
-    VectorXd left, right;
+    const Square *W;          // physical
+    const Square *inverse;    // of W, or null
+    const Poll *poll;         // of long factorisations
+    VectorXd q;               // physical
+    VectorXd left, right;     // scaled over physical displacements, physical over scaled reactions
     VectorXd rho_n, rho_t;    // metric of the residual, per node
     std::vector<bool> smooth; // node without friction
     Index nodes, tied;        // tied rows come last: w_c = 0, r_c of any sign
