@@ -320,6 +320,20 @@ def test_options_are_positive(name):
             CondensedNewton(**{name: value})
 
 
+def test_a_caller_may_give_newton_more_iterations():
+    """Newton's method alone takes as many iterations as its caller lets it, also more than by default."""
+
+    def iterations(seed):
+        scene = random_problem(seed, contacts=8, rank=24, mu_range=(0.05, 2), ratio=3)
+        solver = CondensedNewton(newton_iterations=1000, fallbacks=False)
+        try:
+            return check(scene, solver=solver).iterations
+        except CondensedNotConverged as failure:
+            return failure.best.iterations
+
+    assert max(map(iterations, (453, 1165, 1344))) > CondensedNewton().newton_iterations
+
+
 def test_axes_per_contact():
     """Turning the principal directions is turning the tangential part of W and q."""
     scene = random_problem(11, contacts=6, rank=18, mu_range=(0.1, 0.5), ratio=3)
