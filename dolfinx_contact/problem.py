@@ -46,6 +46,7 @@ from dolfinx_contact.results.record import (
     named,
     record,
     warn_of_contact,
+    warn_of_corners,
     warn_of_rounding,
 )
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
@@ -178,6 +179,7 @@ class ContactProblem(Guarded):
         self._points = [contact.points for contact in self.contacts]
         self._unseen = Unseen(self.contacts)
         self._large = False  # whether a displacement was, and the user told
+        self._turned = False  # the same of slip that turns
         self._bound = self._bound_to = None
         self._assembled = 0
         self._laws, self._freedom = self._present_laws(), self._present_freedom()
@@ -296,6 +298,7 @@ class ContactProblem(Guarded):
         )
         warn_of_rounding(done, self.tol)
         warn_of_contact(done, self.tol)
+        self._turned = self._turned or warn_of_corners(self.body, self.contacts)
         return done
 
     def _step(self, start: float) -> tuple[Step, SolverResult]:

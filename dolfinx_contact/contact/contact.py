@@ -581,6 +581,10 @@ class Contact(Guarded):
         # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
         path = ((pressed > 0.0) & (self.covered > 0.0)) * np.linalg.norm(slip, axis=1)
         work, path = self.repeats * self._work(slip), self.repeats * path
+        self._doubtful = 0.0
+        if self.may_turn:
+            straight = self.repeats * self._work(slip, turned=False)
+            self._doubtful = float(np.abs((work - straight).sum(axis=1)).sum())
         if self._wearing is not None:
             depth = self._wearing
         else:
@@ -631,18 +635,34 @@ class Contact(Guarded):
             begun = self._begun(0.5 * (start + force * end))
         return begun * self._rate(start), begun * self._rate(end)
 
-    def _work(self, slip: np.ndarray) -> np.ndarray:
-        """Work of friction of the step along each principal direction, for its slip, ``shape=(n, gdim - 1)``."""
+    @property
+    def may_turn(self) -> bool:
+        """Whether slip may turn between directions of different friction; the same on all ranks."""
+        return self.points.dim == 3 and (self.friction.mu.ndim > 1 or not self.friction.isotropic)
+
+    @property
+    def doubtful_work(self) -> float:
+        """Of the work of friction of the last step, on this rank: by how much slip that went straight on would have another one."""
+        return self._doubtful
+
+    def _work(self, slip: np.ndarray, turned: bool = True) -> np.ndarray:
+        """Work of friction of the step along each principal direction, for its slip, ``shape=(n, gdim - 1)``.
+
+        Args:
+            turned: Whether the direction of slip of the last step counts.
+        """
         if self._laws.begun is not None:
-            return sum(self._works(slip, self.reaction))
+            return sum(self._works(slip, self.reaction, turned))
         last = self.last
-        slipped = last.status == int(Status.SLIP)
+        slipped = turned & (last.status == int(Status.SLIP))
         return work_of_friction(self.friction, last.reaction, slipped, self.reaction, slip, self.law_before)  # fmt: skip
 
-    def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _works(
+        self, slip: np.ndarray, reaction: np.ndarray, turned: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Shares of the frictional work of a step that the forces at its start and at its end have, ``shape=(n, gdim - 1)`` each."""
         none, before = np.zeros_like(reaction), self.last.reaction
-        slipped = self.last.status == int(Status.SLIP)
+        slipped = turned & (self.last.status == int(Status.SLIP))
         law = self.friction if self._laws.begun is None else self._laws.begun
         start = work_of_friction(law, before, slipped, none, slip, self.law_before)
         return start, work_of_friction(self.friction, none, slipped, reaction, slip)

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3
 
+# Part of the work of friction that a step may leave unknown without a word.
+DOUBTFUL = 0.1
+
 
 class Counts(NamedTuple):
     """Number of contact nodes by status, over all ranks.
@@ -208,3 +211,20 @@ def warn_of_contact(step: Step, tol: float) -> None:
             f"more than {WORSE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",
             stacklevel=3,
         )
+
+
+def warn_of_corners(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+    """Warn, in the name of who called ``solve``, of work that a turn of slip within the step leaves unknown; whether it did.  Collective."""
+    may = [contact for contact in contacts if contact.may_turn]
+    if not may:
+        return False
+    sums = [[c.doubtful_work for c in may], [c.dissipation.sum() for c in may]]
+    doubtful, work = body.total(np.sum(sums, axis=1))
+    if doubtful <= DOUBTFUL * work:
+        return False
+    warnings.warn(
+        f"slip has turned in this step between directions of different friction, which leaves the work of friction unknown by {doubtful:.2g}, "
+        f"{doubtful / work:.0%} of all so far: it counts as a part of a curve, a sharp corner has so much more or less. Divide the step that turns.",
+        stacklevel=3,
+    )
+    return True

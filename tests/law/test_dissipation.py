@@ -216,6 +216,23 @@ def test_no_nodal_rule_is_of_second_order_behind_a_spring():
 # -- bodies ------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("law", [LAWS["case C"], LAWS["crossed"], dict(mu=0.3)])
+@pytest.mark.parametrize("turn", [0.4, 0.0])
+def test_a_corner_that_leaves_work_unknown_is_told(law, turn):
+    """One stroke after another: straight on nothing is unknown, nor with isotropic friction; else after a corner more than a tenth."""
+    scene = scenes.block(cells=(2, 2, 1), **{"p": None, **law})
+    scene.move_top(0, 0, -1e-5)
+    scene.problem.solve()
+    scene.surface.displacement = (0.6, 0.0, 0)
+    scene.problem.solve()
+    scene.surface.displacement = (0.6 + 0.6 * np.cos(turn), 0.6 * np.sin(turn), 0)
+    if turn and np.size(law["mu"]) == 2:
+        with pytest.warns(UserWarning, match="leaves the work of friction unknown by .*% of all"):
+            scene.problem.solve()
+    else:
+        scene.problem.solve()  # warnings are errors here
+
+
 @pytest.mark.parametrize("p", [None, (0.05, 0.20)])
 @pytest.mark.parametrize("increments", [1, 2, 5, 20])
 def test_block_dragged_to_and_fro(increments, p):
