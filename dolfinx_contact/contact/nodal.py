@@ -21,8 +21,12 @@ from dolfinx_contact.step.errors import EPSILON
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import LawLike
 
-# Newton's steps at most, those in which a residual has to halve, and sweeps over the contacts after one that does not help.
-MOST, PATIENCE, SWEEPS = 30, 8, 4
+# Newton's steps at most, those in which a residual has to halve, the same once it is within the tolerance; those that need not
+# help, and sweeps over the contacts in place of later ones that do not.
+MOST, PATIENCE, AT_END, FREE, SWEEPS = 30, 8, 2, 3, 4
+
+# Of the tolerance, what is as good as nothing.
+PART = 1e-2
 
 # A residual that is rounding, over the size of its terms, and what a step has to leave at most.
 ROUNDED, HELPS = 64 * EPSILON, 0.5
@@ -76,32 +80,35 @@ class NodalProblems:
         """What reactions of the others leave to each contact."""
         return self._all - times(self.coupling, r)
 
-    def unsolved(self, r: np.ndarray) -> np.ndarray:
-        """What is left of the problem and what it moves the node, as forces, at least rounding: ``shape=(m,)``."""
-        left, _ = self._left(r)
-        moved = times(self.stacked.transpose(0, 2, 1), r) - self._force
-        return np.linalg.norm(left, axis=1) + np.linalg.norm(moved, axis=1) + self._rounding(r)
+    def _small(self, r: np.ndarray, tol: float) -> np.ndarray:
+        """What is a part ``tol`` of the terms, or their rounding."""
+        return max(tol, ROUNDED) * (self._terms + np.linalg.norm(r, axis=1))
 
-    def _rounding(self, r: np.ndarray) -> np.ndarray:
-        return ROUNDED * (self._terms + np.linalg.norm(r, axis=1))
+    def balanced(self, r: np.ndarray, tol: float) -> tuple[np.ndarray, np.ndarray]:
+        """Reactions that solve the problems, from a start, where the search fails the best of its states; what they leave, ``shape=(m,)``.
 
-    def balanced(self, r: np.ndarray) -> np.ndarray:
-        """Reactions that solve the problems, from a start; where the search fails the best of its states."""
+        That is what is left of the problem and what it moves the node, as forces, at least the accuracy.
+
+        Args:
+            r: The start.
+            tol: Accuracy, over the forces and springs of the node.
+        """
         left, slope = self._left(r)
         size = np.linalg.norm(left, axis=1)
         best, smallest = r, size
         halved, since = size, np.zeros(size.size, dtype=int)
         for _ in range(MOST):
-            goes_on = ~(size <= self._rounding(r)) & (since < PATIENCE)
+            patience = np.where(size <= self._small(r, tol), AT_END, PATIENCE)
+            goes_on = ~(size <= self._small(r, PART * tol)) & (since < patience)
             if not goes_on.any():
                 break
             trial = r.copy()
             trial[goes_on] += times(np.linalg.pinv(slope[goes_on], SINGULAR), left[goes_on])
             trial_left, trial_slope = self._left(trial)
             trial_size = np.linalg.norm(trial_left, axis=1)
-            stays = goes_on & ~(trial_size <= HELPS * size)
+            stays = goes_on & ~(trial_size <= HELPS * size) & (since >= FREE)
             if stays.any():
-                swept = r
+                swept = best
                 for _ in range(SWEEPS):
                     swept = self._swept(swept)
                 trial[stays] = swept[stays]
@@ -117,7 +124,8 @@ class NodalProblems:
             best, smallest = np.where(better[:, None], r, best), np.where(better, size, smallest)
             helps = smallest <= HELPS * halved
             halved, since = np.where(helps, smallest, halved), np.where(helps, 0, since + 1)
-        return best
+        moved = times(self.stacked.transpose(0, 2, 1), best) - self._force
+        return best, smallest + np.linalg.norm(moved, axis=1) + self._small(best, tol)
 
     def _left(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the maps make of ``r`` minus ``r``, and minus its derivative."""

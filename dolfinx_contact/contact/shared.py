@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part
+from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part, times
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 # By which the product of two unit normals may miss one for them to be the same.
 ALIKE = 1e-12
+
+# By how much what a start leaves may have grown before all others are tried.
+KEPT = 2.0
 
 
 def shared_nodes(
@@ -143,49 +146,57 @@ class SharedNodes:
             self._slots.append(slots)
         self._alike, self._shares = alike, shares
         self._spring = springs.sum(axis=1) / (springs > 0).sum(axis=1)
-        self._copies = [np.tile(rows, n + 2) for rows in self._rows]
-        self._laws = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._copies)]
-        self._law = [c.friction.at(rows).law(dim) for c, rows in zip(contacts, self._rows)]
+        # Of each node the start that served last, and the least that this start has left.
+        self._start, self._least = np.zeros(m, dtype=int), np.full(m, -np.inf)
 
-    def split(self, x: np.ndarray, forces: np.ndarray) -> None:
+    def split(self, x: np.ndarray, forces: np.ndarray, tol: float) -> None:
         """Find what each contact is asked for, for ``give``.  Moves the contacts.
 
         With friction a node may have several solutions: that one is taken which moves it least, of equal ones that from
         the last reactions.  Where none is found so, the present ones may lead to one: those of a solver that knows them.
+        A node keeps its start while what is left of its problem, and moves it, falls.
 
         Args:
             x: Displacement of owned degrees of freedom.
             forces: Forces on the body at the nodes, owned degrees of freedom.
+            tol: Largest error of the step.
         """
-        m, n, dim = self._shape
-        known, self._motions = np.zeros((2, *self._shape)), []
-        for k, (contact, rows) in enumerate(zip(self._contacts, self._rows)):
+        (m, n, dim), every = self._shape, np.arange(self._shape[0])
+        self._force, self._motions = forces[self._dofs], []
+        starts = np.zeros((n + 2, m, n, dim))
+        for k, (contact, rows, slots) in enumerate(zip(self._contacts, self._rows, self._slots)):
             contact.move(x)
             self._motions.append((contact.gap[rows], contact.slip_increment[rows]))
-            for start, reaction in zip(known, (contact.last.reaction, contact.reaction)):
-                start[self._slots[k], k] = reaction[rows]
-        self._force = forces[self._dofs]
-        alone = np.eye(n)[:, None, :, None] * (self._frames @ self._force[:, None, :, None])[..., 0]
-        starts = np.concatenate((known, alone)).reshape(-1, n * dim)
-        problems = self._problems(n + 2, self._laws, self._copies)
-        r = problems.balanced(starts)
-        unsolved = problems.unsolved(r).reshape(n + 2, m)
-        unsolved[0] /= 2
-        unsolved[1] *= 2
-        chosen = np.nan_to_num(unsolved, nan=np.inf).argmin(axis=0)
-        self._asked = problems.asked(r).reshape(n + 2, m, n * dim)[chosen, np.arange(m)]
+            starts[:2, slots, k] = contact.last.reaction[rows], contact.reaction[rows]
+            starts[2 + k, :, k] = times(self._frames[:, k], self._force)
+        starts = starts.reshape(n + 2, m, n * dim)
+        self._all = self._problems(every)
+        r, left = self._all.balanced(starts[self._start, every], tol)
+        lost = np.flatnonzero(~(left <= KEPT * self._least))
+        if lost.size:
+            tried = self._problems(np.tile(lost, n + 2))
+            found, unsolved = tried.balanced(starts[:, lost].reshape(-1, n * dim), tol)
+            unsolved = np.nan_to_num(unsolved.reshape(n + 2, -1), nan=np.inf)
+            weighted = unsolved * np.array([0.5, 2.0, *np.ones(n)])[:, None]
+            self._start[lost] = best = weighted.argmin(axis=0)
+            chosen = best, np.arange(lost.size)
+            r[lost], left[lost] = found.reshape(n + 2, -1, n * dim)[chosen], unsolved[chosen]
+            self._least[lost] = np.inf
+        self._least = np.minimum(self._least, left)
+        self._asked = self._all.asked(r)
 
-    def _problems(self, copies: int, laws: list, rows: list) -> NodalProblems:
-        """The nodal problems, so many times."""
-        m, parts = self._shape[0], []
-        laws = [contact.law_of(law, of) for contact, law, of in zip(self._contacts, laws, rows)]
-        for slots, law, (gap, slip) in zip(self._slots, laws, self._motions):
-            every = (m * np.arange(copies)[:, None] + slots).ravel()
-            spring = np.tile(self._spring[slots], copies)
-            parts.append(Part(every, law, spring, np.tile(gap, copies), np.tile(slip, (copies, 1))))
-        frames = np.tile(self._frames, (copies, 1, 1, 1))
-        alike, shares = np.tile(self._alike, (copies, 1, 1)), np.tile(self._shares, (copies, 1))
-        return NodalProblems(parts, frames, np.tile(self._force, (copies, 1)), alike, shares)
+    def _problems(self, nodes: np.ndarray) -> NodalProblems:
+        """The problems of some of the nodes, which may be named several times."""
+        parts = []
+        for contact, rows, slots, (gap, slip) in zip(
+            self._contacts, self._rows, self._slots, self._motions
+        ):
+            mine = np.flatnonzero(np.isin(nodes, slots))
+            at = np.searchsorted(slots, nodes[mine])
+            law = contact.law_of(contact.friction.at(rows[at]).law(self._shape[2]), rows[at])
+            parts.append(Part(mine, law, self._spring[nodes[mine]], gap[at], slip[at]))
+        given = self._frames, self._force, self._alike, self._shares
+        return NodalProblems(parts, *(of[nodes] for of in given))
 
     def give(self, k: int) -> None:
         """Give a contact the reactions that its map starts from at these nodes."""
@@ -200,9 +211,8 @@ class SharedNodes:
         Args:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame; changed in place.
         """
-        problems = self._problems(1, self._law, self._rows)
-        _, by_asked, by_motion = problems.linearised(self._asked)
-        C, F, asks = problems.coupling, problems.stacked, problems.asks
+        _, by_asked, by_motion = self._all.linearised(self._asked)
+        C, F, asks = self._all.coupling, self._all.stacked, self._all.asks
         inverse = C @ np.linalg.pinv(np.eye(C.shape[1]) + by_asked @ C, SINGULAR)
         shape = *self._shape, self._shape[-1]
         both = ((by_asked, asks), (by_motion, F))

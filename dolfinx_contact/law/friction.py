@@ -284,12 +284,12 @@ class Friction(Guarded):
         return self._from_axes(self.mu[..., : slip.shape[1]] * unit)
 
     def drag_with_slope(self, slip: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``drag(slip)``, and the derivative of ``along . drag(slip + w along)`` by w, ``shape=(n,)``, per length of the slip."""
+        """``drag(slip)``, and the derivative of ``drag(slip + w along)`` by w, the same shape, per length of the slip."""
         (unit, length), along = self._resisted(slip), self.along_axes(along)
         mu, T = self.mu[..., : slip.shape[1]], slip.shape[1]
         rate = np.divide(self._softness(T) * along, length, out=np.zeros_like(along), where=length > 0)  # fmt: skip
         turning = rate - (rate * unit).sum(axis=1, keepdims=True) * unit
-        return self._from_axes(mu * unit), (along * mu * turning).sum(axis=1)
+        return self._from_axes(mu * unit), self._from_axes(mu * turning)
 
     def over_radii(self, t: np.ndarray) -> np.ndarray:
         """``M^-1 t`` along the principal directions, ``shape=(n, T)``; zero without friction."""

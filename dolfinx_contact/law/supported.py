@@ -169,24 +169,24 @@ class _Answer:
     def __init__(self, of: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
         self._law, self._f, self._rho = of.friction, of.along, rho
         moved, guided, both, d, most, friction = of.kinds
-        slope = np.zeros(R.size)
+        turn = np.zeros_like(d)
         if both.size:
             d = d.copy()
             rows = (self._f[both], rho[both], R[both], tau[both], of.moved[both])
-            d[both], slope[both] = _slipped(friction, *rows)
-        stiff = rho + R * np.maximum(slope, 0.0)
-        self.friction = -R[:, None] * d
-        self.by_predictor, self.by_R = R * np.maximum(slope, 0.0) / stiff, -_dot(d, self._f) * rho / stiff  # fmt: skip
-        rest = ~moved
+            d[both], turn[both] = _slipped(friction, *rows)
+        by_predictor = (
+            R[:, None] * turn / (rho + R * np.maximum(_dot(turn, of.along), 0.0))[:, None]
+        )
+        by_R = by_predictor * _dot(d, of.along)[:, None] - d
         slips = np.abs(tau) > most * R
         along = np.clip(tau, -most * R, most * R)
         stuck = along[:, None] * of.ratio
         stuck += self._room(stuck, np.where(slips[:, None], 0.0, of.kept), R) * of.kept
-        self.friction[rest] = stuck[rest]
-        self.by_predictor[rest] = (guided & ~slips)[rest]
-        self.by_R[rest] = (slips * np.sign(tau) * most)[rest]
+        made = moved[:, None]
+        self.friction = np.where(made, -R[:, None] * d, stuck)
+        self.by_predictor = np.where(made, by_predictor, (guided & ~slips)[:, None] * of.ratio)
+        self.by_R = np.where(made, by_R, (slips * np.sign(tau) * most)[:, None] * of.ratio)
         self.slips = moved | (guided & slips)
-        self.share = np.where(moved[:, None], -d, 0.0)
 
     def _room(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Largest part of ``kept`` up to one with which ``friction`` stays within the cone, ``shape=(k, 1)``."""
@@ -206,8 +206,8 @@ class _Answer:
         """The kernel's derivatives with these nodes' own, by the reaction before and by the motion."""
         f, T = self._f, self._f.shape[1]
         by_reaction = np.zeros((len(nodes), T + 1, T + 1))
-        by_reaction[:, :T, :T] = self.by_predictor[:, None, None] * f[:, :, None] * f[:, None, :]
-        by_reaction[:, :T, T] = np.where(f.any(axis=1)[:, None], self.by_R[:, None] * f, self.share)
+        by_reaction[:, :T, :T] = self.by_predictor[:, :, None] * f[:, None, :]
+        by_reaction[:, :T, T] = self.by_R
         by_reaction[:, T, T] = 1.0
         by_reaction[~touches] = 0.0
         rates = np.column_stack((np.repeat(self._rho[:, None], T, axis=1), normal))
@@ -227,7 +227,7 @@ def _slipped(
     tau: np.ndarray,
     known: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``d(known + w f)`` and the derivative of ``f.d`` by w, where ``rho w + R f.d + tau = 0``.
+    """``d(known + w f)`` and its derivative by w, where ``rho w + R f.d + tau = 0``.
 
     The left side grows with w: Newton's steps within an interval.
     """
@@ -235,10 +235,10 @@ def _slipped(
     low, high = (-tau - most) / rho, (-tau + most) / rho
     w = -tau / rho
     for _ in range(STEPS):
-        d, slope = friction.drag_with_slope(known + w[:, None] * f, f)
+        d, turn = friction.drag_with_slope(known + w[:, None] * f, f)
         left = rho * w + R * _dot(d, f) + tau
         low, high = np.where(left < 0.0, w, low), np.where(left > 0.0, w, high)
-        following = w - left / (rho + R * np.maximum(slope, 0.0))
+        following = w - left / (rho + R * np.maximum(_dot(turn, f), 0.0))
         outside = ~((low < following) & (following < high))
         following = np.where(outside, (low + high) / 2, following)
         following = np.where(left == 0.0, w, following)

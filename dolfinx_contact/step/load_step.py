@@ -349,7 +349,7 @@ class LoadStep:
     def _asked(self, x: np.ndarray, forces: np.ndarray):
         """The contacts, each with the reactions that balance the forces at its nodes, of shared ones with its own part."""
         if self._shared is not None:
-            self._shared.split(x, -forces)
+            self._shared.split(x, -forces, self.tol)
         for k, contact in enumerate(self.contacts):
             contact.take_reaction(-forces)
             if self._shared is not None:

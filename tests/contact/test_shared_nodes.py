@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.nodal import NodalProblems
 from dolfinx_contact.contact.shared import shared_nodes
 from dolfinx_contact.law.maps import ReturnMap
 from mechanics.corners import STRAIN, Push, build_corner
@@ -407,3 +408,33 @@ def test_a_nonlinear_body_in_the_corner_of_a_box():
         step = problem.solve()
         verdict = judge.verdict()
         assert verdict.accepts(max(TOL, step.error)), verdict.defects
+
+
+def test_nodes_of_three_faces_keep_the_start_that_served(monkeypatch):
+    """An evaluation of a step solves each node's problem about once, not from all five starts, in few calls of the laws."""
+    scene, calls = cube([0.3] * 3, dc.FixedPoint()), dict.fromkeys(("problems", "laws", "states"), 0)  # fmt: skip
+    for contact in scene.contacts:
+        contact.friction = dc.Friction((0.3, 0.15), (0.05, 0.2))
+    solve, linearise = NodalProblems.balanced, NodalProblems.linearised
+
+    def balanced(problems, r, tol):
+        calls["problems"] += len(r)
+        return solve(problems, r, tol)
+
+    def linearised(problems, asked):
+        calls["laws"] += 1
+        return linearise(problems, asked)
+
+    def told(*_):
+        calls["states"] += 1
+
+    monkeypatch.setattr(NodalProblems, "balanced", balanced)
+    monkeypatch.setattr(NodalProblems, "linearised", linearised)
+    scene.problem.monitor = told
+    nodes = np.concatenate([contact.nodes for contact in scene.contacts])
+    shared = (np.unique(nodes, return_counts=True)[1] > 1).sum()
+    for value, way in zip(scene.held, (-2e-3, 1e-4, -1e-3)):
+        value.value = way
+    scene.problem.solve()
+    assert calls["problems"] <= 3 * shared * calls["states"]
+    assert calls["laws"] <= 25 * calls["states"]
