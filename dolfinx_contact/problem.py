@@ -99,7 +99,7 @@ class ContactProblem(Guarded):
             dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Not available in older releases.
         undetermined: What to do if a body held by contact alone can move without a change of reactions: "refused" raises a
             ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, with the smallest integral of
-            |du|^2 over the volume.
+            ``|du|^2`` over the volume.
         geometry_tol: Largest ``step.geometry_error`` of a converged step, on curved, rotating, wavy, textured or deformable
             surfaces, see docs/surfaces.md.
 

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md")]
 PAGES += sorted([*ROOT.glob("docs/**/*.md"), *ROOT.glob("notes/*.md")])
 PAGES = [page for page in PAGES if "gallery" not in page.parts]  # made by `make docs`
+ON_SITE = {*PAGES[1:], ROOT / "CHANGELOG.md"}
 SCRIPTS = [
     (page, script)
     for page in PAGES
@@ -51,13 +52,14 @@ def anchors(page: Path) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
-    """Every link and picture within the repository exists, with the heading it points to."""
+    """Every link and picture within the repository exists, with the heading it points to; pages of the site link to no page beside it."""
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if "://" in link:
             continue
         name, _, heading = link.partition("#")
         target = (page.parent / name).resolve() if name else page
         assert target.exists(), link
+        assert target.suffix != ".md" or page.name == "README.md" or target in ON_SITE, link
         assert not heading or heading in anchors(target), link
 
 
