@@ -8,7 +8,7 @@ import json
 import os
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,8 +42,8 @@ class CycleJump:
     """What ``cycle_jump`` returns.
 
     Attributes:
-        cycles: Of the programme.
-        simulated: Cycles that were simulated for it, those of rejected jumps too.
+        cycles: Number of cycles.
+        simulated: Cycles that were simulated for it, including those of rejected jumps.
         accepted, rejected: Number of jumps.
         volume: Worn, of all contacts.
         depth: The largest.
@@ -74,7 +74,7 @@ class CycleJump:
     depth_error: float
     profile_error: float
     reached: bool
-    table: list[dict[str, Any]]
+    table: list[dict[str, Any]] = field(repr=False)  # a row for each jump would hide the rest
 
 
 def cycle_jump(
