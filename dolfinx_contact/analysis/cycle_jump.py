@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Wear over many cycles: one that is simulated counts for many, and the error that this makes says for how many it may."""
+"""Wear over many cycles: one that is simulated counts for many, in second order, and the estimated error says for how many it may."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from dolfinx_contact.support.progress import progress_bar
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
-# The shortest jump: its halves are cycles simulated one by one.
+# The shortest jump: the cycles of its fine run are simulated one by one.
 SHORTEST = 2
 
 # Jumps aim at this part of the accuracy; from one to the next they grow and shrink by these factors at most.
@@ -84,17 +84,21 @@ def cycle_jump(
     accuracy: float = 0.02,
     *,
     longest: float = np.inf,
+    max_cycles: int = 500,
     path: str | os.PathLike[str] | None = None,
     monitor: Callable[[dict[str, Any]], object] | None = None,
 ) -> CycleJump:
     """Wear through a number of cycles, of which few are simulated.  Collective.
 
-    In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  Two
-    runs go side by side: a coarse one with a simulated cycle for each jump, and a fine one with two, each for half of it.  The fine
-    one is the result, their difference its estimated error: of a method of first order, half of the coarse one's.  Lengths are
-    chosen so that what a jump adds to this is ``accuracy`` of what it wears, or a twentieth of that of all that is worn; a jump that adds more,
-    or in which a step does not converge, is made again, shorter.  The halves of the shortest jump are two cycles simulated one by one, so programmes
-    begin with these: as long as stick and slip have not settled, twice the first is not the first and the second.
+    In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  A
+    jump is made twice from the same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of it.  Both
+    have errors of first order, the coarse one twice that of the fine one; so the fine one plus the difference of the two is of second
+    order (Richardson extrapolation).  That is where the jump ends, after a step in which nothing moves and nothing wears.
+
+    The estimated error is what extrapolation leaves: how far the difference of the two is from that of the last jump times the square of
+    their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` of what it wears, or a twentieth of that of all that is worn; a
+    jump of a larger error, or in which a step does not converge, is made again, shorter.  Programmes begin with jumps of two cycles, both
+    simulated, and go on with these as long as stick and slip have not settled.
 
     Args:
         problem: The ContactProblem, in the state in which the programme begins.
@@ -103,6 +107,7 @@ def cycle_jump(
         cycles: How many.
         accuracy: Relative, of worn volume, largest depth and profile.
         longest: Jump.
+        max_cycles: To be simulated in this call, at most; a jump that has begun is finished.
         path: Folder of checkpoints, written after every jump; if there are some, the programme goes on from there.
         monitor: None, or a function of a row of the table, called after every jump in the state at its end.
 
@@ -111,7 +116,8 @@ def cycle_jump(
 
     Raises:
         NotConverged: a step of cycles simulated one by one did not converge; after any error the problem is at the end of the last jump.
-        ValueError: no contact wears, numbers that make no sense, a folder of another programme.
+        RuntimeError: ``max_cycles`` were simulated; the same call goes on if there is a ``path``.
+        ValueError: no contact wears, a cycle without a step, numbers that make no sense, a folder of another programme.
 
     Example:
         >>> def cycle(done):
@@ -125,22 +131,26 @@ def cycle_jump(
     with raised_together(comm):
         cycles, accuracy = int(positive("cycles", cycles, whole=True)), positive("accuracy", accuracy, finite=True)  # fmt: skip
         longest = positive("longest", longest)
+        max_cycles = int(positive("max_cycles", max_cycles, whole=True))
         _check(problem, cycle, monitor)
-    agree(comm, cycles=cycles, accuracy=accuracy, longest=longest, path=None if path is None else str(path))  # fmt: skip
+    agree(comm, cycles=cycles, accuracy=accuracy, longest=longest, max_cycles=max_cycles, path=None if path is None else str(path))  # fmt: skip
     run = _Run(problem, cycle, accuracy, longest)
     folder = None if path is None else _Folder(path, run)
     if folder is not None:
         folder.read(cycles)
-    _jump_on(run, cycles, folder, monitor)
+    _jump_on(run, cycles, max_cycles, folder, monitor)
     return run.found()
 
 
-def _jump_on(run: _Run, cycles: int, folder: _Folder | None, monitor: Callable | None) -> None:
-    """Jump until all cycles are done; whatever happens the problem is at the end of the last jump.  Collective."""
+def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None) -> None:  # fmt: skip
+    """Jump until all cycles are done, or ``most`` are simulated; whatever happens the problem is at the end of the last jump.  Collective."""
     comm = run.problem.body.comm
     with progress_bar(comm.rank, cycles) as shown:
         try:
+            begun = run.record["simulated"]
             while run.record["done"] < cycles:
+                if run.record["simulated"] - begun >= most:
+                    raise RuntimeError(run.told(cycles, folder is not None))
                 row = run.jump(cycles)
                 if folder is not None:
                     folder.write()
@@ -163,12 +173,20 @@ def _check(problem: Any, cycle: object, monitor: object) -> None:
         raise ValueError(f"monitor must be a function of a row of the table, got {monitor!r}.")
 
 
+class _State(NamedTuple):
+    """Snapshot of the problem, depths at this rank's nodes that wear, and the sums of each contact."""
+
+    snapshot: Any
+    depth: np.ndarray
+    sums: list[dict[str, np.ndarray]]
+
+
 class _Run:
-    """The two runs of a programme, and what has been made of it.
+    """A programme on its way.
 
     Attributes:
-        fine, coarse: Snapshot of the problem and depths of this rank's nodes, of each run; the same object as long as all
-            cycles were simulated.
+        end: The ``_State`` after the last jump.
+        coarse: That of its coarse run, which tells the error of first order.
         record: What a checkpoint has beside them: cycles ``done`` and ``simulated``, jumps ``rejected``, length of the
             ``next`` one, and the ``table``.
     """
@@ -178,18 +196,19 @@ class _Run:
         self._accuracy, self._longest = accuracy, longest
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
         self._area = np.concatenate([area for c in self._worn for area in (c.whole_area, c.opposite_area)])  # fmt: skip
-        self.fine = self.coarse = self.present()
+        self.end = self.coarse = self.present()
         self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST), "table": []}  # fmt: skip
 
-    def present(self) -> tuple:
-        """Snapshot and depths of the present state."""
+    def present(self) -> _State:
+        """The present state."""
         depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
-        return self.problem.snapshot(), np.concatenate(depths)
+        sums = [contact.sums for contact in self.problem.contacts]
+        return _State(self.problem.snapshot(), np.concatenate(depths), sums)
 
     def show(self) -> None:
         """Put the problem into the state after the last jump."""
         self._count(1)
-        self.problem.restore(self.fine[0])
+        self.problem.restore(self.end.snapshot)
 
     def found(self) -> CycleJump:
         table, record = self.table, self.record
@@ -198,6 +217,16 @@ class _Run:
         reached = max(errors) <= self._accuracy
         worn = last["volume"], last["depth"]
         return CycleJump(record["done"], record["simulated"], len(table), record["rejected"], *worn, *errors, reached, table)  # fmt: skip
+
+    def told(self, cycles: int, kept: bool) -> str:
+        """Why it ends before so many cycles."""
+        done, last = self.record["done"], self.table[-1]
+        on = "the same call goes on from there" if kept else f"another call goes on from there, with cycles={cycles - done}; path= keeps the state in a folder"  # fmt: skip
+        return (
+            f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}; estimated errors {last['volume_error']:.1e} of "
+            f"the volume, {last['depth_error']:.1e} of the depth. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer "
+            "mesh often does."
+        )
 
     @property
     def table(self) -> list[dict[str, Any]]:
@@ -218,37 +247,42 @@ class _Run:
 
     def _tried(self, length: int) -> dict[str, Any] | None:
         """The row of a jump of so many cycles, None where it is rejected; says how long the next one may be.  Collective."""
-        plain = length <= SHORTEST  # its halves are cycles simulated one by one
-        exact = plain and self.fine is self.coarse
-        fine = self._through(self.fine, [length - length // 2, length // 2], plain)
-        coarse = fine and self._through(self.coarse, [length], plain and not exact)
-        volume, depth, errors, local = self._compared(fine, coarse)
-        coarse, errors = (fine, [0.0] * len(ERRORS)) if exact else (coarse, errors)
-        accepted = plain or local <= self._accuracy
+        plain = length <= SHORTEST  # the fine run simulates all
+        coarse = self._through([length])
+        fine = end = coarse
+        if length > 1 and (plain or coarse):
+            fine = end = self._through([length - length // 2, length // 2], must=plain)
+        if coarse and fine and not plain:
+            end = self._extrapolated(coarse, fine)
+        worn, errors, local = self._compared(coarse, fine, end, length)
+        accepted = end is not None and (plain or local <= self._accuracy)
         over = local / (SAFETY * self._accuracy)
-        factor = min(max(1.0 / over, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
+        factor = min(max(over**-0.5, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
         self.record["next"] = max(factor * length, float(SHORTEST))
         if not accepted:
             return None
-        self.fine, self.coarse = fine, coarse
+        self.end, self.coarse = end, coarse or end
         return {
             "cycle": self.record["done"] + length,
             "jump": length,
-            "volume": volume,
-            "depth": depth,
-            **dict(zip(ERRORS, errors)),
+            **dict(zip(("volume", "depth", *ERRORS), (*worn, *errors))),
             "simulated": self.record["simulated"],
         }
 
-    def _through(self, state: Any, parts: list[int], must: bool) -> tuple | None:
+    def _through(self, parts: list[int], must: bool = False) -> _State | None:
         """The state after a cycle for each of ``parts`` that counts so many times; None where it does not converge, unless it must."""
-        self.problem.restore(state[0])
-        done = self.record["done"]
+        problem, done = self.problem, self.record["done"]
+        problem.restore(self.end.snapshot)
         try:
-            for part in filter(None, parts):
+            for part in parts:
                 self._count(part)
-                with raised_together(self.problem.body.comm):
+                before = problem.snapshot()
+                with raised_together(problem.body.comm):
                     self._cycle(done)
+                    if problem.snapshot() is before:
+                        raise ValueError(
+                            "cycle has made no step of this problem: it takes the problem through one cycle by problem.solve()."
+                        )
                 self.record["simulated"] += 1
                 done += part
         except NotConverged:
@@ -257,29 +291,60 @@ class _Run:
             return None
         return self.present()
 
+    def _extrapolated(self, coarse: _State, fine: _State) -> _State | None:
+        """The state with the fine run's sums less their error of first order, in equilibrium; None where that does not converge."""
+        for contact, *sums in zip(self.problem.contacts, self.end.sums, coarse.sums, fine.sums):
+            start, one, two = sums
+            contact.take_sums({name: np.maximum(2.0 * two[name] - one[name], start.get(name, 0.0)) for name in two})  # fmt: skip
+        self._count(0)
+        try:
+            self.problem.solve()
+        except NotConverged:
+            return None
+        return self.present()
+
     def _count(self, times: int) -> None:
         for contact in self.problem.contacts:
             contact.repeats = times
 
-    def _compared(self, fine: Any, coarse: Any) -> tuple[float, float, list[float], float]:
-        """Volume and largest depth at the end of a jump, the errors, and those that this jump has made, over what it wears.
+    def _compared(self, coarse: Any, fine: Any, end: Any, length: int) -> tuple[tuple, list[float], float]:  # fmt: skip
+        """Volume and largest depth at the end of a jump, the estimated errors, and that of this jump, over what it wears.
 
-        All reduced over the ranks.  Errors are infinite where a run did not converge.
+        All reduced over the ranks.  The last is infinite where a run did not converge.
+
+        Half the difference of coarse and fine run, of a jump of n cycles, is ``n^2 a + n^3 b``; extrapolated is ``a`` alone.  With the
+        ``a`` of the last jump, ``rho`` times shorter, what is left of it is compared with the change of ``a``, too: for depths
+        that approach a limit exponentially it has ``1 / (3 - 1.5 / rho)`` of the difference, in the limit of short jumps.
         """
-        if fine is None:
-            return 0.0, 0.0, [np.inf] * len(ERRORS), np.inf
-        body, area = self.problem.body, self._area
-        other = fine if coarse is None else coarse
-        worn, off = fine[1] - self.fine[1], fine[1] - other[1]
-        made = off - (self.fine[1] - self.coarse[1])
-        integrals = [area @ of for of in (fine[1], worn, off, np.abs(off), np.abs(made))]
-        volume, more, missing, profile, new = map(float, body.total(integrals))
-        depth, deeper, most, highest = (
-            body.largest(np.abs(of)) for of in (fine[1], worn, off, made)
-        )
-        errors = [_part(abs(missing), volume), _part(most, depth), _part(profile, volume)]
-        local = max(_part(new, more + SHARE * volume), _part(highest, deeper + SHARE * depth))
-        return volume, depth, errors, np.inf if coarse is None else local
+        if end is None:
+            return (), [], np.inf
+        body, area, last = self.problem.body, self._area, self.table[-1] if self.table else None
+        made = np.zeros_like(area)
+        if last and fine is not coarse and coarse:
+            rho = length / last["jump"]
+            off = fine.depth - coarse.depth - rho**2 * self._off(last["jump"])
+            made = off / (3.0 - 1.5 / max(rho, 1.0))
+        worn = end.depth - self.end.depth
+        integrals = [area @ of for of in (end.depth, worn, made, np.abs(made))]
+        volume, more, *new = map(float, body.total(integrals))
+        depth, deeper, most = (body.largest(np.abs(of)) for of in (end.depth, worn, made))
+        known = bool(last and coarse)  # the first jump has none to compare with
+        local = max(_part(new[1], more + SHARE * volume), _part(most, deeper + SHARE * depth))
+        if length <= SHORTEST:
+            new, most = [0.0, 0.0], 0.0
+        whole = (volume, depth, volume)
+        before = [0.0] * len(ERRORS)
+        if last:  # errors that are there go on as the rate does: both obey the equation linearised
+            earlier = self.table[-2]["volume"] if len(self.table) > 1 else 0.0
+            rate = (last["volume"] - earlier) / last["jump"]
+            fall = min(1.0, _part(more / length, rate))
+            before = [fall * last[name] * of for name, of in zip(ERRORS, (last["volume"], last["depth"], last["volume"]))]  # fmt: skip
+        errors = [_part(a + b, of) for a, b, of in zip(before, (abs(new[0]), most, new[1]), whole)]
+        return (volume, depth), errors, local if known else np.inf
+
+    def _off(self, length: int) -> np.ndarray:
+        """Fine less coarse depth at the end of the last jump, of so many cycles; half of it went into an extrapolated end."""
+        return (self.end.depth - self.coarse.depth) * (1.0 if length <= SHORTEST else 0.5)
 
 
 def _part(of: float, whole: float) -> float:
@@ -312,7 +377,8 @@ class _Folder:
         for name in self._names():
             run.problem.load(self._path / name)
             states.append(run.present())
-        run.fine, run.coarse, self._written = states[-1], states[0], self._names()
+        run.coarse, run.end = states
+        self._written = self._names()
 
     def _record(self, cycles: int) -> dict | None:
         file = self._path / RECORD
@@ -321,7 +387,7 @@ class _Folder:
             done = record["done"]
             complete = (
                 done == record["table"][-1]["cycle"]
-                and {"simulated", "rejected", "next", "exact"} <= record.keys()
+                and {"simulated", "rejected", "next"} <= record.keys()
             )
         except FileNotFoundError:
             self._path.mkdir(parents=True, exist_ok=True)
@@ -339,17 +405,15 @@ class _Folder:
         return record
 
     def _names(self) -> list[str]:
-        """Names of the checkpoints, the coarse run's first, the fine one's last."""
-        record = self._run.record
-        return [f"{record['done']}_coarse.npz"] * (not record["exact"]) + [f"{record['done']}.npz"]
+        """Names of the checkpoints: of the coarse run and of the end of the last jump."""
+        return [f"{self._run.record['done']}{of}.npz" for of in ("_coarse", "")]
 
     def write(self) -> None:
         """Write the state after the last jump.  Collective."""
         run = self._run
-        run.record["exact"] = run.fine is run.coarse
         names = self._names()
-        for name, state in zip(names, [run.coarse, run.fine][-len(names) :]):
-            run.problem.restore(state[0])
+        for name, state in zip(names, (run.coarse, run.end)):
+            run.problem.restore(state.snapshot)
             run.problem.save(self._path / name)
         with raised_together(self._comm):
             if self._comm.rank == 0:

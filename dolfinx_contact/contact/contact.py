@@ -205,12 +205,12 @@ class Contact(Guarded):
 
     @property
     def repeats(self) -> float:
-        """How many times what a step wears, works and slips counts, 1 at first; ``cycle_jump`` sets it.  The same on all ranks."""
+        """How many times what a step wears, works and slips counts, 1 at first, none at 0; ``cycle_jump`` sets it.  The same on all ranks."""
         return self._repeats
 
     @repeats.setter
     def repeats(self, times: float) -> None:
-        self._repeats = positive("repeats", times, finite=True)
+        self._repeats = positive("repeats", times, finite=True) if times != 0 else 0.0
 
     @property
     def law(self):
@@ -689,6 +689,16 @@ class Contact(Guarded):
         axes = np.column_stack((law.axes, np.zeros((n, gdim - 2))))
         axes = carried(axes, settled.frame, self.frame)[:, :2]
         return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
+
+    @property
+    def sums(self) -> dict[str, np.ndarray]:
+        """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
+        return {name: of for name, of in self._history.sums.items() if name != KEPT}
+
+    def take_sums(self, sums: dict[str, np.ndarray]) -> None:
+        """Let the next step start from other ``sums``, none of them negative."""
+        self._history.sums = self._history.sums | {name: frozen(of) for name, of in sums.items()}
+        self._settle_here()
 
     def restore(self) -> None:
         """Return to the last converged state, its frames and, where friction is a field, its law."""

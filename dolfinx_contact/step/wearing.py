@@ -6,7 +6,7 @@ A node that slips by ``s`` wears by ``d = (1 - theta) c0 N0 + theta c r_n``, wit
 ``c = k m s / A``, friction m per normal force, wear coefficient k, area A.  With ``theta = 1/2`` the volume is k times the frictional
 work (``law/dissipation.py``); that is taken where wear is gentle.  Where ``c kappa``, with a stiffness ``kappa`` of the node, is
 large, ``1 - theta = START / (c kappa)``: what is worn under the force at the start takes at most the part START of it from the node, and
-the step is one of backward Euler, which does not alternate.
+the step is one of backward Euler, which does not alternate.  How gentle a cycle is that counts many times (``contact.repeats``) one alone decides.
 
 For given slip the second term is a spring in series with the surface.  The step is solved for given depths ``d``, and others follow
 from what is found: a node at another depth ``d'`` has the force ``r_n - kappa (d' - d)``, an open one
@@ -40,6 +40,10 @@ FALL, PATIENCE = 0.7, 10
 
 # Part of its force that what a step wears under the force at its start takes from a node, at most.
 START = 0.01
+
+# In a jump of many cycles ``1 - theta`` is at most this, where one cycle is gentle: with far less, or with less the longer the jump,
+# a jump would go by another rule than the cycles that it stands for.  What alternates falls to 2/3 in a step.
+JUMP = 0.4
 
 # Part of ``geometry_tol`` that depths may be off.
 PART = 0.1
@@ -102,8 +106,10 @@ class Wearing:
         """Depth that the slip of a state wears under forces at the end, the part of it due to the start, and that per force at the end."""
         rates = [contact.wear_rates(getattr(contact, name)) for contact in self._contacts]
         start, c = map(np.concatenate, zip(*rates))
-        z = c * self._kappa
-        share = np.minimum(0.5, np.divide(START, z, np.ones_like(z), where=z > START))
+        repeats = np.concatenate([np.full(of.nodes.size, of.repeats) for of in self._contacts])
+        z, part = c * self._kappa, START * repeats
+        share = np.divide(part, z, np.ones_like(z), where=z > part)
+        share = np.minimum(share, np.where(repeats > 1.0, JUMP, 0.5))
         start, c = share * start, (1.0 - share) * c
         return start + c * np.concatenate(forces), start, c
 

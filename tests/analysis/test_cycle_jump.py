@@ -62,7 +62,10 @@ def total(scene, array):
 
 @pytest.mark.parametrize("make, coefficient, stroke", [(pad, 1e-4, 0.2), (roller, 2e-4, 2e-3)])
 def test_estimates_are_the_errors_of_jumps(make, coefficient, stroke):
-    """In gross and in partial slip, jumps wear what cycles one by one do: to the accuracy, and with the error that is estimated, within three."""
+    """In gross and in partial slip, jumps wear what cycles one by one do: to the accuracy, and with the error that is estimated, within three.
+
+    Errors of a hundredth of the accuracy are not resolved: in gross slip the volume follows from the weight.
+    """
     truth, cycle = make(coefficient, stroke)
     for done in range(40):
         cycle(done)
@@ -79,8 +82,9 @@ def test_estimates_are_the_errors_of_jumps(make, coefficient, stroke):
         "profile_error": total(scene, np.abs(off)) / volume,
     }
     for name, error in errors.items():
-        assert error <= ACCURACY
-        assert error / 3 <= getattr(found, name) <= 3 * error, name
+        estimated, resolved = getattr(found, name), ACCURACY / 100
+        assert error <= ACCURACY / 2
+        assert error <= max(3 * estimated, resolved) and estimated <= max(3 * error, resolved), name
 
 
 def test_a_million_cycles_of_gross_slip():
@@ -164,6 +168,23 @@ def test_what_fails_leaves_the_last_jump():
     assert np.array_equal(scene.contact.wear_depth, depths[-1]) and scene.contact.repeats == 1
 
 
+def test_a_budget_of_simulated_cycles():
+    """Where it is used up, an error says where the programme is; nothing is lost, another call goes on from there."""
+    scene, cycle = pad(1e-5, 0.2)
+    with pytest.raises(RuntimeError, match="is at cycle 4 of 100.*with cycles=96") as error:
+        dc.cycle_jump(scene.problem, cycle, 100, max_cycles=5)
+    assert not isinstance(error.value, dc.NotConverged) and scene.contact.repeats == 1
+    worn = total(scene, scene.contact.wear_depth)
+    found = dc.cycle_jump(scene.problem, cycle, 2)
+    assert found.volume == pytest.approx(1.5 * worn, rel=1e-2)
+
+
+def test_a_cycle_without_a_step_is_refused():
+    """Nothing would wear, and no accuracy be reached by it."""
+    with pytest.raises(ValueError, match="cycle has made no step"):
+        dc.cycle_jump(pad(1e-5, 0.2)[0].problem, lambda done: None, 10)
+
+
 def test_what_cannot_be_meant():
     """Cycles, accuracy, wear and snapshots are checked."""
     scene, cycle = pad(1e-5, 0.2)
@@ -172,7 +193,7 @@ def test_what_cannot_be_meant():
         with pytest.raises(ValueError, match=said):
             dc.cycle_jump(problem, *given)
     with pytest.raises(ValueError, match="repeats must be"):
-        scene.contact.repeats = 0
+        scene.contact.repeats = -1
     snapshot, other = problem.snapshot(), pad(1e-5, 0.2)[0]
     with pytest.raises(ValueError, match="of the same problem"):
         other.problem.restore(snapshot)
