@@ -90,15 +90,14 @@ def cycle_jump(
 ) -> CycleJump:
     """Wear through a number of cycles, of which few are simulated.  Collective.
 
-    In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  A
-    jump is made twice from the same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of it.  Both
-    have errors of first order, the coarse one twice that of the fine one; so the fine one plus the difference of the two is of second
-    order (Richardson extrapolation).  That is where the jump ends, after a step in which nothing moves and nothing wears.
+    In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  A jump is made twice from the
+    same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of it.  Errors of first order of the
+    coarse run are twice those of the fine one; less these (Richardson extrapolation), the jump ends with a step in which nothing moves and nothing wears.
 
-    The estimated error is what extrapolation leaves: how far the difference of the two is from that of the last jump times the square of
+    The estimated error is what extrapolation leaves: how far the difference of the runs is from that of the last jump times the square of
     their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` of what it wears, or a twentieth of that of all that is worn; a
-    jump of a larger error, or in which a step does not converge, is made again, shorter.  Programmes begin with jumps of two cycles, both
-    simulated, and go on with these as long as stick and slip have not settled.
+    jump of a larger error, or in which a step does not converge, is made again, shorter.  Programmes begin with jumps of two cycles, which end as two cycles
+    simulated one by one do, and go on with these as long as stick and slip have not settled.
 
     Args:
         problem: The ContactProblem, in the state in which the programme begins.
@@ -106,8 +105,7 @@ def cycle_jump(
             called again from earlier states, so all loads that its steps need are set in it.
         cycles: How many.
         accuracy: Relative, of worn volume, largest depth and profile.
-        longest: Jump.
-        max_cycles: To be simulated in this call, at most; a jump that has begun is finished.
+        longest, max_cycles: Jump, and cycles to be simulated in this call, at most; a jump that has begun is finished.
         path: Folder of checkpoints, written after every jump; if there are some, the programme goes on from there.
         monitor: None, or a function of a row of the table, called after every jump in the state at its end.
 
@@ -116,7 +114,7 @@ def cycle_jump(
 
     Raises:
         NotConverged: a step of cycles simulated one by one did not converge; after any error the problem is at the end of the last jump.
-        RuntimeError: ``max_cycles`` were simulated; the same call goes on if there is a ``path``.
+        RuntimeError: ``max_cycles`` were simulated; with ``path`` the same call goes on.
         ValueError: no contact wears, a cycle without a step, numbers that make no sense, a folder of another programme.
 
     Example:
@@ -129,9 +127,8 @@ def cycle_jump(
     """
     comm = problem.body.comm
     with raised_together(comm):
-        cycles, accuracy = int(positive("cycles", cycles, whole=True)), positive("accuracy", accuracy, finite=True)  # fmt: skip
-        longest = positive("longest", longest)
-        max_cycles = int(positive("max_cycles", max_cycles, whole=True))
+        cycles, max_cycles = (int(positive(name, of, whole=True)) for name, of in (("cycles", cycles), ("max_cycles", max_cycles)))  # fmt: skip
+        accuracy, longest = positive("accuracy", accuracy, finite=True), positive("longest", longest)  # fmt: skip
         _check(problem, cycle, monitor)
     agree(comm, cycles=cycles, accuracy=accuracy, longest=longest, max_cycles=max_cycles, path=None if path is None else str(path))  # fmt: skip
     run = _Run(problem, cycle, accuracy, longest)
