@@ -113,13 +113,14 @@ class Responses:
         if comm.rank > 0:
             return np.zeros((0, 0))
         loads = sparse.vstack([part.all for part in rows]).tocsr()
-        met, at = np.unique(np.searchsorted(self.dofs, loads.indices), return_inverse=True)
-        R = sparse.csr_matrix((loads.data, at.ravel(), loads.indptr), (loads.shape[0], met.size))
-        between = np.empty((met.size, met.size))  # a row for each column of A^-1
-        for k in needed:
-            here = met // _COLUMNS == k
-            between[here] = self._blocks[k][np.ix_(met, met[here] - k * _COLUMNS)].T
-        W = R @ (R @ between).T
+        size, at = loads.shape[0], np.searchsorted(self.dofs, loads.indices)
+        R = sparse.csr_matrix((loads.data, at, loads.indptr), (size, self.dofs.size))
+        moved = np.zeros((len(needed) * _COLUMNS, size))  # rows by unit forces at what they need
+        for k, first in zip(needed, range(0, len(moved), _COLUMNS)):
+            block = self._blocks[k]
+            moved[first : first + block.shape[1]] = (R @ block).T
+        at = np.searchsorted(needed, at // _COLUMNS) * _COLUMNS + at % _COLUMNS
+        W = sparse.csr_matrix((loads.data, at, loads.indptr), (size, len(moved))) @ moved
         return (W + W.T) / 2
 
     def _solve(self, solver: LinearSolver, comm: MPI.Comm, blocks: list[int]) -> None:
