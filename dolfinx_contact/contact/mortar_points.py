@@ -401,9 +401,14 @@ class MortarPoints(ContactPoints):
         none = np.zeros(self.count)
         part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
         self.share = frozen(np.where(rows.covered, part, 0.0))
-        both = sparse.hstack((sparse.eye(self.count), -self.m), "csr")
-        blocks = both.data[:, None, None] * np.repeat(frames, np.diff(both.indptr), axis=0)
-        B = sparse.bsr_matrix((blocks, both.indices, both.indptr), np.array(both.shape) * self.dim)
+        starts = self.m.indptr + np.arange(self.count + 1)  # of rows with the node itself first
+        values, nodes = np.ones(starts[-1]), np.zeros(starts[-1], dtype=np.int32)
+        away = np.ones(starts[-1], dtype=bool)
+        away[starts[:-1]] = False
+        values[away], nodes[away] = -self.m.data, self.count + self.m.indices
+        nodes[starts[:-1]] = np.arange(self.count)
+        blocks = values[:, None, None] * np.repeat(frames, np.diff(starts), axis=0)
+        B = sparse.bsr_matrix((blocks, nodes, starts), (dofs.size, dofs.size + opposite.size))
         B, columns = B.tocsr(), np.concatenate((self.first + dofs, opposite)).ravel()
         self._B = self._petsc(B.indptr, columns[B.indices], B.data)
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
