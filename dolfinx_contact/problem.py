@@ -69,8 +69,9 @@ LOG = logging.getLogger("dolfinx_contact")
 # How often friction is made to follow the pressure, and the largest factor by which its changes are taken to fall.
 MOST, SLOWEST = 50, 0.9
 
-# How many times as far as supports move bodies may be expected to move in a step.
-FARTHER = 2.0
+# How many times as far as supports move bodies may be expected to move in a step; and the part of that within which they are expected
+# to go on as in the step before.
+FARTHER, STEADY = 2.0, 0.05
 
 # Tolerance of a solution on the way: at most ROUGH, and this part of the last change of the reactions.
 ROUGH, PART = 1e-3, 0.03
@@ -392,6 +393,9 @@ class ContactProblem(Guarded):
             contact.assemble_reaction(forces)
         forces[body.fixed] = 0.0
         x += body.solve(forces)
+        ahead = 2 * last - self._states.before
+        if body.farthest(ahead - x) <= STEADY * body.farthest(given):
+            x = ahead  # friction and what deforms go on, too
         slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
         if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
             return last
