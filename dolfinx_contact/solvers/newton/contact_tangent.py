@@ -87,8 +87,12 @@ class ContactTangent:
         """A matrix with room for all entries.  Collective."""
         A, how = self._body.K.copy(), structure(self._points)
         if how != PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN:
-            ones = [(np.ones(of.frames.shape),) * 2 for of in self._points]
-            change = change_of(self._body.K, responses(self._body.K, self._points, ones))
+            # Of ones, products cancel where normals are along a diagonal.
+            any_values = np.random.default_rng(0).uniform(
+                1.0, 2.0, self._points[0].frames.shape[1:]
+            )
+            some = [(np.tile(any_values, (of.count, 1, 1)),) * 2 for of in self._points]
+            change = change_of(self._body.K, responses(self._body.K, self._points, some))
             change.scale(0.0)
             A.axpy(1.0, change, how)
             change.destroy()
