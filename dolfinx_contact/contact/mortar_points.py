@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
+from scipy.spatial.transform import Rotation
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
@@ -61,6 +62,8 @@ class MortarPlacement(Placement):
         )  # a displacement with the nodes that have left, and what was placed for it
         self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
         self._leaving = False  # whether nodes of any rank leave the other side in the step
+        self._began: list | None = None  # how both sides have turned at its start
+        self._planes: list = []  # directions and places along which supports hold nodes in one plane
         self._owned = owned
         super().__init__(
             contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
@@ -82,13 +85,15 @@ class MortarPlacement(Placement):
             rows = rows_of(slaves, masters, self._mine, len(there))
             rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, self._mean_normals(slaves))
-            frames = frames_along(normals, self._axis(moved), self.x, self.surface)
+            turns = self._turns(moved, there)
+            axis = None if self.surface.axis is None else turns[0] @ self.surface.axis
+            frames = frames_along(normals, axis, self.x, self.surface)
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
         flat[~rows.covered] = self._apart  # opposite nothing: closed
         points = MortarPoints(self._dofs, frames, self._owned, rows, self._master.dofs, self._comm)
-        points.met = self._supported
+        points.met, points.turns = self._supported, turns
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
         found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
@@ -102,12 +107,40 @@ class MortarPlacement(Placement):
             sums -= at @ side.outwards
         return sums / np.linalg.norm(sums, axis=1, keepdims=True)
 
-    def _axis(self, moved: np.ndarray) -> np.ndarray | None:
-        """The axis turned with the slave's facets as a whole, whose nodes are at ``moved``, ``shape=(m, gdim)``."""
-        axis = self.surface.axis
-        if axis is None:
-            return None
-        return turn_of_nodes(self._slave.x, moved, MPI.COMM_SELF) @ axis  # all ranks know all nodes
+    def _turns(self, slave: np.ndarray, master: np.ndarray) -> list[np.ndarray]:
+        """Rotations of both sides as a whole, ``shape=(gdim, gdim)``, whose nodes are at these places; all ranks know all nodes."""
+        pairs = [(self._slave.x, slave), (self._master.x, master)]
+        for k, plane in self._planes:  # of symmetry: bodies turn as with their other halves
+            mirror, foot = np.ones(self.x.shape[1]), np.zeros(self.x.shape[1])
+            mirror[k], foot[k] = -1.0, 2.0 * plane
+            pairs = [[np.concatenate((x, mirror * x + foot)) for x in pair] for pair in pairs]
+        return [turn_of_nodes(x, there, MPI.COMM_SELF) for x, there in pairs]
+
+    def twist(self, u: np.ndarray) -> float:
+        """Radians by which one side has turned against the other since the start of the step.  Collective."""
+        ends = self._turns(*(side.moved(u)[1] for side in (self._slave, self._master)))
+        return _between(*self._since_start(ends))[2]
+
+    def _since_start(self, turns: list[np.ndarray]) -> list[np.ndarray]:
+        """Rotations of both sides in the step.  Collective the first time."""
+        if self._began is None:
+            began = (side.moved(self._start)[1] for side in (self._slave, self._master))
+            self._began = self._turns(*began)
+        return [new @ old.T for new, old in zip(turns, self._began)]
+
+    def _way(self, placed: Placed) -> np.ndarray:
+        """By what slip past what is opposite is more than its chord, ``shape=(n, gdim - 1)``, local frame.  Collective the first time.
+
+        What was apart by ``d`` at the start has slipped by it as both sides see it: turned by the half of what each has, and as long as
+        the arc on which the sides turn against each other.
+        """
+        mean, axis, angle = _between(*self._since_start(placed.points.turns))
+        apart = self.x - placed.home
+        apart = apart + turned_back(placed.frame, placed.points.motion(self._start))
+        turned = apart @ mean.T
+        along = (turned @ axis)[:, None] * axis
+        arc = angle / 2 / np.sin(angle / 2) if angle > 0.0 else 1.0
+        return times(placed.frame, apart - along - arc * (turned - along))[:, :-1]
 
     def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
         """See ``Placement``; rows are those where the step is likely to end, then those where it has ended."""
@@ -120,13 +153,14 @@ class MortarPlacement(Placement):
         if self._renewed > LEAVES:
             self._left |= alone & ~self._used.alone
         self._used = self.now.points
+        self.now = self.now._replace(way=frozen(self._way(self.now)))
         left = alone & ~self.settled.points.alone
         self._leaving = bool(self._comm.allreduce(left.any(), op=MPI.LOR))
 
     def begin(self, start: np.ndarray) -> None:
         """A step begins at a displacement, and its first rows are no renewal."""
         self._start, self._used, self._renewed = start, self.settled.points, -1
-        self._left[:], self._leaving = False, False
+        self._left[:], self._leaving, self._began = False, False, None
 
     def carried(self, last: State) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
@@ -161,6 +195,8 @@ class MortarPlacement(Placement):
         """What a state would be with the rows of its own displacement ``u``, owned degrees of freedom.  Collective."""
         now, there = self.now, self.placed(u)
         slip, used = (of.points.motion(u - self._start) for of in (there, now))
+        slip[:, :-1] += self._way(there)
+        used[:, :-1] += 0.0 if now.way is None else now.way
         slip[:, -1] = used[:, -1] = 0.0
         missed = times(now.frame, turned_back(there.frame, slip)) - used
         reaction = carried(state.reaction, now.frame, there.frame)
@@ -282,6 +318,11 @@ class MortarPlacement(Placement):
         if not self._comm.allreduce(bool((held != self.now.points.met).any())):
             return False
         self._supported, self._projected = held, (None, None)
+        self._planes = []
+        for k, at in enumerate(self.x.T):
+            where = np.concatenate(self._comm.allgather(at[held[:, k]]))
+            if where.size and np.ptp(where) <= CLEAR * self._extent:
+                self._planes.append((k, where.mean()))
         self.now = self.placed(self.now.at)
         return True
 
@@ -376,6 +417,7 @@ class MortarPoints(ContactPoints):
     Attributes:
         alone: Nodes opposite nothing, or next to nothing, which never touch, ``shape=(n,)``.
         share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
+        turns: Rotations of both sides as a whole, ``shape=(gdim, gdim)`` each.
         met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
         m: Coefficients of the opposite nodes, sparse, ``shape=(n, m)``.
         stiffer: Of the last ``stiffness``: that of each node over that of the nodes opposite, along the normal, ``shape=(n,)``.
@@ -383,6 +425,7 @@ class MortarPoints(ContactPoints):
 
     local = False
     met: np.ndarray
+    turns: list[np.ndarray]
     stiffer: np.ndarray
 
     def __init__(
@@ -538,6 +581,18 @@ class MortarPoints(ContactPoints):
         for rows, part in self._comm.allgather((own, C)):
             found[rows] = part
         return found
+
+
+def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """The rotation half way between two, the axis from the one to the other, and the angle between them."""
+    dim = len(slave)
+    first, second = np.eye(3), np.eye(3)
+    first[:dim, :dim], second[:dim, :dim] = slave, master
+    one, vector = Rotation.from_matrix(first), Rotation.from_matrix(first.T @ second).as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    mean = one * Rotation.from_rotvec(vector / 2)
+    axis = one.apply(vector / angle) if angle > 0.0 else vector
+    return mean.as_matrix()[:dim, :dim], axis[:dim], angle
 
 
 def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip

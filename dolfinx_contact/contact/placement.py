@@ -164,6 +164,10 @@ class Placement:
         """How far a node has slid beyond what its frame was taken for, and how far it may: lengths.  None on rigid surfaces."""
         return 0.0, np.inf
 
+    def twist(self, u: np.ndarray) -> float:
+        """Radians by which a deformable surface has turned against the body in a step that ends at a displacement.  Collective."""
+        return 0.0
+
     def clamped(self, fixed: np.ndarray) -> np.ndarray:
         """Nodes without friction because supports hold them along the surface, and not as on a plane of symmetry, ``shape=(n,)``; ``fixed`` degrees of freedom."""
         return np.zeros(len(self.x), dtype=bool)

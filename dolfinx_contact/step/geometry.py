@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.contact.placement import LONGEST
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
@@ -200,6 +201,13 @@ def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
         contacts: Those whose geometry changes; in the state of ``u``.
         u: Displacement of owned degrees of freedom.
     """
+    for contact in [c for c in contacts if c.surface.deformable and body.nonlinear]:
+        turned = contact.placement.twist(u)
+        if turned > LONGEST:
+            return (
+                f"the step is too long: two bodies turn against each other by {turned:.2g} radians in it, {LONGEST:g} is the most. Divide the step, "
+                "or let dc.advance do so"
+            )
     lost = [(2.0, "")]
     for contact in [c for c in contacts if not c.surface.deformable]:
         with raised_together(body.comm):  # the user's functions
