@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.errors import NodalStiffness
 
 
+# Solves by multigrid for the condensed operator, where the fixed point has failed: about a thousand cycles.
+MOST_SOLVES = 100
+
+
 def most_nodes(unknowns: int, friction: bool) -> int:
     """The most contact nodes of a body for which the condensed solver is tried first, see docs/solvers.md.
 
@@ -85,13 +89,13 @@ class BoundAutomatic:
         if nodes > most:
             self._why = f"{nodes} contact nodes, more than {most}"
             self._solvers.reverse()
-        elif body.ksp.getPC().getType() not in ("lu", "cholesky"):
+        elif not body.exact:
             self._why = "without a factorisation the condensed operator would cost too many solves"
             self._solvers.reverse()
         elif not enough:
             self._why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
             self._solvers.reverse()
-        if not enough:
+        if not enough or not (body.exact or self._components * nodes <= MOST_SOLVES):
             self._solvers = self._solvers[:1]
 
     def destroy(self) -> None:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 # Steps over which the fall of the errors is taken.
 WINDOW = 3
 
+# States whose statuses are kept.
+KEPT = 50
+
 
 class Search:
     """Keeps the best iterate.
@@ -26,6 +29,7 @@ class Search:
         step: The ``LoadStep``.
         x: Where the search begins.
         max_seconds: Wall time after which it ends, seconds.
+        most: Iterations after which it ends.
 
     Attributes:
         best: The iterate of the smallest errors.
@@ -33,22 +37,29 @@ class Search:
         forward_error: Of the best one, see docs/errors.md.
         iterations: Done so far.
         left: Iterations left.
-        over: Solved, or out of time.
+        over: Solved, or out of time or iterations.
+        statuses: Of each contact in the last states.
     """
 
-    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float):
+    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float, most: float = math.inf):
         self.step, self.best = step, x
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=WINDOW + 1)
         self.iterations = self.left = 0
-        self._start, self._seconds = perf_counter(), max_seconds
+        self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT)
+        self._start, self._seconds, self._most = perf_counter(), max_seconds, most
         self.over = self._lost = False
 
     def begin(self, most: int, patience: float = math.inf) -> None:
         """Once more, with so many iterations at most, in each ``patience`` of which the smallest error has to halve."""
         self.left, self._lost, self._patience = most, False, patience
         self._halved, self._since = np.inf, self.iterations
+
+    @property
+    def within(self) -> bool:
+        """Whether the errors of the best iterate are at most the tolerance."""
+        return not self._rank[0]
 
     @property
     def goes_on(self) -> bool:
@@ -65,6 +76,7 @@ class Search:
         residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol
         self._errors.append(self.error)
+        self.statuses.append([contact.status for contact in self.step.contacts])
         change = errors.change * self._contraction()
         within = self.error <= tol  # of those the forward error counts, too
         rank = (not within, max(self.error, change) if within else self.error)
@@ -77,7 +89,8 @@ class Search:
         solved = errors.acts and max(self.error, change) <= tol
         stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error
         rounded = stalled and errors.within(0.0)
-        self.over = bool(solved or rounded or self._late())
+        spent = self.iterations >= self._most
+        self.over = bool(solved or rounded or spent or self._late())
         return residual
 
     def _contraction(self) -> float:

@@ -147,7 +147,7 @@ class LoadStep:
     def refusal(self) -> str:
         """Why it has not converged, in words, as far as anything tells.  Collective."""
         said = "" if self.statics is None else self.statics.hidden(self)
-        said = said or self._no_state() or "Smaller load steps help most often"
+        said = said or self._no_state() or self._hard()
         if any(contact.follows_pressure for contact in self.contacts):
             said += "; friction follows the pressure, and was that of the last iterate"
         if any(contact.wears_within for contact in self.contacts):
@@ -155,6 +155,13 @@ class LoadStep:
                 "; the depth that the step wears is part of it, and was that of the last iterate"
             )
         return said
+
+    def _hard(self) -> str:
+        """What may help where a state should exist, in words.  Collective."""
+        from dolfinx_contact.step.stalled import tall
+
+        said = "Smaller load steps help most often", tall(self.body, self.contacts)
+        return "; ".join(filter(None, said))
 
     def _no_state(self) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""

@@ -34,6 +34,9 @@ EVERY, SOONER, GROWTH, USELESS = 20, 10, 100.0, 0.9
 # Of a loose body, which may slide away, the error has to halve within so many iterations.
 PATIENCE = 60
 
+# Iterations of a step in all, over ``max_iterations``, where one is a multigrid cycle: ten times those of a hard step.
+BUDGET = 2.5
+
 # Corrections that grow by this mislead.
 ASTRAY = 1e3
 
@@ -59,7 +62,8 @@ class FixedPoint:
             converges, at the cost of a factorisation each.
         depth: Number of previous corrections that Anderson's method combines.
         newton: Whether Newton's method may be tried, with the first rho.
-        max_iterations: Iterations with one rho, not counting those of Newton's method.
+        max_iterations: Iterations with one rho, not counting those of Newton's method; where they are multigrid cycles a step
+            ends after 2.5 times as many in all.
         max_seconds: Wall time after which the search ends, seconds.
 
     Raises:
@@ -133,7 +137,9 @@ class BoundFixedPoint:
             start: Where to begin; None asks the step.
         """
         options = self._options
-        search = Search(step, step.start() if start is None else start, options.max_seconds)
+        start = step.start() if start is None else start
+        most = math.inf if self._body.exact else BUDGET * options.max_iterations
+        search = Search(step, start, options.max_seconds, most)
         newton = options.newton
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
             self._fall(search, factor, EVERY)
@@ -148,9 +154,19 @@ class BoundFixedPoint:
                 newton = False
             if search.over or _slides(step, search.best, tried=True):
                 break
-        return SolverResult(
-            search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
-        )
+        found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
+        stopped = search.within or _slides(step, search.best, tried=True)
+        return SolverResult(*found, reason="" if stopped else self._stalled(search, most))
+
+    def _stalled(self, search: Search, most: float) -> str:
+        """What stands in the way, in words.  Collective."""
+        from dolfinx_contact.step.stalled import changing
+
+        said = changing(self._body, self._contacts, search.statuses)
+        if search.iterations < most:
+            return said
+        twice = 2 * self._options.max_iterations
+        return f"{said}; a step of this size has {most:.0f} iterations, FixedPoint(max_iterations={twice}) gives it twice as many"
 
     def _fall(self, search: Search, factor: float, every: int) -> None:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""

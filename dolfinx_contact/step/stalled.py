@@ -1,0 +1,71 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""Why a search ends without a solution, in words: nodes that change their status again and again, tall elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dolfinx_contact import compat
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+
+# Height over width of elements at the surface from which on they are called tall.
+TALL = 2.0
+
+
+def changing(
+    body: BodyLike, contacts: Sequence[ContactLike], statuses: Iterable[Sequence[np.ndarray]]
+) -> str:
+    """How many nodes have changed their status in the last states of a search, and which one most often.  Collective.
+
+    Args:
+        body: The body.
+        contacts: Its contacts.
+        statuses: Of each contact in each of these states, ``shape=(n,)``.
+    """
+    every = np.array([np.concatenate(one) for one in statuses])
+    times = (every[1:] != every[:-1]).sum(axis=0)
+    x = np.concatenate([contact.x for contact in contacts])
+    count, nodes = body.total(np.array([np.count_nonzero(times), times.size])).astype(int)
+    if not count:
+        return f"no node has changed its status in the last {len(every)} states, errors fall slowly"
+    most = int(times.argmax()) if times.size else None
+    mine = (0, None) if most is None else (int(times[most]), tuple(x[most].tolist()))
+    often, where = max(body.comm.allgather(mine), key=lambda one: one[0])
+    at = ", ".join(f"{value:.4g}" for value in where)
+    return (
+        f"the search goes from state to state: {count} of {nodes} contact nodes have changed their status in the last "
+        f"{len(every)}, most often ({often} times) the one at ({at})"
+    )
+
+
+def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> str:
+    """That elements at the surface are tall, in the mean, and what to do; empty if they are not.  Collective."""
+    ratios = np.concatenate([_ratios(contact) for contact in contacts])
+    total, count = body.total(np.array([ratios.sum(), ratios.size]))
+    if total <= TALL * count:
+        return ""
+    return (
+        f"elements at the surface are {total / count:.1f} times as high as wide, which makes steps harder where nodes slip: "
+        "make them flatter there"
+    )
+
+
+def _ratios(contact: ContactLike) -> np.ndarray:
+    """Height over width of this rank's cells that have a facet of contact nodes."""
+    V, dim = contact.displacements.V, contact.points.dim
+    nodes, x = compat.cell_nodes(V), V.tabulate_dof_coordinates()[:, :dim]
+    row = np.full(len(x), -1)
+    row[contact.nodes] = np.arange(contact.nodes.size)
+    ratios = []
+    for cell in nodes[(row[nodes] >= 0).sum(axis=1) >= dim]:
+        touching = cell[row[cell] >= 0]
+        heights = x[cell] @ contact.points.frames[row[touching[0]], -1]
+        apart = np.linalg.norm(x[touching][:, None] - x[touching], axis=2)
+        ratios.append(np.ptp(heights) / apart[apart > 0.0].min())
+    return np.array(ratios)
