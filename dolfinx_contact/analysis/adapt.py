@@ -75,7 +75,7 @@ def adapt(
 
     On each mesh, ``compute`` repeats the whole load history: no state is transferred from mesh to mesh.
     ``estimate`` gives the error of the quantity and the energy norm of the difference on each cell; the cells with the largest
-    norms, which together make up the part ``share`` of the sum of squares, are divided (W.  Doerfler, SIAM J.  Numer.  Anal. 33
+    norms, which together make up the part ``share`` of the sum of squares, are divided (W. Doerfler, SIAM J. Numer. Anal. 33
     (1996) 1106).  These are estimates, not bounds, and do not include the error of increments.  New boundary nodes are midpoints
     of old edges, also on a curved boundary.
 
@@ -94,7 +94,7 @@ def adapt(
         ValueError: other cells, an unknown quantity, numbers out of range, problems that are not on the mesh.
 
     Example:
-        >>> def press(cube, order):  # and all steps of the programme
+        >>> def press(cube, order):  # and all steps of the load history
         ...     V = functionspace(cube, ("Lagrange", order, (3,)))
         ...     U, ends = fem.Function(V), [mesh.locate_entities_boundary(cube, 2, lambda x: x[2] == z) for z in (0, 1)]
         ...     top = fem.dirichletbc(np.array([0, 0, -1e-3]), fem.locate_dofs_topological(V, 2, ends[1]), V)

@@ -88,26 +88,27 @@ def cycle_jump(
     path: str | os.PathLike[str] | None = None,
     monitor: Callable[[dict[str, Any]], object] | None = None,
 ) -> CycleJump:
-    """Wear through a number of cycles, of which few are simulated.  Collective.
+    """Wear through a number of cycles, of which only a few are simulated.  Collective.
 
-    In a jump of n cycles, what each step of one simulated cycle wears, works and slips counts n times (``contact.repeats``).  A jump is made twice from the
-    same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of it.  Errors of first order of the
-    coarse run are twice those of the fine one; less these (Richardson extrapolation), the jump ends with a step in which nothing moves and nothing wears.
+    In a jump of n cycles, wear, work and slip of each step of one simulated cycle count n times (``contact.repeats``).  Each jump is made twice
+    from the same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of the jump.  First-order errors of the
+    coarse run are twice those of the fine one; Richardson extrapolation removes them.  The jump ends with a step in which nothing moves and nothing wears.
 
     The estimated error is what extrapolation leaves: how far the difference of the runs is from that of the last jump times the square of
-    their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` of what it wears, or a twentieth of that of all that is worn; a
-    jump of a larger error, or in which a step does not converge, is made again, shorter.  Programmes begin with jumps of two cycles, which end as two cycles
-    simulated one by one do, and go on with these as long as stick and slip have not settled.
+    their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` times its wear, or a twentieth of that times all wear so
+    far.  A jump of a larger error, or in which a step does not converge, is repeated with fewer cycles.  The first jumps are of two cycles, which end like
+    two cycles simulated one by one, until stick and slip zones have settled.
 
     Args:
-        problem: The ContactProblem, in the state in which the programme begins.
+        problem: The ContactProblem, in the state before the first cycle.
         cycle: Function of the number of cycles done that takes the problem through one cycle by ``problem.solve()``.  It is
             called again from earlier states, so all loads that its steps need are set in it.
-        cycles: How many.
+        cycles: Number of cycles.
         accuracy: Relative, of worn volume, largest depth and profile.
-        longest, max_cycles: Jump, and cycles to be simulated in this call, at most; a jump that has begun is finished.
-        path: Folder of checkpoints, written after every jump; if there are some, the programme goes on from there.
-        monitor: None, or a function of a row of the table, called after every jump in the state at its end.
+        longest: Largest number of cycles in a jump.
+        max_cycles: Largest number of cycles simulated in this call; a jump that has begun is finished.
+        path: Folder of checkpoints, written after every jump; if it has some, the run continues from the last.
+        monitor: None, or a function of a row of the table, called after every jump, in the state at its end.
 
     Returns:
         A ``CycleJump``; the problem is in the state after the last cycle.  On a terminal there is a progress bar if tqdm is installed.
@@ -115,7 +116,7 @@ def cycle_jump(
     Raises:
         NotConverged: a step of cycles simulated one by one did not converge; after any error the problem is at the end of the last jump.
         RuntimeError: ``max_cycles`` were simulated; with ``path`` the same call goes on.
-        ValueError: no contact wears, a cycle without a step, numbers that make no sense, a folder of another programme.
+        ValueError: no contact wears, a cycle has no step, a number is out of range, or the folder is of another run.
 
     Example:
         >>> def cycle(done):
@@ -397,7 +398,7 @@ class _Folder:
             )
         if done > cycles:
             raise ValueError(
-                f"{self._path} has a programme that is {done} cycles on, further than cycles = {cycles}."
+                f"{self._path} has a run that has done {done} cycles, more than cycles = {cycles}."
             )
         return record
 

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""How far results are off because of the mesh: by a second problem with a better space, stepped along the same programme."""
+"""How far results are off because of the mesh: by a second problem with a better space, stepped along the same load history."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def estimate(
 
     ``reference`` is the same body after the same load history, but with second order on the same mesh, a finer mesh, or smaller
     increments.  The estimated error of a quantity is the difference, ``abs(J(u) - J(U)) * share``, which is the true error if
-    that of the reference is much smaller (saturation; R.  E.  Bank, R.  K.  Smith, SIAM J.  Numer.  Anal. 30 (1993) 921).  It is
+    that of the reference is much smaller (saturation; R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  It is
     an estimate, not a bound.  Each problem has its own slip history, so estimates for frictional work and other history variables
     include accumulated errors.  Both problems may share a surface driven by displacement; a surface driven by force moves
     differently in each, so make two.
@@ -119,7 +119,7 @@ def estimate(
         >>> finer_F = ufl.replace(F, {u: U, v: ufl.TestFunction(W)})
         >>> finer_bc = fem.dirichletbc(held, fem.locate_dofs_topological(W, 2, head), W)
         >>> finer = dc.ContactProblem(finer_F, U, dc.Contact(W, foot, plane, friction), bcs=[finer_bc])
-        >>> step = finer.solve()  # and all other steps of the programme
+        >>> step = finer.solve()  # and all other steps of the load history
         >>> off = dc.estimate(problem, finer)["normal_force"].relative
     """
     comm = problem.body.comm

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A programme of loading in increments that are halved where a step fails, and grow again."""
+"""A load history in increments that are halved where a step fails, and grow again."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ TILTED = 0.01
 
 
 class Contact(Guarded):
-    """Nodes of boundary facets that may touch a rigid plane, or another rigid surface.
+    """Nodes of boundary facets that may touch a surface, rigid or deformable.
 
     Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The local frame is (t1, t2, n), in
     two dimensions (t, n): the plane's axis, the direction across it, and the normal.  On a curved surface every node has its own
@@ -64,7 +64,7 @@ class Contact(Guarded):
             first such sub-space is taken, or that sub-space itself.
         facets: Local indices of boundary facets, integers; a rank may have none.  Or ``(facet_tags, tag)`` with one tag, an
             integer, or several.
-        plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder`` or ``RigidSurface``.
+        plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder``, ``RigidSurface`` or ``DeformableSurface``.
         friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.  Coefficients may be given per
             node, ``shape=(n, 2)`` for this rank's n nodes, or as fields, which the contact evaluates at its nodes.
         wear: Archard's law, whose worn depth opens the gap; None is no wear.  Between two deformable bodies a law for each, see ``Wear``.

@@ -16,7 +16,7 @@ class Wear(Guarded):
     The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the frictional work along principal direction i in the
     step (``dissipation.py``) and ``A`` the nodal area.  So the worn volume, the sum of depth times area, is ``sum k_i
     w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
-    hardness H [J.  F.  Archard, J.  Appl.  Phys. 24 (1953) 981].
+    hardness H [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 
     The depth worn in a step is part of its equations, so that a node is never worn below contact, whatever the coefficient.  The
     work is that of ``contact.dissipation``, with the mean of the forces at both ends of the step, as long as it takes less than a fiftieth of

@@ -138,7 +138,7 @@ def test_a_killed_programme_goes_on(tmp_path):
     if COMM.size == 1:
         assert resumed == straight
         assert np.array_equal(again.contact.reaction, scene.contact.reaction)
-    with pytest.raises(ValueError, match="100 cycles on, further than cycles = 10"):
+    with pytest.raises(ValueError, match="has done 100 cycles, more than cycles = 10"):
         dc.cycle_jump(again.problem, cycle, 10, path=path)
     COMM.barrier()
     if COMM.rank == 0:
