@@ -105,8 +105,7 @@ def cycle_jump(
             called again from earlier states, so all loads that its steps need are set in it.
         cycles: Number of cycles.
         accuracy: Relative, of worn volume, largest depth and profile.
-        longest: Largest number of cycles in a jump.
-        max_cycles: Largest number of cycles simulated in this call; a jump that has begun is finished.
+        longest, max_cycles: Most cycles in a jump, and most cycles simulated in this call; a jump that has begun is finished.
         path: Folder of checkpoints, written after every jump; if it has some, the run continues from the last.
         monitor: None, or a function of a row of the table, called after every jump, in the state at its end.
 
