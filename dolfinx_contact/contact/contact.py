@@ -31,7 +31,7 @@ from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.laws import Laws, rows
 from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
-from dolfinx_contact.law.dissipation import work_of_friction
+from dolfinx_contact.law.dissipation import work_and_turn
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.law.supported import supported
@@ -580,11 +580,9 @@ class Contact(Guarded):
         pressed = np.maximum(self.last.reaction[:, -1], self.reaction[:, -1])
         # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
         path = ((pressed > 0.0) & (self.covered > 0.0)) * np.linalg.norm(slip, axis=1)
-        work, path = self.repeats * self._work(slip), self.repeats * path
-        self._doubtful = 0.0
-        if self.may_turn:
-            straight = self.repeats * self._work(slip, turned=False)
-            self._doubtful = float(np.abs((work - straight).sum(axis=1)).sum())
+        work, turned = self._work(slip)
+        work, path, turned = (self.repeats * part for part in (work, path, turned))
+        self._doubtful = float(np.abs(turned.sum(axis=1)).sum()) if self.may_turn else 0.0
         if self._wearing is not None:
             depth = self._wearing
         else:
@@ -628,7 +626,9 @@ class Contact(Guarded):
         slip = slips * (self.slip_kept + state.slip_increment)
         unit = np.zeros_like(self.reaction)
         unit[:, -1] = 1.0
-        start, end = (2.0 * self.repeats * work for work in self._works(slip, unit))  # a half each
+        start, end, _ = (
+            2.0 * self.repeats * work for work in self._works(slip, unit)
+        )  # a half each
         begun = 1.0
         if self.wear.threshold:
             force = np.maximum(state.reaction[:, -1:], 0.0)
@@ -645,27 +645,22 @@ class Contact(Guarded):
         """Of the work of friction of the last step, on this rank: by how much slip that went straight on would have another one."""
         return self._doubtful
 
-    def _work(self, slip: np.ndarray, turned: bool = True) -> np.ndarray:
-        """Work of friction of the step along each principal direction, for its slip, ``shape=(n, gdim - 1)``.
-
-        Args:
-            turned: Whether the direction of slip of the last step counts.
-        """
+    def _work(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Work of friction of the step along each principal direction, for its slip, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         if self._laws.begun is not None:
-            return sum(self._works(slip, self.reaction, turned))
+            start, end, turned = self._works(slip, self.reaction)
+            return start + end, turned
         last = self.last
-        slipped = turned & (last.status == int(Status.SLIP))
-        return work_of_friction(self.friction, last.reaction, slipped, self.reaction, slip, self.law_before)  # fmt: skip
+        slipped = last.status == int(Status.SLIP)
+        return work_and_turn(self.friction, last.reaction, slipped, self.reaction, slip, self.law_before)  # fmt: skip
 
-    def _works(
-        self, slip: np.ndarray, reaction: np.ndarray, turned: bool = True
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Shares of the frictional work of a step that the forces at its start and at its end have, ``shape=(n, gdim - 1)`` each."""
+    def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Shares of the frictional work of a step that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         none, before = np.zeros_like(reaction), self.last.reaction
-        slipped = turned & (self.last.status == int(Status.SLIP))
+        slipped = self.last.status == int(Status.SLIP)
         law = self.friction if self._laws.begun is None else self._laws.begun
-        start = work_of_friction(law, before, slipped, none, slip, self.law_before)
-        return start, work_of_friction(self.friction, none, slipped, reaction, slip)
+        start, turned = work_and_turn(law, before, slipped, none, slip, self.law_before)
+        return start, work_and_turn(self.friction, none, slipped, reaction, slip)[0], turned
 
     def _rate(self, work: np.ndarray) -> np.ndarray:
         return self.wear.depth(work, self.whole_area, self._wear_field)

@@ -45,6 +45,18 @@ def work_of_friction(
         ``shape=(n, gdim - 1)``, force times length; the work of a node is the sum of its row.
         Normal forces below zero, which only a state that is no solution has, count as none.
     """
+    return work_and_turn(friction, before, slipped, reaction, slip_increment, law_before)[0]
+
+
+def work_and_turn(
+    friction: Friction,
+    before: np.ndarray,
+    slipped: np.ndarray,
+    reaction: np.ndarray,
+    slip_increment: np.ndarray,
+    law_before: Friction | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """As ``work_of_friction``, and by how much this is more than the work of slip along ``e1`` alone, ``shape=(n, gdim - 1)``."""
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
     way, e1 = split(friction.along_axes(slip_increment))
@@ -59,7 +71,8 @@ def work_of_friction(
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
     per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
-    return 0.5 * way * (N0 * per_way_before + N1 * per_way)
+    work = 0.5 * way * (N0 * per_way_before + N1 * per_way)
+    return work, 0.5 * way * N0 * (per_way_before - per_way)
 
 
 def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
