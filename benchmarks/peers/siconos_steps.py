@@ -32,8 +32,8 @@ class Watched(dc.CondensedNewton):
 
     seconds: list[float] = []
 
-    def solve_condensed(self, *arguments, **options):
-        seconds, found = timed(partial(super().solve_condensed, *arguments, **options))
+    def search(self, *arguments, **options):
+        seconds, found = timed(partial(super().search, *arguments, **options))
         self.seconds.append(seconds)
         return found
 
