@@ -22,7 +22,9 @@ from benchmarks.measurement import ROOT, run_alone
 from studies.punch import CASES, Parameters, Punch, programme
 
 PARTS = ("steps", "first", "kernel", "iterations")
-SEARCH = "search" if hasattr(dc.CondensedNewton, "search") else "solve_condensed"  # an older clone's
+SEARCH = (
+    "search" if hasattr(dc.CondensedNewton, "search") else "solve_condensed"
+)  # an older clone's
 
 
 def study() -> dict:

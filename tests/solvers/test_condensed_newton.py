@@ -334,6 +334,14 @@ def test_a_caller_may_give_newton_more_iterations():
     assert max(map(iterations, (453, 1165, 1344))) > CondensedNewton().newton_iterations
 
 
+def test_iterations_and_seconds_are_those_of_all_searches():
+    """An answer counts what every method took, also those that made it more accurate."""
+    for seed in range(20):
+        found = check(random_problem(seed, contacts=6, rank=9, mu_range=(0.05, 0.5)))
+        assert found.iterations == sum(attempt.iterations for attempt in found.tried)
+        assert found.seconds >= sum(attempt.seconds for attempt in found.tried)
+
+
 def test_axes_per_contact():
     """Turning the principal directions is turning the tangential part of W and q."""
     scene = random_problem(11, contacts=6, rank=18, mu_range=(0.1, 0.5), ratio=3)

@@ -248,13 +248,17 @@ def _nearer(
     """
     cheap = solver.fallbacks and q.size <= 100
     most = min(solver.max_iterations or UNLIMITED, 100 * solver.newton_iterations)
-    left = max(solver.max_seconds - found.seconds, 1e-3)
-    limits = {"max_iterations": most, "max_seconds": left}
-    finer = replace(solver, slip_tol=None, fallbacks=cheap, **limits)
+    finer = replace(solver, slip_tol=None, fallbacks=cheap, max_iterations=most)
 
     def again(tol: float, **limits: Any):
-        nearer, done = finer.search(operator, friction, q, tol, [found.reaction], **limits)
-        return replace(nearer, branch=found.branch, tried=found.tried + nearer.tried), done
+        within = replace(finer, max_seconds=max(solver.max_seconds - found.seconds, 1e-3))
+        nearer, done = within.search(operator, friction, q, tol, [found.reaction], **limits)
+        both = dict(
+            tried=found.tried + nearer.tried,
+            iterations=found.iterations + nearer.iterations,
+            seconds=found.seconds + nearer.seconds,
+        )
+        return replace(nearer, branch=found.branch, **both), done
 
     done = True
     for factor in (1e-2, 1e-4):
@@ -279,8 +283,9 @@ def _nearer(
 
 def _better(nearer: CondensedResult, found: CondensedResult, tol: float) -> CondensedResult:
     """The best state of a search that failed, if it is a solution with a smaller local error than the one found before."""
-    solves = max(nearer.error, nearer.slip_error) <= tol
-    return nearer if solves and nearer.local_error < found.local_error else found
+    if max(nearer.error, nearer.slip_error) <= tol and nearer.local_error < found.local_error:
+        return nearer
+    return replace(found, tried=nearer.tried, iterations=nearer.iterations, seconds=nearer.seconds)
 
 
 def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
