@@ -352,8 +352,10 @@ class Placement:
         """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
         if turns:
             return times(self.now.frame, cross(axis, self.now.arms))
-        along = self.now.frame @ axis  # the axes of a plane are those of its frame
-        return np.broadcast_to(along if self.surface.curved else np.rint(along), self.x.shape)
+        along, surface = self.now.frame @ axis, self.surface
+        if not (surface.curved or surface.spins):  # the axes are those of its frame
+            along = np.rint(along)
+        return np.broadcast_to(along, self.x.shape)
 
     def turned_past(self, displacement: np.ndarray) -> np.ndarray:
         """Displacements relative to the surface with what a rotation found in the step is beyond the first order."""

@@ -40,7 +40,8 @@ class RigidPlane(Surface):
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.  Assign
             another one between steps; normal and axis rotate with the plane, and slip is relative to it.
         free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the frame, "r1", "r2", "rn" about
-            them; in two dimensions "t", "n" and "r".  Empty at first.
+            them; in two dimensions "t", "n" and "r".  Empty at first.  With a rotation among them these axes are those of the
+            plane as it was made, and do not turn.
         force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Components along directions
             that are not free have no effect: a guide carries them.
         moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
@@ -93,13 +94,13 @@ class RigidPlane(Surface):
 
     @property
     def drive_axes(self) -> np.ndarray:
-        """The rows of ``frame``."""
-        return self.frame
+        """The rows of ``frame``; where a rotation is free, those of the frame as it was made: guides do not tilt with the plane."""
+        return self._frame if self.spins else self.frame
 
     def check_pressing(self, motion: Any) -> None:
         """See ``Surface``."""
         force = np.asarray(self.force)
-        pressing = float(force @ self.frame[-1])
+        pressing = float(force @ self.drive_axes[-1])
         if motion.name == "n" and motion.spring == 0 and pressing <= 0:
             raise ValueError(
                 f"surface.force {force.tolist()} does not press the plane on the body: its component along the "
