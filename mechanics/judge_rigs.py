@@ -191,8 +191,10 @@ class RigJudge:
 
         Along what is not, its way has to be nothing.
         """
-        # Guides of a plane turn with it.
-        axes = turned(self.angle, np.eye(3)) if self.scene.kind == "plane" else np.eye(3)
+        # Guides of a plane turn with it where its rotation is given, not where it is free.
+        tilts = {"r1", "r2", "rn"} & set(self.scene.free)
+        plain = self.scene.kind == "plane" and not tilts
+        axes = turned(self.angle, np.eye(3)) if plain else np.eye(3)
         if np.abs(axes[~self._free_lengths()] @ way).max(initial=0.0) > EPS * reach:
             found.notes.append("the surface left its guide")
         left, terms = [], []

@@ -678,10 +678,14 @@ class Contact(Guarded):
     def law_before(self) -> Friction | None:
         """The law by which the last step was settled, its axes carried in space to the frames of this one; None before the first."""
         law, settled = self._history.settled_by, self._placement.settled
-        if law is None or law.axes is None or settled.points is self.points:
-            return law
         n, gdim = self.points.count, self.points.dim
-        axes = np.column_stack((law.axes, np.zeros((n, gdim - 2))))
+        turns = gdim == 3 and settled.points is not self.points
+        if law is None or not turns or (law.axes is None and law.isotropic):
+            return law
+        along = (
+            np.tile([1.0, 0.0], (n, 1)) if law.axes is None else law.axes
+        )  # grooves turn with the surface
+        axes = np.column_stack((along, np.zeros(n)))
         axes = carried(axes, settled.frame, self.frame)[:, :2]
         return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
 

@@ -38,8 +38,8 @@ def work_of_friction(
         slipped: Nodes that slipped in the last step, ``shape=(n,)``, bool.
         reaction: Reactions at the end of this one; of these the normal components count.
         slip_increment: Slip during this one, ``shape=(n, gdim - 1)``, local frame.
-        law_before: The law of the last step, if friction was exchanged since: it says along which direction the
-            node slipped then.
+        law_before: The law of the last step, if friction was exchanged or its axes have turned since: it says along which
+            direction the node slipped then, and axes alone count as they were.
 
     Returns:
         ``shape=(n, gdim - 1)``, force times length; the work of a node is the sum of its row.
@@ -65,14 +65,24 @@ def work_and_turn(
 
     if law_before in (None, friction):
         s0, e0 = _of_force(mu, Q, friction.along_axes(before[:, :-1]))
+        start = mu * e0 * s0
     else:
-        e0 = friction.along_axes(-law_before.against_slip(before[:, :-1]))
-        _, s0 = split(Q**2 * mu * e0)
+        back = -law_before.against_slip(before[:, :-1])
+        e0, alike = friction.along_axes(back), _same_coefficients(friction, law_before)
+        along = law_before.along_axes(back) if alike else e0  # grooves that have turned since
+        _, s0 = split(Q**2 * mu * along)
+        start = mu * along * s0
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
-    per_way_before = c * (mu * e0 * s0) + np.maximum(1.0 - c, 0.0) * per_way
+    per_way_before = c * start + np.maximum(1.0 - c, 0.0) * per_way
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
     work = 0.5 * way * (N0 * per_way_before + N1 * per_way)
     return work, 0.5 * way * N0 * (per_way_before - per_way)
+
+
+def _same_coefficients(one: Friction, other: Friction) -> bool:
+    """Whether two laws differ by their axes at most."""
+    pairs = ((one.mu, other.mu), (one.Q, other.Q))
+    return all(bool(np.all(a == b)) for a, b in pairs)
 
 
 def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

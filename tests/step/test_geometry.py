@@ -247,6 +247,33 @@ def test_a_turntable_drags_along_its_grooves(of, steps):
     assert force / force[2] == pytest.approx([0, 0.1, 1], abs=1e-3)
 
 
+@pytest.mark.parametrize("of_surface", [False, True])
+@pytest.mark.parametrize(
+    "mu, p", [((0.1, 0.4), None), ((0.4, 0.1), None), ((0.3, 0.15), (0.05, 0.2))]
+)
+def test_grooves_that_turn_work_as_their_angle_says(mu, p, of_surface):
+    """Straight grooves on a turntable, after the first step: the integral of m over the angle, the start with the grooves of then."""
+    along, turn = np.array([np.cos(0.2), np.sin(0.2), 0.0]), 0.15
+    law = (
+        dict(axes=lambda x: np.tile(along[:, None], x.shape[1]), of="surface") if of_surface else {}
+    )
+    table = dc.RigidPlane((0, 0, 0), (0, 0, 1), axis=(1, 0, 0) if of_surface else along)
+    friction = dc.Friction(mu, p, **law)
+    scene = slab([0.98, -0.02, 0], [1.02, 0.02, 0.04], [1, 1, 1], table, friction)
+    scene.step(0, 0, -1e-4)
+    work = []
+    for angle in turn * np.array([1, 1.25, 1.5, 1.75, 2, 2.25, 2.5]):
+        table.rotation = (0, 0, angle)
+        scene.problem.solve()
+        work.append(total(scene.contact.dissipation))
+    M, P2 = np.array(mu), np.array(p or mu) ** 2
+    x, w = np.polynomial.legendre.leggauss(20)
+    angles = 0.2 + turn * (1.75 + 0.75 * x)
+    e = np.column_stack((np.sin(angles), np.cos(angles)))
+    right = 0.75 * turn * w @ ((e * P2 * e).sum(axis=1) / np.linalg.norm(P2 * e / M, axis=1))
+    assert (work[-1] - work[0]) / scene.contact.force()[2] == pytest.approx(right, rel=2e-3)
+
+
 # -- ways that cannot be followed --------------------------------------------------------------
 
 
