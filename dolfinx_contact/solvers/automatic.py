@@ -85,9 +85,9 @@ class BoundAutomatic:
         enough = fits(body.comm, nodes, self._components, unknowns)
         self._solvers = [CondensedNewton(), FixedPoint()]
         most = most_nodes(unknowns, friction=self._components > 1)
-        self._why = f"{nodes} contact nodes, at most {most}"
+        self._why = f"{nodes} contact nodes, up to {most} by CondensedNewton first"
         if nodes > most:
-            self._why = f"{nodes} contact nodes, more than {most}"
+            self._why = f"{nodes} contact nodes, more than {most} by FixedPoint first"
             self._solvers.reverse()
         elif not body.exact:
             self._why = "without a factorisation the condensed operator would cost too many solves"
