@@ -994,6 +994,12 @@ class Contact(Guarded):
         """A scalar Function for output with these values at the contact nodes, ``shape=(n,)``, and zero elsewhere.  Collective."""
         return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
 
+    def wear_function(self, name: str = "wear_depth") -> fem.Function:
+        """Depth worn off both sides as a scalar Function for output, each at its own nodes, zero elsewhere.  Collective."""
+        nodes = np.concatenate((self.nodes, self.opposite))
+        depths = np.concatenate((self.wear_depth, self.opposite_wear_depth))
+        return fields.scalar(self.displacements.V, nodes, depths, name, 0.0)
+
     def everywhere(self, values: ArrayLike) -> np.ndarray:
         """Values at the contact nodes at those of all nodes that this rank knows, ghosts included, zero elsewhere.  Collective."""
         function = fem.Function(self.displacements.V)

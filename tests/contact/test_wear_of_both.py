@@ -109,6 +109,8 @@ def test_a_worn_track_stays_with_its_body():
         scene.problem.solve()
     assert largest(contact.opening - contact.wear_depth) <= 1e-6 * largest(own)
     assert largest(contact.opposite_wear_depth) > 0.1 * largest(own)
+    both = contact.wear_function().x.array
+    assert largest(both) == max(largest(contact.wear_depth), largest(contact.opposite_wear_depth))
 
 
 def test_sides_swapped_lose_the_same():
