@@ -1,31 +1,40 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A million cycles of fretting wear by ``dc.cycle_jump``; the table of docs/howto/wear.md.
+"""Wear over many cycles by ``dc.cycle_jump``: the tables of docs/howto/wear.md.
 
-    python -m benchmarks.wear_cycles [name ...]      (all by default; some minutes on one core)
+    python -m benchmarks.wear_cycles million [name ...]     (some minutes each on one core)
+    python -m benchmarks.wear_cycles errors [name ...]      (all by default; results/wear_cycles.json and .svg)
 
-The paper's punch, cases A and C, and a cylinder in partial slip, each under a dead weight on a plane that goes to and fro.  Units: mm,
-N, MPa.  Beside them the same programmes in 300 cycles, simulated one by one, with so many times the coefficient.
+``million``: the paper's punch, cases A and C, and a cylinder in partial slip, each under a dead weight on a plane that goes to and fro.
+Units: mm, N, MPa.  Beside them the same programmes in 300 cycles, simulated one by one, with so many times the coefficient.
+
+``errors``: small programmes of 1,000 cycles, which are also simulated one by one; errors of jumps of several accuracies, beside those
+that were estimated, and of jumps of fixed length with explicit wear.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import warnings
-from time import perf_counter
+from time import perf_counter, process_time
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
 from dolfinx import mesh
+from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from benchmarks.measurement import ROOT
 from mechanics import scenes
 from studies.punch.model import Parameters, Punch
 
 CYCLES, ACCURACY = 10**6, 0.02
 TRUE = 300  # cycles simulated one by one
+SMALL, ACCURACIES, FIXED = 1000, (0.05, 0.02, 0.01, 0.005), (10, 25, 50, 100, 200)
+RECORD = ROOT / "results" / "wear_cycles.json"
 
 
 def cycle_of(problem, stroke: float, quarter: int):
@@ -43,15 +52,15 @@ def cycle_of(problem, stroke: float, quarter: int):
     return cycle
 
 
-def punch(case: str, coefficient: float):
+def punch(case: str, coefficient: float, divisions: int = 4):
     """Of steel, under 100 kN, slid by 0.05 mm to either side."""
-    problem = Punch(Parameters(case=case), divisions=4).problem
+    problem = Punch(Parameters(case=case), divisions=divisions).problem
     return problem, settled(problem, (0, 0, 1e5), 0.05, 1, coefficient)
 
 
-def cylinder(_, coefficient: float):
-    """In plane strain, 64 by 16 cells, radius 100 mm, a contact of some 2 mm; a stroke that slides its edges alone."""
-    cells = mesh.create_rectangle(MPI.COMM_WORLD, [[-1, 0], [1, 1]], [64, 16], mesh.CellType.quadrilateral)  # fmt: skip
+def cylinder(size, coefficient: float, stroke: float = 0.0015, quarter: int = 2):
+    """In plane strain, of so many cells, radius 100 mm, a contact of some 2 mm; by default a stroke that slides its edges alone."""
+    cells = mesh.create_rectangle(MPI.COMM_WORLD, [[-1, 0], [1, 1]], size, mesh.CellType.quadrilateral)  # fmt: skip
     bottom, top = (mesh.locate_entities_boundary(cells, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, 1))  # fmt: skip
     x = cells.geometry.x
     x[:, 0] = 8 * np.sinh(3 * x[:, 0]) / np.sinh(3)
@@ -59,7 +68,7 @@ def cylinder(_, coefficient: float):
     x[:, 1] += x[:, 0] ** 2 / 200 * (1 - x[:, 1] / 8)
     scene = scenes.on_plane(cells, bottom, top, 210e3, 0.3, 0.3, loads=False)
     problem = scenes.problem_of(scene)
-    return problem, settled(problem, (0, 2000.0), 0.0015, 2, coefficient)
+    return problem, settled(problem, (0, 2000.0), stroke, quarter, coefficient)
 
 
 def settled(problem, weight, stroke: float, quarter: int, coefficient: float):
@@ -77,11 +86,106 @@ def settled(problem, weight, stroke: float, quarter: int, coefficient: float):
 PROGRAMMES = {
     "punch, case A": (punch, "A", 1e-8),
     "punch, case C": (punch, "C", 1e-8),
-    "cylinder in partial slip": (cylinder, None, 1e-8),
+    "cylinder in partial slip": (cylinder, (64, 16), 1e-8),
 }
 
 
-def main(names) -> None:
+def block(coefficient: float):
+    """Held by its top at a given approach, E = 1 GPa: it wears until it does not touch any more."""
+    scene = scenes.block(cells=(4, 4, 2), mu=0.3, p=None, E=1000.0, tol=1e-8)
+    scene.move_top(0, 0, -0.01)
+    scene.problem.solve()
+    cycle = cycle_of(scene.problem, 0.2, 1)
+    cycle(0)
+    scene.contact.wear = dc.Wear(coefficient)
+    return scene.problem, cycle
+
+
+def growing(coefficient: float):
+    """A pad under a dead weight whose friction grows with the worn depth, to more than twice."""
+    scene = scenes.block(cells=(6, 3), mu=0.3, p=None, E=1000.0, tol=1e-8)
+    scene.contact.friction = dc.Friction(lambda x, wear_depth: 0.3 * (1 + wear_depth / 2e-3))
+    return scene.problem, settled(scene.problem, (0, 1.0), 0.2, 1, coefficient)
+
+
+ERRORS = {  # the first three are those for which jumps were developed
+    "cylinder in partial slip": lambda: cylinder((24, 6), 1e-5, 0.002, 1),
+    "punch, case C": lambda: punch("C", 1e-5, 2),
+    "block at a given approach": lambda: block(7.5e-6),
+    "punch, case A": lambda: punch("A", 1e-5, 2),
+    "friction that grows": lambda: growing(1e-5),
+    "cylinder in gross slip": lambda: cylinder((24, 6), 2e-5, 0.05, 1),
+}
+
+
+def off(contact, truth) -> dict[str, float]:
+    """Errors of the contact's worn depth, as ``CycleJump`` has them."""
+    depth, area = truth, contact.area
+    by, volume = contact.wear_depth - depth, area @ depth
+    return dict(volume=abs(area @ by) / volume, depth=np.abs(by).max() / depth.max(), profile=area @ np.abs(by) / volume)  # fmt: skip
+
+
+def true_depth(name: str) -> np.ndarray:
+    """Depths after all cycles one by one, kept."""
+    file = RECORD.parent / "wear_cycles" / f"{name}.npy"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        problem, cycle = ERRORS[name]()
+        for done in range(SMALL):
+            cycle(done)
+        np.save(file, problem.contacts[0].wear_depth)
+    return np.load(file)
+
+
+def errors(names) -> None:
+    """Measure, print and draw errors of jumps."""
+    rows = []
+    for name in names or ERRORS:
+        truth = true_depth(name)
+        for accuracy in ACCURACIES:
+            problem, cycle = ERRORS[name]()
+            start = process_time()
+            try:
+                found = dc.cycle_jump(problem, cycle, SMALL, accuracy)
+            except RuntimeError:  # more cycles than it may simulate
+                continue
+            seconds = process_time() - start
+            estimated = {of: getattr(found, f"{of}_error") for of in ("volume", "depth", "profile")}
+            rows.append(dict(programme=name, accuracy=accuracy, simulated=found.simulated, seconds=seconds, estimated=estimated, true=off(problem.contacts[0], truth)))  # fmt: skip
+            print(rows[-1], flush=True)
+        for jump in FIXED:
+            problem, cycle = ERRORS[name]()
+            contact, start = problem.contacts[0], process_time()
+            contact.wear, contact.repeats = dc.Wear(contact.wear.coefficient, explicit=True), jump
+            try:
+                for done in range(0, SMALL, jump):
+                    cycle(done)
+            except dc.NotConverged:
+                continue
+            rows.append(dict(programme=name, jump=jump, simulated=SMALL // jump, seconds=process_time() - start, true=off(contact, truth)))  # fmt: skip
+            print(rows[-1], flush=True)
+    RECORD.write_text(json.dumps(rows, indent=0))
+    draw(rows).savefig(RECORD.with_suffix(".svg"))
+
+
+def draw(rows) -> Figure:
+    """Error of the profile against seconds: jumps of fixed length with explicit wear, and controlled ones."""
+    names = list(dict.fromkeys(row["programme"] for row in rows))
+    figure = Figure(figsize=(12, 6.5), layout="constrained")
+    axes = figure.subplots(2, -(-len(names) // 2), squeeze=False).ravel()
+    for ax, name in zip(axes, names):
+        for key, style, label in (
+            ("jump", "o--", "explicit, fixed"),
+            ("accuracy", "s-", "cycle_jump"),
+        ):
+            some = [row for row in rows if row["programme"] == name and key in row]
+            ax.loglog([row["seconds"] for row in some], [row["true"]["profile"] for row in some], style, label=label)  # fmt: skip
+        ax.set(title=name, xlabel="processor seconds", ylabel="error of the worn profile")
+    axes[0].legend()
+    return figure
+
+
+def million(names) -> None:
     """Print a row for each programme."""
     for name in names or PROGRAMMES:
         make, case, coefficient = PROGRAMMES[name]
@@ -107,4 +211,4 @@ def main(names) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    main(sys.argv[1:])
+    {"million": million, "errors": errors}[sys.argv[1]](sys.argv[2:])

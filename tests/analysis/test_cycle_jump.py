@@ -37,13 +37,19 @@ def fretting(scene, stroke):
     return cycle
 
 
-def roller(coefficient, stroke, comm=COMM):
-    """A cylinder of radius 100 under a weight on a plane that goes to and fro by less than slides it as a whole: the problem and its cycle."""
+def roller(coefficient, stroke, comm=COMM, touching=8.0):
+    """A cylinder of radius 100 under a weight on a plane that goes to and fro by less than slides it as a whole: the problem and its cycle.
+
+    It may touch as far as ``touching`` from the middle.
+    """
     domain = mesh.create_rectangle(comm, [[-1, 0], [1, 1]], [24, 6], mesh.CellType.quadrilateral)
     x = domain.geometry.x
     x[:, :2] = 8 * np.sinh(3 * x[:, :2]) / np.sinh(3)
     x[:, 1] += x[:, 0] ** 2 / 200 * (1 - x[:, 1] / 8)
-    marks = (lambda x: x[1] <= x[0] ** 2 / 200 + 1e-9, lambda x: x[1] > 8 - 1e-9)
+    marks = (
+        lambda x: (x[1] <= x[0] ** 2 / 200 + 1e-9) & (np.abs(x[0]) < touching + 1e-9),
+        lambda x: x[1] > 8 - 1e-9,
+    )
     foot, head = (mesh.locate_entities_boundary(domain, 1, mark) for mark in marks)
     scene = on_plane(domain, foot, head, 210e3, 0.3, MU, loads=False, wear=dc.Wear(0.0))
     scene.problem = problem_of(scene)
@@ -97,6 +103,26 @@ def test_a_million_cycles_of_gross_slip():
     assert found.table[-1]["cycle"] == cycles == sum(row["jump"] for row in found.table)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("power", [-12, 0, 6])
+def test_jumps_with_any_coefficient(power):
+    """Under dead weight the volume is k mu N times the way; of a block at a given approach no more wears off than was pressed in."""
+    natural, stroke, cycles, approach = 1e-3, 0.2, 30, 0.01
+    coefficient = natural * 10.0**power
+    scene, cycle = pad(coefficient, stroke)
+    found = dc.cycle_jump(scene.problem, cycle, cycles, ACCURACY)
+    assert found.reached and found.simulated < cycles
+    assert found.volume == pytest.approx(coefficient * MU * WEIGHT * 4 * stroke * cycles, rel=ACCURACY)  # fmt: skip
+    wear = dc.Wear(coefficient)
+    scene = scenes.block(cells=(6, 3), mu=MU, p=None, E=1000.0, tol=1e-8, wear=wear)
+    scene.move_top(0, -approach)
+    scene.problem.solve()
+    found = dc.cycle_jump(scene.problem, fretting(scene, stroke), cycles, ACCURACY)
+    assert 0.0 < found.volume < 1.001 * approach  # of a foot of length one
+    if power >= 0:
+        assert found.volume == pytest.approx(approach, rel=ACCURACY)
+
+
 def test_in_partial_slip_wear_ends_where_the_slip_zone_carries_nothing():
     """Under a constant weight, what sticks does not wear and takes over the load, and wear comes to an end [Ciavarella and Hills 1999]."""
     scene, cycle = roller(1e-2, 2e-3)
@@ -113,6 +139,25 @@ def test_in_partial_slip_wear_ends_where_the_slip_zone_carries_nothing():
         COMM.allreduce(float(of[edges].sum())) / 2000.0 for of in (before, c.reaction[:, -1])
     ]
     assert carried[0] > 0.05 and carried[1] < 1e-3
+
+
+@pytest.mark.slow
+def test_the_limit_of_partial_slip_is_contact_of_the_stick_zone_alone():
+    """Where gentle wear has ended, the stick zone carries what it would carry if nothing else could touch [Ciavarella and Hills 1999]."""
+    scene, cycle = roller(1e-3, 2e-3)
+    for done in range(80):
+        cycle(done)
+    alone, _ = roller(
+        0.0, 0.0, touching=0.8
+    )  # mm, between the last node that sticks and the first one that slips
+    sides = []
+    for c in (scene.contact, alone.contact):
+        here = dict(zip(np.round(c.x[:, 0], 9).tolist(), c.reaction[:, 1].tolist()))
+        sides.append({x: r for of in COMM.allgather(here) for x, r in of.items()})
+    worn, expected = sides
+    assert len(expected) == 7 and sum(expected.values()) == pytest.approx(2000.0, rel=1e-6)
+    for x, carried in worn.items():
+        assert carried == pytest.approx(expected.get(x, 0.0), abs=0.01 * max(expected.values())), x
 
 
 def test_a_killed_programme_goes_on(tmp_path):
