@@ -283,7 +283,8 @@ class ContactProblem(Guarded):
             with raised_together(self.body.comm):  # whatever happens on one rank alone
                 done, found = self._step(start)
         except BaseException as failure:
-            self._log(f"step failed: {type(failure).__name__}: {failure}")
+            said = f"step failed: {type(failure).__name__}: {failure}"
+            self._log(lambda: said)
             stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
             if self.body.comm.allreduce(stopped, op=MPI.LOR):
                 self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
@@ -292,7 +293,7 @@ class ContactProblem(Guarded):
             raise_interrupt(failure)
             raise
         self._states.advance(found.x)
-        self._log(f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
+        self._log(lambda: f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
         self._large = self._large or check_size(self.body, found.x, self.u.x.array)
         self._unseen.check(
             self.body, self.contacts, self._stiffness, self.u.x.array, done.counts, self._large
@@ -686,9 +687,9 @@ class ContactProblem(Guarded):
         drivers = [contact.surface.driver for contact in self.contacts]
         return [() if driver is None else driver.freedom for driver in drivers]
 
-    def _log(self, line: str) -> None:
-        if self.body.comm.rank == 0:
-            LOG.info(line)
+    def _log(self, line: Callable[[], str]) -> None:
+        if self.body.comm.rank == 0 and LOG.isEnabledFor(logging.INFO):
+            LOG.info(line())
 
     def counts(self) -> Counts:
         """Contact nodes open, sticking and slipping in the present state.  Collective."""

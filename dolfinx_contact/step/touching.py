@@ -109,10 +109,11 @@ def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol
         tol: Part of the reactions which does not matter.
     """
     opens = [(c.settled.reaction[:, -1] > 0.0) & (c.reaction[:, -1] == 0.0) for c in contacts]
-    before = [np.where(at[:, None], c.settled.reaction, 0.0) for c, at in zip(contacts, opens)]
-    size = np.sqrt(body.total([sum(np.square(r).sum() for r in before)])[0])
-    if size <= tol * step.carried(tol):
+    squares = [np.square(c.settled.reaction[at]).sum() for c, at in zip(contacts, opens)]
+    size = np.sqrt(body.total([sum(squares)])[0])
+    if size == 0.0 or size <= tol * step.carried(tol):
         return
+    before = [np.where(at[:, None], c.settled.reaction, 0.0) for c, at in zip(contacts, opens)]
     forces, points = np.zeros(body.size), [c.placement.settled.points for c in contacts]
     for of, reaction in zip(points, before):
         of.add_forces(reaction, forces)
