@@ -10,7 +10,11 @@ ARGUMENT = r"\s*(\{(?:[^{}]|\{[^{}]*\})*\}|\\[A-Za-z]+|[^\s\\{}])"
 
 
 def grouped(formula: str) -> str:
-    r"""Braces that TeX does without and docutils needs: ``\frac12`` would be 12 over what follows, ``\dot u_t`` a t under u."""
+    r"""Braces that TeX does without and docutils needs: ``\frac12`` would be 12 over what follows, ``\dot u_t`` a t under u.
+
+    Sizes of brackets, ``\big``, are dropped: docutils does not know them.
+    """
+    formula = re.sub(r"\\[bB]igg?[lrm]?(?![A-Za-z])", "", formula)
     formula = re.sub(r"\\frac" + 2 * ARGUMENT, r"\\frac{\1}{\2}", formula)
     accents = r"\\(dot|ddot|bar|hat|tilde|vec)(?![A-Za-z])"
     return re.sub(accents + ARGUMENT + r"\s*(?=_)", r"\\\1{\2}{}", formula)
