@@ -60,23 +60,28 @@ def work_and_turn(
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
     way, e1 = split(friction.along_axes(slip_increment))
-    _, s1 = split(Q**2 * mu * e1)  # M^-1 P^2 e1
-    per_way = mu * e1 * s1
+    per_way = _per_way(mu, Q, e1)
 
     if law_before in (None, friction):
         s0, e0 = _of_force(mu, Q, friction.along_axes(before[:, :-1]))
-        start = mu * e0 * s0
+        start, straight = mu * e0 * s0, per_way
     else:
         back = -law_before.against_slip(before[:, :-1])
-        e0, alike = friction.along_axes(back), _same_coefficients(friction, law_before)
-        along = law_before.along_axes(back) if alike else e0  # grooves that have turned since
-        _, s0 = split(Q**2 * mu * along)
-        start = mu * along * s0
+        # Of the same friction axes have turned: grooves as they stood.
+        then = law_before if _same_coefficients(friction, law_before) else friction
+        e0, both = friction.along_axes(back), (then.along_axes(a) for a in (back, slip_increment))
+        start, straight = (_per_way(mu, Q, split(along)[1]) for along in both)
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
-    per_way_before = c * start + np.maximum(1.0 - c, 0.0) * per_way
+    per_way_before = c * start + np.maximum(1.0 - c, 0.0) * straight
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
     work = 0.5 * way * (N0 * per_way_before + N1 * per_way)
-    return work, 0.5 * way * N0 * (per_way_before - per_way)
+    return work, 0.5 * way * N0 * (per_way_before - straight)
+
+
+def _per_way(mu: np.ndarray, Q: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Work per way and normal force along unit vectors ``e``, by principal directions."""
+    _, s = split(Q**2 * mu * e)  # M^-1 P^2 e
+    return mu * e * s
 
 
 def _same_coefficients(one: Friction, other: Friction) -> bool:

@@ -252,7 +252,7 @@ def test_a_turntable_drags_along_its_grooves(of, steps):
     "mu, p", [((0.1, 0.4), None), ((0.4, 0.1), None), ((0.3, 0.15), (0.05, 0.2))]
 )
 def test_grooves_that_turn_work_as_their_angle_says(mu, p, of_surface):
-    """Straight grooves on a turntable, after the first step: the integral of m over the angle, the start with the grooves of then."""
+    """Straight grooves on a turntable, from the first step on: the integral of m over the angle, at the start with the grooves of then."""
     along, turn = np.array([np.cos(0.2), np.sin(0.2), 0.0]), 0.15
     law = (
         dict(axes=lambda x: np.tile(along[:, None], x.shape[1]), of="surface") if of_surface else {}
@@ -268,10 +268,16 @@ def test_grooves_that_turn_work_as_their_angle_says(mu, p, of_surface):
         work.append(total(scene.contact.dissipation))
     M, P2 = np.array(mu), np.array(p or mu) ** 2
     x, w = np.polynomial.legendre.leggauss(20)
-    angles = 0.2 + turn * (1.75 + 0.75 * x)
-    e = np.column_stack((np.sin(angles), np.cos(angles)))
-    right = 0.75 * turn * w @ ((e * P2 * e).sum(axis=1) / np.linalg.norm(P2 * e / M, axis=1))
-    assert (work[-1] - work[0]) / scene.contact.force()[2] == pytest.approx(right, rel=2e-3)
+
+    def right(first, last):
+        angles = 0.2 + turn * (0.5 * (last + first) + 0.5 * (last - first) * x)
+        e = np.column_stack((np.sin(angles), np.cos(angles)))
+        m = (e * P2 * e).sum(axis=1) / np.linalg.norm(P2 * e / M, axis=1)
+        return 0.5 * (last - first) * turn * w @ m
+
+    N = scene.contact.force()[2]
+    assert work[0] / N == pytest.approx(right(0, 1), rel=2e-2)
+    assert (work[-1] - work[0]) / N == pytest.approx(right(1, 2.5), rel=2e-3)
 
 
 # -- ways that cannot be followed --------------------------------------------------------------
