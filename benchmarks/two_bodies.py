@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """What a load step of two deformable bodies costs, beside that of one body on a rigid plane with as many contact nodes and unknowns.
 
-    python -m benchmarks.two_bodies [--sizes 5000 43000] [--steps 6] [--output results/two_bodies.csv]
+    python -m benchmarks.two_bodies [--sizes 5000 43000 60000] [--steps 6] [--output results/two_bodies.csv]
 
 A block of bricks is pressed on another one, whose mesh does not match, and slides along it by a quarter of a facet a step, with
 orthotropic friction.  Processor seconds of one thread, medians of the steps; the three problems take turns within one run.  The first
@@ -32,7 +32,7 @@ from mechanics.material import elasticity
 from mechanics.two_blocks import pair
 
 # Facets along an edge of the contact, and layers of each body, by unknowns.
-SIZES = {5000: (9, 5), 43000: (21, 10), 300000: (41, 21)}
+SIZES = {5000: (9, 5), 43000: (21, 10), 60000: (24, 11), 300000: (41, 21)}
 WIDER = 1.25  # of the lower block
 E, NU = 210e3, 0.3
 DOWN, ASIDE = 0.01, (0.25, 0.1)  # of the top: length, and parts of a facet a step
@@ -115,7 +115,7 @@ def measured(size: int, steps: int) -> list[dict]:
 
 def main(argv=None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", type=int, nargs="+", default=[5000, 43000], choices=SIZES)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[5000, 43000, 60000], choices=SIZES)
     parser.add_argument("--steps", type=int, default=6)
     parser.add_argument("--output", type=Path, default=Path("results/two_bodies.csv"))
     options = parser.parse_args(argv)

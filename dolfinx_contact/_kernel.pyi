@@ -374,8 +374,8 @@ def mortar_rows(
     numpy.typing.NDArray[numpy.float64],
     numpy.typing.NDArray[numpy.float64],
     numpy.typing.NDArray[numpy.float64],
-    numpy.typing.NDArray[numpy.int64],
-    numpy.typing.NDArray[numpy.int64],
+    numpy.typing.NDArray[numpy.int32],
+    numpy.typing.NDArray[numpy.int32],
 ]:
     """
     Rows of a dual mortar method: (int N_a over the covered part, shape (count,), over all of it, and int psi_a N_b, values, columns and starts of rows). Sides are lists of facets of one shape each, (x of shape (m, k, dim), outward normals (m, dim), nodes on the reference facet (k, dim - 1), coefficients of the shape functions (k, k), a row for each monomial, density of the measure (m, k) or empty, rows or columns of the nodes (m, k), negative is none, nodes at the corners of each straight piece (parts, c), degree); rules are (points, weights) on the unit interval, with ever more points for quadrilaterals that are no parallelograms.

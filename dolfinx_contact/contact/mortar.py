@@ -125,7 +125,8 @@ def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: i
     own = [_for_kernel(side, _places(side.nodes, nodes)) for side in slaves]
     other = [_for_kernel(side, side.nodes) for side in masters]
     area, whole, *csr = _kernel.mortar_rows(own, other, nodes.size, _rules())
-    m = sparse.csr_matrix(tuple(csr), (nodes.size, count))
+    m = sparse.csr_matrix((nodes.size, count))
+    m.data, m.indices, m.indptr = csr  # in order: nothing to check
     least = max((COVERED[side.degree] for side in slaves), default=0.0)
     covered = area > np.maximum(least * whole, NOTHING * whole.max(initial=0.0))
     inverse = np.divide(1.0, area, out=np.zeros_like(area), where=covered)

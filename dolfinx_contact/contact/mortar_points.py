@@ -450,10 +450,12 @@ class MortarPoints(ContactPoints):
         away[starts[:-1]] = False
         values[away], nodes[away] = -self.m.data, self.count + self.m.indices
         nodes[starts[:-1]] = np.arange(self.count)
-        blocks = values[:, None, None] * np.repeat(frames, np.diff(starts), axis=0)
-        B = sparse.bsr_matrix((blocks, nodes, starts), (dofs.size, dofs.size + opposite.size))
-        B, columns = B.tocsr(), np.concatenate((self.first + dofs, opposite)).ravel()
-        self._B = self._petsc(B.indptr, columns[B.indices], B.data)
+        counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
+        ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
+        at = np.arange(rows.size) - np.repeat(ends - counts - np.repeat(starts[:-1], self.dim), counts)  # fmt: skip
+        B = values[at, None] * frames.reshape(-1, self.dim)[rows]
+        columns = np.concatenate((self.first + dofs, opposite))[nodes[at]]
+        self._B = self._petsc(self.dim * np.append(0, ends), columns.ravel(), B)
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 

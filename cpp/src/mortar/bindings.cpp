@@ -133,19 +133,19 @@ auto mortar_rows(const py::list &slaves, const py::list &masters, std::size_t co
         found.add(slave, opposite);
     }
     std::vector<double> values;
-    std::vector<std::int64_t> columns, starts{0};
+    std::vector<std::int32_t> columns, starts{0};
     for (auto &row : found.rows) {
         std::stable_sort(row.begin(), row.end(),
                          [](const auto &a, const auto &b) { return a.first < b.first; });
         for (std::size_t i = 0; i < row.size(); ++i) {
             if (i == 0 || row[i].first != row[i - 1].first)
-                columns.push_back(row[i].first), values.push_back(0);
+                columns.push_back(std::int32_t(row[i].first)), values.push_back(0);
             values.back() += row[i].second;
         }
-        starts.push_back(std::int64_t(columns.size()));
+        starts.push_back(std::int32_t(columns.size()));
     }
-    const auto numbers = [](const std::vector<std::int64_t> &of) {
-        return py::array_t<std::int64_t>(py::ssize_t(of.size()), of.data());
+    const auto numbers = [](const std::vector<std::int32_t> &of) {
+        return py::array_t<std::int32_t>(py::ssize_t(of.size()), of.data());
     };
     return py::make_tuple(as_array(found.area), as_array(found.whole), as_array(values),
                           numbers(columns), numbers(starts));

@@ -86,10 +86,12 @@ struct FacetPiece {
     // Where the bilinear map of the unit square takes to `p` from: Newton's method.
     Point on_square(Point p) const {
         constexpr int steps = 20;
-        constexpr double last = 1e-9; // the square of it is rounding
+        constexpr double rounding = 1e-16;
         const Point &a = projected[0], &b = projected[1], &c = projected[2], &d = projected[3];
         const Point u{b.x - a.x, b.y - a.y}, v{d.x - a.x, d.y - a.y};
         const Point w{c.x - b.x - v.x, c.y - b.y - v.y};
+        const double bend = std::max(std::abs(w.x), std::abs(w.y));
+        const double size = std::max({std::abs(u.x), std::abs(u.y), std::abs(v.x), std::abs(v.y)});
         double s = 0.5, t = 0.5;
         for (int k = 0; k < steps; ++k) {
             const double x = a.x + u.x * s + v.x * t + w.x * s * t - p.x;
@@ -99,7 +101,7 @@ struct FacetPiece {
             const double ds = (x * by_t.y - y * by_t.x) / area,
                          dt = (by_s.x * y - by_s.y * x) / area;
             s -= ds, t -= dt;
-            if (!(std::max(std::abs(ds), std::abs(dt)) > last))
+            if (!(bend * std::abs(ds * dt) > rounding * size)) // what a step leaves of the distance
                 break;
         }
         return {s, t};
