@@ -106,17 +106,28 @@ def test_geometry_error_is_what_the_exact_geometry_says(tol):
     assert step.geometry_error == pytest.approx(max(parts), rel=0.2, abs=1e-12)
 
 
-@pytest.mark.parametrize("steps", [1, 7])
-def test_body_and_ball_that_go_together_do_not_notice(steps):
+@pytest.mark.parametrize(
+    "kind, steps", [("ball", 1), ("ball", 7), ("circle", 1), ("bore", 1), ("roll", 1)]
+)
+def test_body_and_ball_that_go_together_do_not_notice(kind, steps):
     """By a fifth of the radius, with friction: reactions stay, nothing slips."""
-    ball = dc.RigidSphere((0, 0, -1.0), 1.0)
-    scene = slab([-0.05, -0.05, 0], [0.05, 0.05, 0.1], [2, 2, 2], ball, 0.3)
-    scene.step(0, 0, -1e-3)
+    d = 2 if kind in ("circle", "bore") else 3
+    up, along = np.eye(d)[-1], np.eye(d)[0]
+    if kind == "roll":
+        surface = dc.RigidCylinder(-up, (0, 1, 0), 1.0)
+    else:
+        surface = dc.RigidSphere(up if kind == "bore" else -up, 1.0, inside=kind == "bore")
+    scene = slab(
+        [-0.05] * (d - 1) + [0], [0.05] * (d - 1) + [0.1], [2] * d, surface, 0.3, geometry_tol=1e-8
+    )
+    scene.step(*-3e-3 * up)
     before = scene.contact.force()
+    assert before[-1] > 0.0
     for k in range(steps):
-        ball.displacement = (0.2 * (k + 1) / steps, 0, 0)
-        scene.step(0.2 * (k + 1) / steps, 0, -1e-3)
-    assert scene.contact.force() == pytest.approx(before, abs=1e-6 * before[2])
+        way = 0.2 * (k + 1) / steps * along
+        surface.displacement = way
+        scene.step(*way - 3e-3 * up)
+    assert scene.contact.force() == pytest.approx(before, abs=1e-6 * before[-1])
     assert largest(scene.contact.slip_path) < 1e-9
 
 
@@ -320,12 +331,16 @@ def test_a_ball_is_not_led_through_a_body():
     assert scene.step(0, 0).counts.open > 0
 
 
-def test_a_block_is_not_dragged_by_a_radius():
-    """Refused, and the state is that before."""
-    scene, _ = on_a_circle([0.0])
-    before = scene.contact.force()
+@pytest.mark.parametrize("moved", ["block", "ball"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_block_is_not_dragged_by_a_radius(d, moved):
+    """Block or ball, in the plane or in space: refused, and the state is that before."""
+    scene, _ = on_a_circle([0.0], d=d)
+    before, way = scene.contact.force(), np.eye(d)[0] - np.eye(d)[-1]
+    if moved == "ball":
+        scene.surface.displacement, way = -way, np.zeros(d)
     with pytest.raises(dc.NotConverged, match="step is too long"):
-        scene.step(1.0, -1.0 - 1e-3)
+        scene.step(*way - 1e-3 * np.eye(d)[-1])
     assert (scene.contact.force() == before).all()
 
 
