@@ -18,7 +18,7 @@ from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
-from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid
+from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid, may_be_blocked
 from dolfinx_contact.support.collective import OverRanks, raised_together
 
 if TYPE_CHECKING:
@@ -343,20 +343,24 @@ class ElasticBody(OverRanks):
         """The solver of another matrix on ``V`` by the options of this body."""
         return LinearSolver(A, self.options, self.prefix, self.rigid_modes)
 
-    def stiffened(self, A: PETSc.Mat, S: PETSc.Mat, how: PETSc.Mat.Structure):
-        """What applies the preconditioner of ``A = K + S``, springs ``S``; GAMG's levels are those of K.
+    def stiffened(self, S: PETSc.Mat, how: PETSc.Mat.Structure):
+        """The stiffness, anchors included, plus springs ``S``, and what applies its preconditioner; GAMG's levels are those of K.
 
         ``how`` the entries of S lie to those of K: a PETSc ``Mat.Structure``.
 
         Collective.
         """
-        if preconditioner(A, self.options, self.prefix) == "gamg":
-            levels = self.ksp.getPC()
-            with options_given(
-                self.prefix, self._own_solver().of_levels()
-            ):  # smoothers read them once more
-                return StiffenedMultigrid(levels, A, S, how)
-        return self.solver(A)
+        K = self.anchors.A if self.loose else self.K
+        multigrid = preconditioner(K, self.options, self.prefix) == "gamg"
+        in_blocks = multigrid and may_be_blocked(K, how, self.ksp.getPC())
+        A = K.convert("baij", PETSc.Mat()) if in_blocks else K.copy()
+        A.axpy(1.0, S, how)
+        if not multigrid:
+            return A, self.solver(A)
+        with options_given(
+            self.prefix, self._own_solver().of_levels()
+        ):  # smoothers read them once more
+            return A, StiffenedMultigrid(self.ksp.getPC(), A, S, how)
 
     def rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""

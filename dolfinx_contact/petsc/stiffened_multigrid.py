@@ -7,6 +7,21 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+# Smoothers that take a matrix in blocks.
+BLOCKED = "sor", "jacobi", "pbjacobi"
+
+
+def may_be_blocked(K: PETSc.Mat, how: PETSc.Mat.Structure, levels: PETSc.PC) -> bool:
+    """Whether a matrix plus springs may be kept in blocks of a node's unknowns: a quarter less memory, and a faster cycle.
+
+    Args:
+        K: The matrix.
+        how: How the entries of the springs lie to its own.
+        levels: The preconditioner of K, of type GAMG.
+    """
+    known = levels.getMGSmoother(levels.getMGLevels() - 1).getPC().getType() in BLOCKED
+    return K.getBlockSize() > 1 and how == PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN and known
+
 
 class StiffenedMultigrid:
     """PETSc's multigrid for ``A = K + S``, with the interpolations and smoothers of GAMG for ``K``.

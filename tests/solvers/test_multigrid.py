@@ -168,20 +168,18 @@ def test_checkpoint_continues_to_the_same_bits(tmp_path):
 
 
 def test_a_step_that_stalls_is_refused_with_its_reason():
-    """Tall elements under a strongly crossed slip rule, reversed: refused within the budget, and said why; a usual step takes a tenth of it."""
+    """Tall elements under a strongly crossed slip rule, reversed: refused within a budget that is enough for a usual step, and said why."""
     scene = scenes.block(
-        cells=(12, 12, 2), mu=(0.3, 0.03), p=(1e-3, 1.0), petsc_options=MULTIGRID,
-        solver=dc.FixedPoint(max_iterations=120), tol=1e-8,
+        cells=(16, 16, 2), mu=(0.3, 0.03), p=(1e-3, 1.0), petsc_options=MULTIGRID,
+        solver=dc.FixedPoint(max_iterations=40), tol=1e-8,
     )  # fmt: skip
     scene.move_top(0.001, 0.0005, -0.01)
-    assert scene.problem.solve().iterations <= 60
+    assert scene.problem.solve().iterations <= 50
     scene.move_top(-0.001, 0.0005, -0.01)
     with pytest.raises(dc.NotConverged) as refused:
         scene.problem.solve()
-    assert 300 <= refused.value.step.iterations <= 320  # those of one step of Newton's method more
+    assert 100 <= refused.value.step.iterations <= 120  # those of one step of Newton's method more
     assert refused.match("changed (their|its) status in the last 50")
     assert refused.match(
-        "has 300 iterations, .*max_iterations=240.* elements at the surface are 3.6 times as high as wide"
+        "has 100 iterations, .*max_iterations=80.* elements at the surface are 4.8 times as high as wide"
     )
-    scene.move_top(0.0012, 0.0006, -0.012)  # the last state is kept
-    assert scene.problem.solve().iterations <= 60

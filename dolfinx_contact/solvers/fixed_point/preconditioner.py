@@ -39,12 +39,10 @@ class ContactPreconditioner:
         self._spring_rates = self._rates()
         self._layer, self._linearised = None, False
         with stage("contact: set-up of springs"):
-            S, A = self._springs(), (body.anchors.A if body.loose else body.K).copy()
-            how = structure([contact.points for contact in contacts])
-            A.axpy(1.0, S, how)
+            S, how = self._springs(), structure([contact.points for contact in contacts])
+            A, self.stiffened = body.stiffened(S, how)
             self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
             self._softened = False
-            self.stiffened = body.stiffened(A, S, how)
         self._A = A
         followed = body.loose is not None or any(contact.surface.motions for contact in contacts)
         self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)
