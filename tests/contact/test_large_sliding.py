@@ -427,3 +427,20 @@ def test_gaps_of_bodies_apart():
         found.append(np.where(contact.reaction[:, -1] > 0.0, 0.0, contact.gap))
     assert largest(found[0]) > 0.01
     assert largest(found[0] - found[1]) < 1e-3 * largest(found[0])
+
+
+def test_steady_sliding_takes_one_solution(monkeypatch):
+    """Once a block slides on as in the step before, the rows of where it is expected are those of where it ends: none is repeated."""
+    placed, follow = [], dc.Contact.follow
+    monkeypatch.setattr(dc.Contact, "follow", lambda *a: placed.append(0) or follow(*a))
+    scene = blocks("quadrilateral", 1, ((6, 2), (19, 2)), size=(1.0, 3.0), sliding="large", mu=0.3)
+    counts = []
+    for k in range(5):
+        placed.clear()
+        scene.way.value[:] = (0.02 * k, -0.01)
+        step = scene.problem.solve()
+        counts.append(len(placed))
+    assert counts[1] > 1 and counts[2:] == [1, 1, 1]  # in the second one friction sets in
+    assert 0.0 < step.geometry_error <= 1e-3
+    force = scene.contact.force()
+    assert force[0] == pytest.approx(-0.3 * force[1], rel=0.01)
