@@ -143,7 +143,7 @@ void on_common_part(const FacetPiece &one, const FacetPiece &other, const LineRu
 
 // Of the measure, which has a value for each shape function, or is one.
 inline double density_at(const double *density, const FacetShapes::Values &N, int count) {
-    if (!density)
+    if (density == nullptr)
         return 1;
     double factor = 0;
     for (int i = 0; i < count; ++i)

@@ -47,7 +47,7 @@ struct MortarSide {
     // The pieces of one facet after the other.
     std::vector<PieceInSpace> pieces() const {
         std::vector<PieceInSpace> found(facets * parts);
-        const std::size_t d = std::size_t(dim), k = std::size_t(nodes);
+        const auto d = std::size_t(dim), k = std::size_t(nodes);
         for (std::size_t p = 0; p < found.size(); ++p) {
             const std::size_t facet = p / parts;
             found[p].count = corners;
@@ -146,6 +146,7 @@ class MortarRows {
     // Slave facets, and all those of the other side. Rows have several entries of one column.
     void add(const MortarSide &slave, const std::vector<MortarSide> &masters) {
         std::vector<std::vector<PieceInSpace>> opposite;
+        opposite.reserve(masters.size());
         for (const auto &master : masters)
             opposite.push_back(master.pieces());
         std::vector<NearPieces> near(opposite.begin(), opposite.end());
@@ -185,13 +186,16 @@ class MortarRows {
     std::vector<Met> met_;      // facets that it meets,
     std::vector<double> mixed_; // and int N_a N_b with each
 
+    static bool weighted(const MortarSide &slave) { return slave.density != nullptr; }
     static const double *density(const MortarSide &slave, std::size_t facet) {
-        return slave.density ? slave.density + facet * std::size_t(slave.nodes) : nullptr;
+        return slave.density != nullptr ? slave.density + facet * std::size_t(slave.nodes)
+                                        : nullptr;
     }
 
     void add_whole(const MortarSide &slave, std::size_t facet, const FacetPiece &here,
                    const FacetShapes &shapes) {
-        const auto &rule = rule_for(here, slave.degree, here, slave.degree, slave.density, rules_);
+        const auto &rule =
+            rule_for(here, slave.degree, here, slave.degree, weighted(slave), rules_);
         on_common_part(here, here, rule, [&](Point p, double weight) {
             const auto N = shapes.at(here.reference(p));
             weight *= density_at(density(slave, facet), N, slave.nodes);
@@ -208,7 +212,7 @@ class MortarRows {
             return;
         const std::size_t first = mixed_.size();
         const auto &rule =
-            rule_for(here, slave.degree, there, master.degree, slave.density, rules_);
+            rule_for(here, slave.degree, there, master.degree, weighted(slave), rules_);
         mixed_.resize(first + std::size_t(slave.nodes * master.nodes), 0.0);
         if (add_common_integrals(here, shapes, there, master.shapes(), rule, density(slave, facet),
                                  D_.data(), M_.data(), &mixed_[first]))
