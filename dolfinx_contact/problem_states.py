@@ -77,13 +77,14 @@ class ProblemStates:
         kept.extend(past)
 
     def places(self) -> list[tuple]:
-        """Displacement and rotation of each contact's surface."""
+        """Displacement and rotation of each contact's surface, and the rotation of its guides."""
         surfaces = [contact.surface for contact in self._contacts]
-        return [surface.stands[:2] for surface in surfaces]
+        return [(*surface.stands[:2], surface.placed) for surface in surfaces]
 
     def _put_surfaces(self, places: list[tuple]) -> None:
-        for contact, (displacement, rotation) in zip(self._contacts, places):
-            contact.surface.displacement, contact.surface.rotation = displacement, rotation
+        for contact, (displacement, rotation, placed) in zip(self._contacts, places):
+            contact.surface.displacement = displacement
+            contact.surface.place(rotation, placed)
 
     def take_variables(self) -> None:
         """What the user has written into internal variables is their last state."""

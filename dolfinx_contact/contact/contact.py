@@ -724,6 +724,8 @@ class Contact(Guarded):
         saved = self._history.save() | self._laws.save(self) | {"plane": self.surface.displacement}
         if self._history.settled_by is not None:
             saved["law_of_last_step"] = rows(self._history.settled_by, self.nodes.size)
+        if self.surface.placed.any():
+            saved["rotation_of_guides"] = self.surface.placed
         return saved | self._placement.save()
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
@@ -736,7 +738,8 @@ class Contact(Guarded):
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         surface = self.surface
-        surface.rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
+        rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
+        surface.place(rotation, frozen(np.array(saved.get("rotation_of_guides", surface.placed))))
         if self.follows:
             self._placement.back_to(saved["home"] if surface.varies else saved.get("at"))
         self._history.load(saved)
@@ -745,7 +748,7 @@ class Contact(Guarded):
         found = saved.get("found_rotation_of_plane", surface.rotation)
         self._placement.end(found)
         self._settle_here()
-        surface.rotation = found
+        surface.turn_to(found)
 
     # -- results -------------------------------------------------------------------------------
 

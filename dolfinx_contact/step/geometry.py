@@ -72,7 +72,8 @@ class Ends:
             for surface in self._turning:
                 size, angles = surface.point.size, surface.rotation.size
                 pose, first = self._at[first : first + size + angles], first + size + angles
-                surface.displacement, surface.rotation = pose[:size], pose[size:] / self._arm
+                surface.displacement = pose[:size]
+                surface.turn_to(pose[size:] / self._arm)
         return self._at[: x.size]
 
 

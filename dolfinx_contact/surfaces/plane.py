@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import finite
-from dolfinx_contact.surfaces.surface import Surface, unit
+from dolfinx_contact.surfaces.surface import Surface, rotation_less_one, unit
 
 
 class RigidPlane(Surface):
@@ -40,8 +40,8 @@ class RigidPlane(Surface):
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.  Assign
             another one between steps; normal and axis rotate with the plane, and slip is relative to it.
         free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the frame, "r1", "r2", "rn" about
-            them; in two dimensions "t", "n" and "r".  Empty at first.  With a rotation among them these axes are those of the
-            plane as it was made, and do not turn.
+            them; in two dimensions "t", "n" and "r".  Empty at first.  With a rotation among them these axes stand as
+            ``rotation`` was last assigned: what a step finds does not turn them.
         force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Components along directions
             that are not free have no effect: a guide carries them.
         moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
@@ -94,8 +94,14 @@ class RigidPlane(Surface):
 
     @property
     def drive_axes(self) -> np.ndarray:
-        """The rows of ``frame``; where a rotation is free, those of the frame as it was made: guides do not tilt with the plane."""
-        return self._frame if self.spins else self.frame
+        """The rows of ``frame``; where a rotation is free, as ``rotation`` was last assigned: guides do not tilt with the plane."""
+        if not self.spins:
+            return self.frame
+        return (
+            self._frame + self._frame @ rotation_less_one(self.placed).T
+            if self.placed.any()
+            else self._frame
+        )
 
     def check_pressing(self, motion: Any) -> None:
         """See ``Surface``."""

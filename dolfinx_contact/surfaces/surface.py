@@ -79,7 +79,7 @@ class Surface(Guarded):
         self.point = frozen(vector("point", point))
         size = self.point.size
         self._displacement = frozen(np.zeros(size))
-        self._rotation = frozen(np.zeros(3 if size == 3 else 1))
+        self._rotation = self._placed = frozen(np.zeros(3 if size == 3 else 1))
         self._turn: np.ndarray | None = None
         self._spin: np.ndarray | None = None
         self._driver: Drive | None = None
@@ -156,6 +156,21 @@ class Surface(Guarded):
 
     @rotation.setter
     def rotation(self, value: ArrayLike) -> None:
+        self.turn_to(value)
+        self._placed = self._rotation
+
+    @property
+    def placed(self) -> np.ndarray:
+        """The rotation that was last assigned, in which guides stand: what steps find does not turn them."""
+        return self._placed
+
+    def place(self, rotation: ArrayLike, placed: np.ndarray) -> None:
+        """Take a rotation, and that in which guides stand, as they were before."""
+        self.turn_to(rotation)
+        self._placed = placed
+
+    def turn_to(self, value: ArrayLike) -> None:
+        """Take a rotation that a step has found, radians: guides stay."""
         size = self._rotation.size
         array = np.atleast_1d(finite("surface.rotation", value))
         if array.shape != (size,):
@@ -181,7 +196,7 @@ class Surface(Guarded):
     def end_step(self) -> None:
         """Add what a step has turned to ``rotation``."""
         if self._spin is not None:
-            self.rotation = composed(self._spin, self._rotation)
+            self.turn_to(composed(self._spin, self._rotation))
 
     def motion(self, x: np.ndarray) -> np.ndarray:
         """Displacement of its material points that were at ``x``: ``shape=(gdim,)`` if it does not rotate."""

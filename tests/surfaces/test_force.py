@@ -457,3 +457,19 @@ def test_tables_have_the_motion_of_driven_planes(tmp_path):
     history = dc.History(scene.problem)
     history.record(scene.push(0, 0, E * 1e-3))
     assert history.column("contact0_plane_z")[0] == scene.surface.displacement[2]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_guides_stand_as_the_plane_was_placed(dim):
+    """A plane that may tilt is guided along the axes that it had when its rotation was assigned: what steps find does not turn them,
+    another assignment does."""
+    normal, axis = np.eye(dim)[-1], None if dim == 2 else np.eye(3)[0]
+    plane = dc.RigidPlane(np.zeros(dim), normal, axis)
+    plane.free = ("n", "r") if dim == 2 else ("n", "r1", "r2")
+    for angle in (0.0, 0.1, 0.3):
+        plane.rotation = [angle] if dim == 2 else [angle, 0.0, 0.5 * angle]
+        placed = plane.frame
+        assert plane.drive_axes == pytest.approx(placed, abs=1e-15)
+        plane.turn_to(plane.rotation + 0.2)
+        assert plane.drive_axes == pytest.approx(placed, abs=1e-15)
+        assert np.abs(plane.frame - placed).max() > 0.1
