@@ -31,7 +31,7 @@ from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.laws import Laws, rows
 from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
-from dolfinx_contact.law.dissipation import work_and_turn
+from dolfinx_contact.law.dissipation import slipped_last, work_and_turn
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.law.supported import supported
@@ -650,16 +650,21 @@ class Contact(Guarded):
         if self._laws.begun is not None:
             start, end, turned = self._works(slip, self.reaction)
             return start + end, turned
-        last = self.last
-        slipped = last.status == int(Status.SLIP)
-        return work_and_turn(self.friction, last.reaction, slipped, self.reaction, slip, self.law_before)  # fmt: skip
+        law, before = self.law_before, self.last.reaction
+        return work_and_turn(self.friction, before, self._slipped(law), self.reaction, slip, law)
+
+    def _slipped(self, law: Friction | None) -> np.ndarray:
+        """See ``slipped_last``, of the last step and its law."""
+        slips = self.last.status == int(Status.SLIP)
+        return slipped_last(law or self.friction, self.last.reaction, slips)
 
     def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
         """Shares of the frictional work of a step that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         none, before = np.zeros_like(reaction), self.last.reaction
-        slipped = self.last.status == int(Status.SLIP)
+        law_before = self.law_before
+        slipped = self._slipped(law_before)
         law = self.friction if self._laws.begun is None else self._laws.begun
-        start, turned = work_and_turn(law, before, slipped, none, slip, self.law_before)
+        start, turned = work_and_turn(law, before, slipped, none, slip, law_before)
         return start, work_and_turn(self.friction, none, slipped, reaction, slip)[0], turned
 
     def _rate(self, work: np.ndarray) -> np.ndarray:

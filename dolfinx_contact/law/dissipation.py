@@ -12,7 +12,7 @@ because its force is ``-N M s``.  The rule is the mean of both ends of the step 
     D = |du| (N0 m0 + N1 m(e1)) / 2,    e1 = du / |du|,    m0 = c m(e0) + (1 - c) m(e1),
 
 with the direction e0 in which the last step's force says that the node was slipping then, and ``c = max(e0.e1, 0)``;
-c = 0 if it did not slip.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
+c = 0 if it did not slip, and has no force on the cone.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from __future__ import annotations
 import numpy as np
 
 from dolfinx_contact.law.friction import Friction, split
+
+# Part of its cone within which a force that sticks points still along the slip before: a pause leaves it there but for rounding.
+PAUSED = 1e-3
 
 
 def work_of_friction(
@@ -98,3 +101,18 @@ def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndar
     _, s = split(np.where(slippery, 0.0, -force) / M)
     _, e = split(s * M / P**2)
     return s, e
+
+
+def slipped_last(friction: Friction, reaction: np.ndarray, slipped: np.ndarray) -> np.ndarray:
+    """Nodes whose force says along which direction they slipped: that slip, or stick with a force that is on the cone, ``shape=(n,)``, bool.
+
+    Args:
+        friction: The law.
+        reaction: Reactions, ``shape=(n, gdim)``, local frame.
+        slipped: Nodes that slip.
+    """
+    force, normal = friction.along_axes(reaction[:, :-1]), reaction[:, -1]
+    mu = friction.mu[..., : force.shape[1]]
+    part = np.divide(force, mu, out=np.zeros_like(force), where=mu > 0.0)
+    on_cone = np.linalg.norm(part, axis=1) >= (1.0 - PAUSED) * normal
+    return slipped | (on_cone & (normal > 0.0))

@@ -7,7 +7,7 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
-from dolfinx_contact.law.dissipation import work_of_friction
+from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 
 COMM = scenes.COMM
 EPS = np.finfo(float).eps
@@ -235,6 +235,33 @@ def test_a_corner_that_leaves_work_unknown_is_told(law, turn):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             scene.problem.solve()
+
+
+def test_a_pause_changes_no_work():
+    """A step in which nothing moves leaves forces on the cone: whether nodes are then called slipping or sticking is rounding, and the
+    work of the next step, which turns, is the same as without the pause."""
+    works = []
+    for pauses in (0, 1, 3):
+        scene = scenes.block(cells=(2, 2, 1), **{"p": None, **LAWS["crossed"]})
+        scene.move_top(0, 0, -1e-5)
+        scene.problem.solve()
+        for way in ((0.6, 0.0, 0), *pauses * [(0.6, 0.0, 0)], (0.9, 0.1, 0)):
+            scene.surface.displacement = way
+            scene.problem.solve()
+        works.append(scene.contact.dissipation)
+    assert works[1] == pytest.approx(works[0], rel=1e-6)
+    assert works[2] == pytest.approx(works[0], rel=1e-6)
+
+
+def test_forces_on_the_cone_alone_say_along_which_way_nodes_slipped():
+    """Status counts, or a stuck force within a thousandth of its cone; none of open nodes, nor without friction."""
+    law = dc.Friction((0.3, 0.1))
+    forces = np.array(
+        [[0.3, 0.0, 1.0], [0.0, 0.09999, 1.0], [0.0, 0.09, 1.0], [0.0, 0.0, 0.0], [0.0, 0.09, 1.0]]
+    )
+    slips = np.array([False, False, False, False, True])
+    assert slipped_last(law, forces, slips).tolist() == [True, True, False, False, True]
+    assert not slipped_last(dc.Friction(0.0), forces * [0, 0, 1], np.zeros(5, dtype=bool)).any()
 
 
 @pytest.mark.parametrize("p", [None, (0.05, 0.20)])
