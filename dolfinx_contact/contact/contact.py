@@ -730,7 +730,7 @@ class Contact(Guarded):
         if self._history.settled_by is not None:
             saved["law_of_last_step"] = rows(self._history.settled_by, self.nodes.size)
         if self.surface.placed.any():
-            saved["rotation_of_guides"] = self.surface.placed
+            saved["placed_rotation_of_plane"] = self.surface.placed
         return saved | self._placement.save()
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
@@ -744,7 +744,9 @@ class Contact(Guarded):
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
         surface = self.surface
         rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
-        surface.place(rotation, frozen(np.array(saved.get("rotation_of_guides", surface.placed))))
+        surface.place(
+            rotation, frozen(np.array(saved.get("placed_rotation_of_plane", surface.placed)))
+        )
         if self.follows:
             self._placement.back_to(saved["home"] if surface.varies else saved.get("at"))
         self._history.load(saved)

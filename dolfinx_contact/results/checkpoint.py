@@ -33,15 +33,7 @@ if TYPE_CHECKING:
 VERSION = 1
 
 # Ends of the names of arrays that not every history has, and of those that files without a version may lack.
-LATELY = (
-    "law_of_last_step",
-    "home",
-    "rotation_of_plane",
-    "rotation_of_guides",
-    "_placed",
-    "_worn",
-    "fixed",
-)
+LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed", "_worn", "fixed")
 NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
 
 ANEW = "Take another one, or write it anew with problem.save."

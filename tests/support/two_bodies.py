@@ -60,7 +60,9 @@ def rubber(u, lame, shear):
     G = ufl.Identity(d) + ufl.grad(u)
     log = ufl.ln(ufl.det(G))
     energy = shear / 2 * (ufl.tr(G.T * G) - d - 2 * log) + lame / 2 * log**2
-    return ufl.derivative(energy * ufl.dx, u, ufl.TestFunction(u.function_space))
+    return ufl.derivative(
+        energy * ufl.dx(metadata={"quadrature_degree": 4}), u, ufl.TestFunction(u.function_space)
+    )
 
 
 def stress(w, lame, shear):
