@@ -439,8 +439,9 @@ class Contact(Guarded):
     def renew_gaps(self, u: np.ndarray) -> None:
         """Let gaps of open nodes on a deformable surface be those at a displacement, not of the rows that a step used.  Collective."""
         if self.surface.deformable and self.changes:
-            gap = self._placement.gap_at(u) + self.wear_depth
-            self.take(gap=np.where(self.reaction[:, -1] > 0.0, self.gap, gap))
+            gap, points = self._placement.gap_at(u)
+            gap = np.where(self.reaction[:, -1] > 0.0, self.gap, gap + self.opening_at(points))
+            self.take(gap=gap)
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""

@@ -56,10 +56,8 @@ class MortarPlacement(Placement):
         self._slave.keep(self._mine)
         self._at_nodes = [at_nodes(side, self._mine) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
-        self._projected: tuple = (
-            None,
-            None,
-        )  # a displacement with the nodes that have left, and what was placed for it
+        # A displacement with the nodes that have left, and what was placed for it.
+        self._projected: tuple = (None, None)
         self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
         self._leaving = False  # whether nodes of any rank leave the other side in the step
         self._began: list | None = None  # how both sides have turned at its start
@@ -227,10 +225,7 @@ class MortarPlacement(Placement):
             volume: ``V_a``.
             area: Of this rank's nodes of the other side, ``shape=(k,)``.
         """
-        now, before = (
-            self.now.points,
-            self.settled.points,
-        )  # of what has left in the step those before
+        now, before = self.now.points, self.settled.points  # of what has left in the step, before
         mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
         volumes = self._comm.allreduce(mine)
         area = self._master.everywhere(area[:, None])[:, 0]
@@ -246,11 +241,11 @@ class MortarPlacement(Placement):
             np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
-    def gap_at(self, u: np.ndarray) -> np.ndarray:
-        """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length; what is opposite nothing is open.  Collective."""
+    def gap_at(self, u: np.ndarray) -> tuple[np.ndarray, MortarPoints]:
+        """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length, and these; what is opposite nothing is open.  Collective."""
         there = self.placed(u)
         gap = there.flat + there.points.motion(u)[:, -1]
-        return np.where(there.points.alone, np.maximum(gap, self._apart), gap)
+        return np.where(there.points.alone, np.maximum(gap, self._apart), gap), there.points
 
     @property
     def changes(self) -> bool:

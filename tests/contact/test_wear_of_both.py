@@ -51,6 +51,18 @@ def test_each_side_loses_its_coefficient_times_the_work(cell, degree, swapped, o
     assert largest(contact.opposite_wear_depth) > 0.0
 
 
+def test_bodies_apart_have_the_gap_that_both_have_lost():
+    """Lifted off, undeformed bodies are apart by the lift and by what both sides have worn; ``opening`` is that opposite nodes of the pressed state."""
+    scene, _ = rubbed("quadrilateral", 1, explicit=True)
+    contact = scene.contact
+    scene.way.value[1] = 0.02
+    scene.problem.solve()
+    assert contact.gap - 0.02 == pytest.approx(contact.opening, rel=0.02)
+    assert (
+        largest(contact.gap - 0.02 - contact.wear_depth) > 0.1 * largest(contact.wear_depth) > 0.0
+    )
+
+
 def test_rubber_loses_it_too():
     """Bodies of finite strain, in steps by one facet."""
     scene, k = rubbed("quadrilateral", 1, form=rubber, explicit=True)
