@@ -28,7 +28,9 @@ def works(friction, before, slipped, reaction, slip) -> np.ndarray:
     """Work of a step by the four rules, summed over the nodes."""
     nothing = np.zeros(len(slip), dtype=bool)
     mean, end = (-(r[:, :2] * slip).sum() for r in (0.5 * (before + reaction), reaction))
-    by = (work_of_friction(friction, before, s, reaction, slip).sum() for s in (slipped, nothing))
+    by = (
+        work_of_friction(friction, before, s, reaction, slip)[0].sum() for s in (slipped, nothing)
+    )
     return np.array([*by, mean, end])
 
 

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     NUMBERS,
@@ -474,7 +475,7 @@ class ContactProblem(Guarded):
 
     def _repeated(self, step: LoadStep, ends: Ends, x: np.ndarray) -> tuple[LoadStep, SolverResult]:
         """The step with the geometry of its end, after it has ended at a displacement.  Collective."""
-        for surface in {id(c.surface): c.surface for c in self.contacts}.values():
+        for surface in surfaces_of(self.contacts):
             surface.end_step()
         placed = [contact.placement.now for contact in self.contacts]
         for contact in self.contacts:

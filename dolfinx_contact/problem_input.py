@@ -15,6 +15,7 @@ from ufl.classes import Indexed, Product, ScalarValue, SpatialCoordinate, Sum
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.solvers.automatic import Automatic
 from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import agree, raised_together
@@ -386,7 +387,7 @@ def check_alive(problem: ContactProblem, body: BodyLike, contacts: Sequence[Cont
             "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
             "go on with that one, or make a Contact for each."
         )
-    for surface in {id(contact.surface): contact.surface for contact in contacts}.values():
+    for surface in surfaces_of(contacts):
         if surface.driver is not None:
             surface.driver.take(problem.number, next(NUMBERS))
 

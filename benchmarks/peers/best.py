@@ -103,7 +103,7 @@ def worth(punch, given: dict, u, element: str | None, points: int) -> dict:
         if short:
             work -= float(((force + before)[:, :2] / 2 * slip).sum())
         else:
-            work += float(work_of_friction(friction, before, slipped, force, slip).sum())
+            work += float(work_of_friction(friction, before, slipped, force, slip)[0].sum())
             slipped = np.linalg.norm(force[:, :2], axis=1) > 0.999 * given["mu"] * force[:, 2]
         if number == punch.parameters.loading:
             loaded = force

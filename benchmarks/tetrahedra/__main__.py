@@ -127,7 +127,9 @@ def cycle(variant: str, punch: Punch, body: Body) -> dict:
     work, failed = 0.0, 0
     for way in programme(punch.parameters):
         now = touching.solve(way * free - moved, law, [reaction.ravel()])
-        work += work_of_friction(law, reaction, slipped, now.reaction, now.at_points[:, :2]).sum()
+        work += work_of_friction(law, reaction, slipped, now.reaction, now.at_points[:, :2])[
+            0
+        ].sum()
         reaction, slipped = now.reaction, now.status == int(dc.Status.SLIP)
         moved[:, :2] += now.motion[:, :2]
         failed += now.failed

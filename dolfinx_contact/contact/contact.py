@@ -31,7 +31,7 @@ from dolfinx_contact.contact.interface import ContactPoints, add_to
 from dolfinx_contact.contact.laws import Laws, rows
 from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
-from dolfinx_contact.law.dissipation import slipped_last, work_and_turn
+from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.law.supported import supported
@@ -652,7 +652,7 @@ class Contact(Guarded):
             start, end, turned = self._works(slip, self.reaction)
             return start + end, turned
         law, before = self.law_before, self.last.reaction
-        return work_and_turn(self.friction, before, self._slipped(law), self.reaction, slip, law)
+        return work_of_friction(self.friction, before, self._slipped(law), self.reaction, slip, law)
 
     def _slipped(self, law: Friction | None) -> np.ndarray:
         """See ``slipped_last``, of the last step and its law."""
@@ -665,8 +665,8 @@ class Contact(Guarded):
         law_before = self.law_before
         slipped = self._slipped(law_before)
         law = self.friction if self._laws.begun is None else self._laws.begun
-        start, turned = work_and_turn(law, before, slipped, none, slip, law_before)
-        return start, work_and_turn(self.friction, none, slipped, reaction, slip)[0], turned
+        start, turned = work_of_friction(law, before, slipped, none, slip, law_before)
+        return start, work_of_friction(self.friction, none, slipped, reaction, slip)[0], turned
 
     def _rate(self, work: np.ndarray) -> np.ndarray:
         return self.wear.depth(work, self.whole_area, self._wear_field)

@@ -5,12 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact.step.errors import EPSILON, NodalStiffness
+
+if TYPE_CHECKING:
+    from dolfinx_contact.solvers.protocols import ContactLike
+    from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
 FREE, STILL = 1e-12, 64 * EPSILON
@@ -280,6 +285,11 @@ def structure(points: Sequence[ContactPoints]) -> PETSc.Mat.Structure:
     kinds = PETSc.Mat.Structure
     local = all(of.local for of in points)
     return kinds.SUBSET_NONZERO_PATTERN if local else kinds.DIFFERENT_NONZERO_PATTERN
+
+
+def surfaces_of(contacts: Iterable[ContactLike]) -> list[Surface]:
+    """The surfaces of contacts, each once."""
+    return list({id(contact.surface): contact.surface for contact in contacts}.values())
 
 
 def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:

@@ -32,8 +32,8 @@ def work_of_friction(
     reaction: np.ndarray,
     slip_increment: np.ndarray,
     law_before: Friction | None = None,
-) -> np.ndarray:
-    """Work of friction of one step along the principal friction directions, all entries >= 0.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Work of friction of one step along the principal friction directions, all entries >= 0, and what of it is owed to a turn.
 
     Args:
         friction: The law.
@@ -45,21 +45,9 @@ def work_of_friction(
             direction the node slipped then, and axes alone count as they were.
 
     Returns:
-        ``shape=(n, gdim - 1)``, force times length; the work of a node is the sum of its row.
-        Normal forces below zero, which only a state that is no solution has, count as none.
+        The work, ``shape=(n, gdim - 1)``, force times length, that of a node is the sum of its row; and by how much it is more than the
+        work of slip along ``e1`` alone.  Normal forces below zero, which only a state that is no solution has, count as none.
     """
-    return work_and_turn(friction, before, slipped, reaction, slip_increment, law_before)[0]
-
-
-def work_and_turn(
-    friction: Friction,
-    before: np.ndarray,
-    slipped: np.ndarray,
-    reaction: np.ndarray,
-    slip_increment: np.ndarray,
-    law_before: Friction | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """As ``work_of_friction``, and by how much this is more than the work of slip along ``e1`` alone, ``shape=(n, gdim - 1)``."""
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
     way, e1 = split(friction.along_axes(slip_increment))

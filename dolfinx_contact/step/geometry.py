@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.contact.placement import LONGEST
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.step.errors import NodalStiffness
+from dolfinx_contact.support.checks import place
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 
@@ -51,9 +53,7 @@ class Ends:
     def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
         renewed = any(c.surface.deformable and c.changes for c in contacts)
         self.most = RENEWED if renewed else REPEATED
-        self._turning = list(
-            {id(c.surface): c.surface for c in contacts if c.surface.spins}.values()
-        )
+        self._turning = surfaces_of(c for c in contacts if c.surface.spins)
         self._arm, self._mix, self._at = body.extent, None, None
         if renewed or self._turning:
             size = body.size + sum(pose.size for pose in self._poses())
@@ -173,7 +173,7 @@ def _dragged(contact: ContactLike, stiffness: NodalStiffness, missed: np.ndarray
 def _moments(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> list[float]:
     """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
     missed = []
-    for surface in {id(c.surface): c.surface for c in contacts if c.surface.spins}.values():
+    for surface in surfaces_of(c for c in contacts if c.surface.spins):
         sums, arms = np.zeros(surface.rotation.size), [np.zeros(1)]
         for contact in contacts:
             if contact.surface is surface:
@@ -217,7 +217,7 @@ def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
         if some.size:
             first = (turned > TURNED)[:, some].argmax(axis=0)
             node = some[first.argmin()]
-            at = contact.x[node, : contact.points.dim].tolist()
+            at = place(contact.x[:, : contact.points.dim], int(node))
             lost.append((float(first.min()) / PLACES, f"{at} on {contact.surface!r}"))
     part, at = min(body.comm.allgather(min(lost)))
     if part > 1.0:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dolfinx_contact import compat
+from dolfinx_contact.support.checks import place
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
@@ -35,12 +36,11 @@ def changing(
     if not count:
         return f"no node has changed its status in the last {len(every)} states, errors fall slowly"
     most = int(times.argmax()) if times.size else None
-    mine = (0, None) if most is None else (int(times[most]), tuple(x[most].tolist()))
+    mine = (0, "") if most is None else (int(times[most]), place(x, most))
     often, where = max(body.comm.allgather(mine), key=lambda one: one[0])
-    at = ", ".join(f"{value:.4g}" for value in where)
     return (
         f"the search goes from state to state: {count} of {nodes} contact nodes have changed their status in the last "
-        f"{len(every)}, most often ({often} times) the one at ({at})"
+        f"{len(every)}, most often ({often} times) the one at {where}"
     )
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
 
@@ -64,9 +65,7 @@ class DrivenSurfaces:
 
     def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
         self._body, self._contacts = body, contacts
-        self.surfaces = list(
-            {id(c.surface): c.surface for c in contacts if c.surface.motions}.values()
-        )
+        self.surfaces = surfaces_of(c for c in contacts if c.surface.motions)
         self._home = [surface.displacement for surface in self.surfaces]
         self._motions = [surface.motions for surface in self.surfaces]
         ends = np.cumsum([0] + [len(motions) for motions in self._motions])

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.interface import STILL
+from dolfinx_contact.contact.interface import STILL, surfaces_of
+from dolfinx_contact.support.checks import place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def held_surfaces(
         contact.drag(None)
     u = last.copy()
     u[body.fixed] = b[body.fixed]
-    surfaces = list({id(c.surface): c.surface for c in contacts if c.surface.motions}.values())
+    surfaces = surfaces_of(c for c in contacts if c.surface.motions)
     found = [_held_surface(body, contacts, surface, u) for surface in surfaces]
     return HeldSurfaces(body, [one for one in found if one is not None]) if any(found) else None
 
@@ -86,7 +87,7 @@ def _held_surface(
             mine = (np.abs(along[:, :, which]) > ALONG * largest[which]).any(axis=(1, 2))
             rows = contact.points.supported[mine]
             if mine.any() and (not simple or contact.points.along[mine].any()):
-                where = contact.x[rows[0]].tolist()
+                where = place(contact.x, int(rows[0]))
                 raise ValueError(
                     f"surface.free has {', '.join(map(repr, names))}, along or about which a boundary condition holds the contact "
                     f"node at {where}, which is free in another direction, or whose surface is no plane or turns: the friction "

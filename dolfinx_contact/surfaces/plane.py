@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import finite
-from dolfinx_contact.surfaces.surface import Surface, rotation_less_one, unit
+from dolfinx_contact.surfaces.surface import Surface, unit
 
 
 class RigidPlane(Surface):
@@ -95,13 +95,7 @@ class RigidPlane(Surface):
     @property
     def drive_axes(self) -> np.ndarray:
         """The rows of ``frame``; where a rotation is free, as ``rotation`` was last assigned: guides do not tilt with the plane."""
-        if not self.spins:
-            return self.frame
-        return (
-            self._frame + self._frame @ rotation_less_one(self.placed).T
-            if self.placed.any()
-            else self._frame
-        )
+        return self.as_placed(self._frame) if self.spins else self.frame
 
     def check_pressing(self, motion: Any) -> None:
         """See ``Surface``."""

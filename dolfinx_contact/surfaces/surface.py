@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.support.attributes import Guarded, frozen, whole
-from dolfinx_contact.support.checks import finite, vector
+from dolfinx_contact.support.checks import finite, place, vector
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
@@ -177,7 +177,7 @@ class Surface(Guarded):
             wanted = "a vector of 3 numbers" if size == 3 else "one angle"
             raise ValueError(f"surface.rotation must be {wanted}, in radians, got {value!r}.")
         self._rotation, self._spin = frozen(array.astype(np.float64)), None
-        self._turn = rotation_less_one(self._rotation) if self._rotation.any() else None
+        self._turn = _turn_of(self._rotation)
 
     @property
     def spin(self) -> np.ndarray | None:
@@ -226,6 +226,11 @@ class Surface(Guarded):
     def turned(self, frames: np.ndarray) -> np.ndarray:
         """Frames in the surface's axes, in global components."""
         return frames if self._turn is None else frames + frames @ self._turn.T
+
+    def as_placed(self, frames: np.ndarray) -> np.ndarray:
+        """The same as guides stand."""
+        turn = _turn_of(self._placed)
+        return frames if turn is None else frames + frames @ turn.T
 
     def own_axes(self, vector: np.ndarray) -> np.ndarray:
         """Components of a vector in its axes; a rotation of two dimensions stays."""
@@ -277,9 +282,8 @@ def frames_along(
         t1 = t1 - (t1 * normals).sum(axis=1, keepdims=True) * normals
         length = np.linalg.norm(t1, axis=1, keepdims=True)
         if (length < ALONG).any():
-            place = at[length.argmin()].tolist()
             raise ValueError(
-                f"axis {axis} of {surface} is along the normal at the contact node at {place}, relative to it: give "
+                f"axis {axis} of {surface} is along the normal at the contact node at {place(at, int(length.argmin()))}, relative to it: give "
                 "another first principal friction direction."
             )
         t1 = t1 / length
@@ -302,6 +306,11 @@ class CurvedSurface(Surface):
             ValueError: an axis along the normal of a position.
         """
         return frames_along(self.normals(y), self.axis, y, self)
+
+
+def _turn_of(angle: np.ndarray) -> np.ndarray | None:
+    """``rotation_less_one``; None where nothing turns."""
+    return rotation_less_one(angle) if angle.any() else None
 
 
 def rotation_less_one(angle: np.ndarray) -> np.ndarray:
