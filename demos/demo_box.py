@@ -109,7 +109,7 @@ def main():
         say(f"q_1 = {part:4.2f} P: the wall carries {table[-1][1]:.4f} P A, friction {part - table[-1][1]:+.4f} P A")  # fmt: skip
     up, down = np.array(table)[:2, 1], np.array(table)[:2:-1, 1]
     assert (down > up).all()
-    say(f"work of friction {work:.3e} N mm")
+    say(f"frictional work {work:.3e} N mm")
     return (np.array(table),)
 
 

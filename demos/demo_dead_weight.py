@@ -92,7 +92,7 @@ def loop(quarter: int, cells: int = 64):
 # 3. The width of the loop, $\delta$ on the way down minus that on the way up at the same $Q$, in which the compliance $C$
 #    drops out, is that of the closed form, $2 s(Q_1) - 2 s(\frac{Q_1 - Q}{2}) - 2 s(\frac{Q_1 + Q}{2})$, to 1.5 % of its
 #    largest value.
-# 4. Work of friction of the cycle is $D$ to 0.5 %.
+# 4. Frictional work of the cycle is $D$ to 0.5 %.
 
 
 # %%

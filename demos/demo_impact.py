@@ -31,7 +31,7 @@
 # $$ \Delta (T + U) = - T(\Delta v) - U(\Delta u) - \sum r_n\, g^k + \sum r_t \cdot \Delta w_t , $$
 #
 # in which no term is positive: the first two are the numerical dissipation of implicit Euler, the third is the energy lost by nodes
-# that land and had a gap $g^k$ before the step, the last is the work of friction.
+# that land and had a gap $g^k$ before the step, the last is the frictional work.
 #
 # ## Code
 #

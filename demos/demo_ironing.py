@@ -8,7 +8,7 @@
 # ## Notation
 #
 # $u$ displacement, $G = 1 + \nabla u$, $J = \det G$, $C = G^T G$; $\mu_i$, $\lambda_i$ moduli of stamp and block; $f$ friction; $N$ and $T$ the
-# forces of the block on the stamp, up and along the way; $s$ the way of the stamp's top; $D$ work of friction, $W$ elastic energy. Units: mm, N, MPa.
+# forces of the block on the stamp, up and along the way; $s$ the way of the stamp's top; $D$ frictional work, $W$ elastic energy. Units: mm, N, MPa.
 #
 # ## Strong form and balance
 #

@@ -28,7 +28,7 @@
 # $$ \int_\Omega \sigma(u) : \varepsilon(v) \,\mathrm{d}x = \sum_{\text{contact nodes}} r \cdot v, $$
 #
 # hexahedra of first order, one load step after another. With `--accuracy 0.01` they are of second order, and refined
-# until an estimate of the error of the forces and of the work of friction, extrapolated to small increments, is below one
+# until an estimate of the error of the forces and of the frictional work, extrapolated to small increments, is below one
 # per cent (`docs/study.md`).
 #
 # ## Code
@@ -101,7 +101,7 @@ def arguments(argv=None) -> argparse.Namespace:
     add("--unload-to", type=float, default=Parameters.unload_to, help="end of unloading, mm")
     add("--point", type=float, nargs=2, metavar=("X", "Y"), help="P, mm; 3/4 R at 45 degrees")
     add("--lowest", type=float, help="height of elements on the plane, mm; else all are as high")
-    add("--accuracy", type=float, metavar="PART", help="of work of friction and forces: mesh, order and increments are chosen, "
+    add("--accuracy", type=float, metavar="PART", help="of frictional work and forces: mesh, order and increments are chosen, "
         "--refine, --lowest and --solver are not used; estimated, see docs/study.md")  # fmt: skip
     add("--solver", choices=SOLVERS, default="auto", help="paper: fixed point with its own map")
     add("--json", type=Path, metavar="FILE", help="numbers of all steps; DIR/punch.json")
@@ -137,7 +137,7 @@ def main(argv=None) -> None:
         if accuracy is None:
             print(f"ParaView  {output / 'punch.pvd'}")
         else:
-            print("work of friction {dissipation:.2f} N mm, {increments:+.2f} of it for smaller increments, estimated error "
+            print("frictional work {dissipation:.2f} N mm, {increments:+.2f} of it for smaller increments, estimated error "
                   "{dissipation_error:.1e}, of forces {force_error:.1e}, {seconds:.3g} s".format(**numbers))  # fmt: skip
         if maps:
             title = "Punch, case {case}: $\\mu$ = {friction[mu]}, $p$ = {friction[p]}".format(**head)  # fmt: skip

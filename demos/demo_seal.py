@@ -25,7 +25,7 @@
 #
 # $$ N = \mathrm{d} E_s / \mathrm{d} \delta . $$
 #
-# With friction the work of the plate is the energy stored plus the work of friction.
+# With friction the work of the plate is the energy stored plus the frictional work.
 #
 # ## Weak form
 #

@@ -41,7 +41,7 @@
 # ## Code
 #
 # The block, the path, the closed form; `drag` moves the plane along the path. For each step it records the total
-# force, how far the total and the worst node are from the closed form, and the work of friction.
+# force, how far the total and the worst node are from the closed form, and the frictional work.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -115,7 +115,7 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
 # %% [markdown]
 # ## Result
 #
-# 1. At the end of each straight part every node has the closed form, and the work of friction of a step is
+# 1. At the end of each straight part every node has the closed form, and the frictional work of a step is
 #    $r_n\, |\Delta s|\, d \cdot P^2 d / |M^{-1} P^2 d|$, both to 1e-9.
 # 2. On the turn the total force never leaves the ellipse, and it lags behind the closed form by an error of first
 #    order in $\ell / |\Delta s|$: three depths, each half of the one before, have lags with a ratio of two. The lag

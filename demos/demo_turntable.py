@@ -87,7 +87,7 @@ def friction(problem):
 # 1. All nodes slide from the first turn on, and the sum of the normal reactions is the weight.
 # 2. At every node friction is along the motion of the plate there, to $10^{-3}$.
 # 3. The torque is $\mu N \bar r$ to 1 %.
-# 4. The work of friction of each further turn is $T \Delta\theta$ to 0.1 %.
+# 4. The frictional work of each further turn is $T \Delta\theta$ to 0.1 %.
 
 
 # %%

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
-STRAINED = 0.5  # mean strain above which linear elasticity says nothing
+STRAINED = 0.2  # mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth
 LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
 
 # What to do where a motion of a body that contact alone holds is undetermined.
@@ -203,7 +203,7 @@ def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3, told: 
     if len(where) <= told:
         return
     warnings.warn(
-        f"{len(where)} of {nodes} contact nodes, between {low} and {high}, are left out: boundary conditions give "
+        f"{len(where)} of {nodes} contact nodes, {f'at {low}' if low == high else f'between {low} and {high}'}, are left out: boundary conditions give "
         "their displacement along the normal, so that they cannot touch. Take their facets out of the contact, or "
         "them out of the conditions, if that is not meant.",
         stacklevel=level,
@@ -418,7 +418,7 @@ def check_size(body: BodyLike, x: np.ndarray, u: np.ndarray) -> bool:
         u: The same with those of ghosts.
     """
     largest = body.farthest(x)
-    if largest <= STRAINED * body.thickness:
+    if 2.0 * largest <= STRAINED * body.thickness:  # opposite faces may move against each other
         return False
     linear = "" if body.nonlinear else " (Elasticity is linear here.)"
     if largest > LARGE * body.extent:

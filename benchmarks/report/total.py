@@ -28,7 +28,7 @@ CAPTION = (
     "the pressure at the centre takes its place, with a limit from our two finest meshes."
 )
 QUANTITIES = dict(
-    normal="normal force, loaded", tangential="sum of tangential forces, loaded", dissipation="work of friction",
+    normal="normal force, loaded", tangential="sum of tangential forces, loaded", dissipation="frictional work",
     centre="pressure at the centre, loaded",
 )  # fmt: skip
 TOL = 1e-8
@@ -263,7 +263,7 @@ def tables(data):
     titles = dict(
         tol="tolerance, case C, n = 4, 30 increments",
         seconds="s",
-        dissipation="work of friction [N mm]",
+        dissipation="frictional work [N mm]",
     )
     yield chosen(data["tolerance"], titles)
     yield chosen(

@@ -643,11 +643,11 @@ class Contact(Guarded):
 
     @property
     def doubtful_work(self) -> float:
-        """Of the work of friction of the last step, on this rank: by how much slip that went straight on would have another one."""
+        """Of the frictional work of the last step, on this rank: by how much slip that went straight on would have another one."""
         return self._doubtful
 
     def _work(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Work of friction of the step along each principal direction, for its slip, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each."""
+        """Frictional work of the step along each principal direction, for its slip, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         if self._laws.begun is not None:
             start, end, turned = self._works(slip, self.reaction)
             return start + end, turned

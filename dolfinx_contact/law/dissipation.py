@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""Work of friction of a load step, node by node: never negative, exact for rigid sliding.
+r"""Frictional work of a load step, node by node: never negative, exact for rigid sliding.
 
 A node that slips along the unit vector ``e`` under the normal force N works ``N m(e)`` per way, with
 
@@ -33,7 +33,7 @@ def work_of_friction(
     slip_increment: np.ndarray,
     law_before: Friction | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Work of friction of one step along the principal friction directions, all entries >= 0, and what of it is owed to a turn.
+    """Frictional work of one step along the principal friction directions, all entries >= 0, and what of it is owed to a turn.
 
     Args:
         friction: The law.

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
-from dolfinx_contact.support.attributes import Guarded, frozen
+from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, number
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
@@ -25,6 +25,11 @@ Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not 
 OWNERS = ("body", "surface")  # of a texture
 
 _SMALLEST, _LARGEST = 1e-50, 1e50
+
+REMEDY = (
+    "a Friction is immutable: assign another one, contact.friction = dc.Friction(mu, p); with a pair for each contact node, mu "
+    "has shape (n, 2)."
+)
 
 # What stands for infinity: nodes slide only where their normal reaction is less than a ten-thousandth of the tangential one.
 # What nodes that are about to open make of it falls with 1 / ROUGH; solvers find states with them up to here at once, beyond it by luck.
@@ -205,8 +210,11 @@ class Friction(Guarded):
                 f"p/mu must not differ by more than {_LARGEST} between the two directions, "
                 f"but does with mu={given[0]!r}, p={given[1]!r}, k={given[2]!r}"
             )
-        self.mu, self.p = frozen(mu), frozen(q * mu)
-        self.axes = None if axes is None else _unit_vectors(axes, mu)
+        axes = None if axes is None else _unit_vectors(axes, mu)
+        self.mu, self.p, self.axes = (
+            whole(f"friction.{name}", array, REMEDY)
+            for name, array in (("mu", frozen(mu)), ("p", frozen(q * mu)), ("axes", axes))
+        )
         self.frictionless = not (mu > 0).any()
         self.associated = bool(np.all(q == 1.0))
         self.isotropic = self.associated and bool(np.all(mu[..., 0] == mu[..., 1]))

@@ -1,4 +1,4 @@
-"""Archard's wear law: worn depth from the work of friction per area."""
+"""Archard's wear law: worn depth from the frictional work per area."""
 
 from __future__ import annotations
 

@@ -17,6 +17,10 @@ STATUS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a"
 PIXELS, SMALLEST, LARGEST = 150.0, 4.0, 12.0
 
 
+# Part of a picture of a plane body that lies between the legend and the colour bar, or between top and bottom.
+BETWEEN = 0.75
+
+
 def body(seen: Any) -> pyvista.UnstructuredGrid:
     """The body, displaced."""
     kinds = {name: int(name[5:]) for name in seen if name.startswith("cells")}
@@ -38,7 +42,8 @@ def surface(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
 def draw(seen: Any, picture: str, title: str) -> None:
     plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 750))
     grid = body(seen)
-    bar = {"title": title, "vertical": True, "fmt": "%.3g", "position_y": 0.3, "color": "black"}
+    bar = {"title": f"{title}\n", "vertical": True, "fmt": "%.3g", "color": "black"}
+    bar |= {"position_x": 0.86, "position_y": 0.3, "title_font_size": 18, "label_font_size": 15}
     looks = {"color": "#d8d8d8"}
     if "colour" in seen:
         looks = {"scalars": seen["colour"], "lighting": False, "scalar_bar_args": bar}
@@ -67,6 +72,11 @@ def look(plotter: Any, grid: Any, up: np.ndarray) -> None:
     """The view: in the plane from before it, in space from below the contact and aside."""
     if not up.size:
         plotter.view_xy()
+        plotter.enable_parallel_projection()
+        low, high = np.reshape(plotter.bounds, (3, 2)).T
+        width, height = plotter.window_size
+        wide, high = (high - low)[:2]
+        plotter.camera.parallel_scale = 0.5 * max(high, wide * height / width) / BETWEEN
         return
     up = up / np.linalg.norm(up)
     aside = np.eye(3)[np.abs(up).argmin()]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3
 
-# Part of the work of friction that a step may leave unknown without a word.
+# Part of the frictional work that a step may leave unknown without a word.
 DOUBTFUL = 0.1
 
 
@@ -223,7 +223,7 @@ def warn_of_corners(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
     if doubtful <= DOUBTFUL * work:
         return False
     warnings.warn(
-        f"slip has turned in this step between directions of different friction, which leaves the work of friction unknown by {doubtful:.2g}, "
+        f"slip has turned in this step between directions of different friction, which leaves the frictional work unknown by {doubtful:.2g}, "
         f"{doubtful / work:.0%} of all so far: it counts as a part of a curve, a sharp corner has so much more or less. Divide the step that turns.",
         stacklevel=3,
     )

@@ -1,7 +1,7 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
 """What a step cannot see, told once a problem: surfaces between nodes, round bodies of straight cells, wear in leaps,
-contacts that are nowhere near their surface, linear bodies that turn.
+contacts that do not touch their surface, linear bodies that turn.
 
 Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
 nodes miss is an error of their forces of about ``kappa`` times that length.
@@ -104,6 +104,7 @@ class Unseen:
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._wavy = [c for c in self._between if getattr(c.surface, "height", None) is not None]
         self._leaps = self._apart = True  # to be looked at
+        self._approach = True  # whether the log has yet to say that no node touches
         self._near = [contact for contact in contacts if contact.surface.deformable]
         self._sided = self._near  # which side carries the unknowns is to be looked at
         self._held = self._near  # whether supports take friction from nodes
@@ -141,6 +142,7 @@ class Unseen:
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
             self._apart = not _check_apart(body, contacts)
+            self._approach = self._apart and self._approach and not _tell_gap(body, contacts)
 
     def _check_facets(self, u: np.ndarray, stiffness: dict[ContactLike, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
@@ -307,7 +309,7 @@ def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
 
 def _check_apart(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
     """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
-    smallest = -max(body.highest(-contact.gap) for contact in contacts)
+    smallest = _smallest_gap(body, contacts)
     if smallest > FAR * body.extent:
         warnings.warn(
             f"no node touches: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}. If that is not meant, "
@@ -338,6 +340,24 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
         stacklevel=4,
     )
     return True
+
+
+def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+    """Log by how much the nearest node misses its surface: on the way there no mistake, and no warning; whether it does.  Collective."""
+    smallest = _smallest_gap(body, contacts)
+    if smallest <= CLEAR * body.extent:
+        return False
+    if contacts[0].comm.rank == 0:
+        LOG.warning(
+            "no node touches yet: the smallest gap is %.3g, in a body of size %.3g",
+            smallest,
+            body.extent,
+        )
+    return True
+
+
+def _smallest_gap(body: BodyLike, contacts: Sequence[ContactLike]) -> float:
+    return -max(body.highest(-contact.gap) for contact in contacts)
 
 
 def _between(

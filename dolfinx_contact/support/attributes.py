@@ -25,10 +25,10 @@ class Whole(np.ndarray):
     ``surface.displacement += way`` assigns a new one.
     """
 
-    called: str = ""
+    said: str = ""  # what to do instead of setting an entry
 
     def __array_finalize__(self, source: object) -> None:
-        self.called = getattr(source, "called", "")
+        self.said = getattr(source, "said", "")
 
     def __array_wrap__(self, array: np.ndarray, context: Any = None, return_scalar: bool = False):
         return array[()] if array.ndim == 0 else array.view(np.ndarray)
@@ -37,15 +37,16 @@ class Whole(np.ndarray):
         if self.flags.writeable:  # a copy of it
             super().__setitem__(key, value)
             return
-        raise ValueError(
-            f"{self.called} is read-only, it is assigned as a whole: {self.called} = ..., or {self.called} += ... for all components."
-        )
+        raise ValueError(self.said)
 
     def __iadd__(self, other: Any):
         return super().__iadd__(other) if self.flags.writeable else self + other
 
     def __isub__(self, other: Any):
         return super().__isub__(other) if self.flags.writeable else self - other
+
+    def __imul__(self, other: Any):
+        return super().__imul__(other) if self.flags.writeable else self * other
 
     def copy(self, order: Any = "C") -> np.ndarray:
         """A plain array that may be changed."""
@@ -55,12 +56,15 @@ class Whole(np.ndarray):
         return repr(self.view(np.ndarray))
 
 
-def whole(name: str, array: np.ndarray | None) -> Any:
-    """A view of a read-only array that is the attribute ``name``; None stays None."""
+def whole(name: str, array: np.ndarray | None, instead: str = "") -> Any:
+    """A view of a read-only array that is the attribute ``name``, and says what to do instead of setting its entries; None stays None."""
     if array is None:
         return None
     view = array.view(Whole)
-    view.called = name
+    instead = (
+        instead or f"it is assigned as a whole: {name} = ..., or {name} += ... for all components."
+    )
+    view.said = f"{name} is read-only, {instead}"
     return view
 
 

@@ -210,7 +210,7 @@ class _Limit:
         return self._body.total(sum(normal @ axes[:, -1] for _, normal, axes in self._parts))
 
     def carried(self, way: np.ndarray) -> float:
-        """The most work of friction against a motion, per length.  Collective."""
+        """The most frictional work against a motion, per length.  Collective."""
         most = [np.zeros(1)]
         for friction, normal, axes in self._parts:
             slip = axes[:, :-1] @ way

@@ -229,7 +229,7 @@ def test_a_corner_that_leaves_work_unknown_is_told(law, turn):
     scene.problem.solve()
     scene.surface.displacement = (0.6 + 0.6 * np.cos(turn), 0.6 * np.sin(turn), 0)
     if turn and np.size(law["mu"]) == 2:
-        with pytest.warns(UserWarning, match="leaves the work of friction unknown by .*% of all"):
+        with pytest.warns(UserWarning, match="leaves the frictional work unknown by .*% of all"):
             scene.problem.solve()
     else:
         with warnings.catch_warnings():

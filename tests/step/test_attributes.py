@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """What a user sets is honoured, or refused at once with what to do; what was computed cannot be changed by accident."""
 
+import pickle
 import warnings
 from copy import copy
 
@@ -41,6 +42,26 @@ def test_a_plane_stays_what_it_was_made(name, value):
     if name != "frame":
         with pytest.raises(ValueError, match="read-only"):
             getattr(plane, name)[0] *= 10
+
+
+@pytest.mark.parametrize("mu", [0.3, (0.3, 0.2), np.full((3, 2), 0.3)])
+def test_an_entry_of_a_law_is_refused_with_what_to_do(mu):
+    """A Friction is immutable, its arrays too, and the message says to assign another one; copies and what is computed are plain arrays."""
+    law = dc.Friction(mu, axes=np.tile([1.0, 0.0], (3, 1)))
+    for name in ("mu", "p", "axes"):
+        array = getattr(law, name)
+        with pytest.raises(
+            ValueError, match=rf"friction.{name} is read-only, .* contact.friction = dc.Friction"
+        ):
+            array[...] = 0.5
+        for operation in ("__iadd__", "__isub__", "__imul__"):
+            with pytest.raises(
+                AttributeError, match=f"Friction.{name} cannot be set: it is immutable"
+            ):
+                setattr(law, name, getattr(array, operation)(2.0))
+        assert type(array * 2) is type(array.copy()) is np.ndarray
+    again = pickle.loads(pickle.dumps(law))
+    assert (again.mu == law.mu).all() and again.associated and not again.mu.flags.writeable
 
 
 def test_misspelt_attributes_are_refused():

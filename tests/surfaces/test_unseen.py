@@ -193,7 +193,7 @@ def test_a_round_body_that_is_round_at_its_nodes_has_the_pressure_of_lame(order,
 
 def test_straight_cells_are_good_enough_where_much_is_pressed_in():
     """The same nodes under an interference of many times what they stand off are no matter, nor is a flat foot."""
-    scene = ring(2, False, 0.15)
+    scene = ring(2, False, 0.05, (4, 24))
     scene.problem.solve()
     assert mean_pressure(scene.contact) == pytest.approx(scene.pressure, rel=0.1)
     flat = block(dc.RigidPlane((0, 0), (0, 1)), order=2, cells=[2, 2])
@@ -241,6 +241,18 @@ def test_a_surface_that_is_nowhere_near_is_told_once(d):
 
 
 @pytest.mark.parametrize("d", [2, 3])
+def test_a_surface_that_is_missed_is_a_line_of_the_log_once(d, caplog):
+    """Missed by a tenth of the body the surface may be on its way: no warning, but its gap, once; not where it touches at first, or with no gap."""
+    for begin, lines in (([0.1, 0.2, -0.01, 0.1], 1), ([-0.01, 0.1], 0), ([0.0, -0.01], 0)):
+        scene = block(dc.RigidPlane(np.zeros(d), np.eye(d)[-1]), cells=[2] * d)
+        caplog.clear()
+        for way in begin:
+            scene.step(*np.zeros(d - 1), way)
+        told = [line for line in caplog.messages if "no node touches" in line]
+        assert told == lines * (COMM.rank == 0) * ["no node touches yet: the smallest gap is 0.1, in a body of size 1"]  # fmt: skip
+
+
+@pytest.mark.parametrize("d", [2, 3])
 def test_a_normal_along_the_facets_is_told(d):
     """A plane whose normal is sideways: gaps along the foot, from zero on, and nothing that could close them."""
     scene = block(dc.RigidPlane(-0.5 * np.eye(d)[0], np.eye(d)[0]), cells=[2] * d)
@@ -252,14 +264,17 @@ def test_a_normal_along_the_facets_is_told(d):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", [1, 2])
 def test_strains_that_are_not_small_are_told_once(d, order):
-    """A block squeezed by 95 % in one step is strained by 95 %; moved as far without strain, or by a few per cent, it is not."""
-    plane = dc.RigidPlane(np.zeros(d), np.eye(d)[-1])
-    scene = block(plane, cells=[2] * d, order=order)
-    scene.step(*0.95 * np.eye(d)[0])
-    scene.step(*np.zeros(d - 1), -0.05)
-    with pytest.warns(UserWarning, match="the body is strained by 95%"):
-        scene.step(*np.zeros(d - 1), -0.95)
-    scene.step(*np.zeros(d - 1), -0.96)
+    """A block squeezed by a part is strained by as much, and told from a fifth on; moved as far without strain, or by less, it is not.
+
+    A linear strain e is half of e off the logarithmic one, as a part of it: a tenth at a fifth.
+    """
+    for part in (0.22, 0.45, 0.95):
+        scene = block(dc.RigidPlane(np.zeros(d), np.eye(d)[-1]), cells=[2] * d, order=order)
+        scene.step(*0.95 * np.eye(d)[0])
+        scene.step(*np.zeros(d - 1), -0.18)
+        with pytest.warns(UserWarning, match=f"the body is strained by {part:.0%}"):
+            scene.step(*np.zeros(d - 1), -part)
+        scene.step(*np.zeros(d - 1), -part - 0.01)
 
 
 def test_a_beam_bent_by_many_times_its_thickness_is_not_strained_much():
