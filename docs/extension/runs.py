@@ -51,7 +51,8 @@ def _run(parts: list[str], folder: Path, command) -> list[str]:
     )
     if done.returncode != 0:
         raise RuntimeError(f"{done.stdout[-500:]}\n{done.stderr[-3000:]}")
-    return [part.strip("\n") for part in done.stdout.split(END)]
+    printed = [part.strip("\n") for part in done.stdout.split(END)]
+    return printed + (len(parts) - len(printed)) * [""]  # it may end before its last block
 
 
 def without_words(text: str) -> str:

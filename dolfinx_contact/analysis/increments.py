@@ -29,7 +29,7 @@ EASY = 2
 
 def advance(
     problem: ContactProblem,
-    programme: Callable[[float], object],
+    load_history: Callable[[float], object],
     points: Sequence[float],
     *,
     start: float = 0.0,
@@ -45,7 +45,7 @@ def advance(
 
     Args:
         problem: The ContactProblem.  Collective.
-        programme: Function of a parameter, such as time, that sets loads, boundary values and planes.
+        load_history: Function of a parameter, such as time, that sets loads, boundary values and planes.
         points: Increasing values of the parameter.
         start: Value of the parameter in the problem's present state.
         smallest: Smallest increment, relative to the distance of its two points.
@@ -60,11 +60,11 @@ def advance(
         ValueError: points that do not increase.
 
     Example:
-        >>> def programme(t): held.value = (0, 0, -0.01 * t)
-        >>> table = dc.advance(problem, programme, points=[0.5, 1.0])
+        >>> def load_history(t): held.value = (0, 0, -0.01 * t)
+        >>> table = dc.advance(problem, load_history, points=[0.5, 1.0])
     """
     comm = problem.body.comm
-    ends, start, smallest = _checked(comm, programme, points, start, smallest, monitor)
+    ends, start, smallest = _checked(comm, load_history, points, start, smallest, monitor)
     history = History(problem) if history is None else history
     now = start
 
@@ -79,12 +79,12 @@ def advance(
 
     with progress_bar(comm.rank, ends[-1], start) as shown:
         for end in ends:
-            _in_increments(problem, programme, now, end, smallest, accepted)
+            _in_increments(problem, load_history, now, end, smallest, accepted)
     return history
 
 
 def _checked(
-    comm: MPI.Comm, programme: object, points: Any, start: Any, smallest: Any, monitor: object
+    comm: MPI.Comm, load_history: object, points: Any, start: Any, smallest: Any, monitor: object
 ) -> tuple[list, float, float]:
     """Points, start and smallest increment as numbers, the same on all ranks.  Collective."""
     with raised_together(comm):
@@ -92,8 +92,10 @@ def _checked(
         if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
             raise ValueError(f"points must rise from start = {start!r}, got {points!r}.")
         smallest = positive("smallest", smallest, finite=True)
-        if not callable(programme):
-            raise ValueError(f"programme must be a function of one number, got {programme!r}.")
+        if not callable(load_history):
+            raise ValueError(
+                f"load_history must be a function of one number, got {load_history!r}."
+            )
         if not (monitor is None or callable(monitor)):
             raise ValueError(
                 f"monitor must be a function of parameter and record, got {monitor!r}."
@@ -104,7 +106,7 @@ def _checked(
 
 def _in_increments(
     problem: ContactProblem,
-    programme: Callable,
+    load_history: Callable,
     now: float,
     end: float,
     smallest: float,
@@ -117,7 +119,7 @@ def _in_increments(
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
         with raised_together(problem.body.comm):
-            programme(at)
+            load_history(at)
         try:
             step = problem.solve()
         except NotConverged as failure:

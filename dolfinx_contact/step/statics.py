@@ -191,7 +191,7 @@ class Statics:
     def place(self) -> None:
         """Move the start until it touches, where it can.  Collective.
 
-        A linear programme for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
+        A linear program for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
         as near as they can be.
         """
         for contact in self._contacts:
@@ -390,7 +390,7 @@ def _cone_weights(
     ``scale`` is about that distance: SciPy compares with its tolerance what is not relative to it.
 
     By bounded least squares [P. B. Stark, R. L. Parker, Computational Statistics 10 (1995) 129]: SciPy's ``nnls`` is
-    another programme from release to release, and that of 1.15 stops early here.
+    another program from release to release, and that of 1.15 stops early here.
     """
     from scipy.optimize import lsq_linear  # of loose bodies alone
 

@@ -11,11 +11,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(rank: int, total: float, start: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """Context of a function that shows how far a programme is.
+    """Context of a function that shows how far a load history is.
 
     Args:
         rank: Of this process; rank 0 shows.
-        total: Where the programme ends.
+        total: Where it ends.
         start: Where it begins.
     """
     bar = None

@@ -76,6 +76,15 @@ def test_a_script_that_fails_is_seen(tmp_path):
     assert run(["x = 1\n", "print(x)\n"], tmp_path) == ["", "1"]
 
 
+def test_blocks_behind_the_end_of_a_script_print_nothing(tmp_path):
+    """Of a page whose script ends in its first block, as where a release lacks what it shows."""
+    assert run(["print(1)\nraise SystemExit\n", "print(2)\n", "print(3)\n"], tmp_path) == [
+        "1",
+        "",
+        "",
+    ]
+
+
 def test_reference_has_every_public_name():
     """Names of ``dolfinx_contact``, and of its rooms of arrays, and of the reference are the same."""
     listed = re.findall(

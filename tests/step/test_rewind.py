@@ -161,11 +161,11 @@ def test_a_step_that_no_increment_solves_is_raised():
         (dict(points=[0.0, 1.0]), "must rise"),
         (dict(points=[np.nan]), "NaN"),
         (dict(points=[1.0], smallest=0.0), "positive"),
-        (dict(points=[1.0], programme=None), "function"),
+        (dict(points=[1.0], load_history=None), "function"),
     ],
 )
 def test_nonsense_is_refused(arguments, message):
-    """Points that do not rise, and what is no programme."""
+    """Points that do not rise, and what is no function of one number."""
     scene = scenes.block(cells=(2, 2, 2))
     with pytest.raises(ValueError, match=message):
-        dc.advance(scene.problem, **{"programme": lambda t: None} | arguments)
+        dc.advance(scene.problem, **{"load_history": lambda t: None} | arguments)
