@@ -97,6 +97,7 @@ class NodalProblems:
         size = np.linalg.norm(left, axis=1)
         best, smallest = r, size
         halved, since = size, np.zeros(size.size, dtype=int)
+        spent = np.zeros(size.size, dtype=bool)  # sweeps from the best have not helped
         for _ in range(MOST):
             patience = np.where(size <= self._small(r, tol), AT_END, PATIENCE)
             goes_on = ~(size <= self._small(r, PART * tol)) & (since < patience)
@@ -108,7 +109,8 @@ class NodalProblems:
             trial_size = np.linalg.norm(trial_left, axis=1)
             stays = goes_on & ~(trial_size <= HELPS * size) & (since >= FREE)
             if stays.any():
-                swept = best
+                swept = np.where(spent[:, None], r, best)
+                spent = spent | stays
                 for _ in range(SWEEPS):
                     swept = self._swept(swept)
                 trial[stays] = swept[stays]
@@ -122,6 +124,7 @@ class NodalProblems:
             size = np.where(goes_on, trial_size, size)
             better = size < smallest
             best, smallest = np.where(better[:, None], r, best), np.where(better, size, smallest)
+            spent &= ~better
             helps = smallest <= HELPS * halved
             halved, since = np.where(helps, smallest, halved), np.where(helps, 0, since + 1)
         moved = times(self.stacked.transpose(0, 2, 1), best) - self._force
