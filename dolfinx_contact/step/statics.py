@@ -231,11 +231,12 @@ class Statics:
         sums = self._body.total(self._modes.T @ forces)
         return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
 
-    def _free_motions(self, step: StepLike, unfelt: float) -> np.ndarray:
+    def _free_motions(self, step: StepLike, x: np.ndarray, unfelt: float) -> np.ndarray:
         """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
 
         Args:
             step: The ``LoadStep``.
+            x: Displacement about as large as that of the present state: nodes pressed by no more than its rounding are not.
             unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
         """
         changed = [np.zeros((0, self._felt.size))]
@@ -244,7 +245,8 @@ class Statics:
             map = ReturnMap(of.normal, of.normal)
             state = contact.reaction, contact.gap, contact.slip_increment
             by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
-            by_motion[contact.reaction[:, -1] <= least] = 0.0
+            rounding = contact_rounding(contact, of, x)[:, -1]
+            by_motion[contact.reaction[:, -1] <= np.maximum(least, rounding)] = 0.0
             changed.append(
                 (by_motion @ contact.points.motion(self._modes)).reshape(-1, self._felt.size)
             )
@@ -258,7 +260,7 @@ class Statics:
 
     def slides(self, step: StepLike) -> bool:
         """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
-        motions = self._free_motions(step, SLIDING)
+        motions = self._free_motions(step, self.last, SLIDING)
         left, sizes = self._left()
         driven = (
             motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
@@ -357,7 +359,7 @@ class Statics:
         Raises:
             ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
         """
-        motions = self._free_motions(step, UNFELT)
+        motions = self._free_motions(step, x, UNFELT)
         if not motions.size:
             return x
         if choice == "refused":
