@@ -67,8 +67,8 @@ class Sampled:
     def solve(self, step):
         residual, self.samples, start = step.residual, [], process_time()
 
-        def noted(x, maps):
-            found = residual(x, maps)
+        def noted(*arguments):
+            found = residual(*arguments)
             self.samples.append((process_time() - start, found[1].largest))
             return found
 

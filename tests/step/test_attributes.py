@@ -171,7 +171,7 @@ def test_friction_that_does_not_fit_is_refused():
         scene.problem.solve()
     if COMM.size > 1:
         scene.contact.friction = dc.Friction(0.1 + 0.1 * COMM.rank)
-        with pytest.raises(ValueError, match="differ between ranks"):
+        with pytest.raises(ValueError, match="differs between ranks"):
             scene.problem.solve()
     assert np.array_equal(scene.u.x.array, u)
     scene.contact.friction = old
