@@ -58,7 +58,7 @@ def cone() -> None:
     for angle in np.linspace(0, 2 * np.pi, 25)[:-1]:
         edge = MU * [np.cos(angle), np.sin(angle)]
         axes.plot([0, edge[0]], [0, edge[1]], [0, 1], color=CONE, lw=0.5)
-    for end, name in (((0.45, 0, 0), "$r_x$"), ((0, 0.4, 0), "$r_y$"), ((0, 0, 1.25), "$r_n$")):
+    for end, name in (((0.45, 0, 0), "$r_x$"), ((0, 0.4, 0), "$r_y$"), ((0, 0, 1.15), "$r_n$")):
         axes.plot(*zip((0, 0, 0), end), color=INK, lw=1)
         axes.text(*(1.06 * np.array(end)), name, color=INK)
     force = 0.7 * np.array([MU[0] * np.cos(2.2), MU[1] * np.sin(2.2), 1])
@@ -67,9 +67,9 @@ def cone() -> None:
     axes.plot(*zip((0, 0, 0), (0.05, -0.02, 0.8)), color=SLIP, lw=2.2)
     axes.text(0.05, -0.02, 0.83, "$r$: stick", color=SLIP)
     axes.plot([0, MU[0]], [0, 0], [1, 1], color=INK, lw=0.8, ls="--")
-    axes.text(0.12, 0, 1.06, r"$\mu_x r_n$", color=INK)
+    axes.text(MU[0] + 0.02, 0, 1.0, r"$\mu_x r_n$", color=INK)
     axes.set(xlim=(-0.32, 0.32), ylim=(-0.32, 0.32), zlim=(0, 1.1))
-    axes.set_box_aspect((1, 1, 1.4), zoom=1.0)
+    axes.set_box_aspect((1, 1, 1.4), zoom=0.95)
     axes.view_init(18, -58)
     save(figure, "cone.svg")
 
@@ -89,7 +89,7 @@ def slip_rule() -> None:
             arrow(axes, force, force + 0.1 * against, SLIP, "")
         axes.set(xlim=(-0.44, 0.44), ylim=(-0.38, 0.3))
         axes_through_zero(axes, "$r_x$", "$r_y$")
-        axes.text(0, -0.36, title, color=INK, ha="center")
+        axes.set_title(title, color=INK, fontsize="medium", y=-0.06)
     save(figure, "slip_rule.svg")
 
 
