@@ -88,7 +88,10 @@ def _draw(path: Path, title: str, seen: dict[str, np.ndarray]) -> None:
         ]
         done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise RuntimeError(f"PyVista could not draw {path}: {done.stderr[-2000:]}")
+        missing = (
+            ": without a display VTK needs EGL, apt install libegl1" if "EGL" in done.stderr else ""
+        )
+        raise RuntimeError(f"PyVista could not draw {path}{missing}: {done.stderr[-2000:]}")
 
 
 def _seen(
