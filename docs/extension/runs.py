@@ -106,13 +106,11 @@ def show_outputs(app, page: str, source: list[str]) -> None:
         from sphinx.errors import ExtensionError  # tests of the scripts do without Sphinx
 
         raise ExtensionError(f"the script of {page} failed: {error}") from None
-    remaining = iter(outputs)  # fewer than blocks where a script ends early
+    remaining = iter(outputs)
 
     def with_output(match: re.Match) -> str:
         files = [folder / name for name in dict.fromkeys(PICTURE.findall(match.group(1)))]
-        return match.group(0) + shown(
-            next(remaining, ""), [file for file in files if file.exists()]
-        )
+        return match.group(0) + shown(next(remaining), [file for file in files if file.exists()])
 
     source[0] = BLOCK.sub(with_output, source[0])
 
