@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """solve_condensed on plain arrays: every answer is judged by NumPy code that shares nothing with it."""
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -251,8 +252,37 @@ def test_infeasible_raises():
     q[:, 2] = -1
     with pytest.raises(CondensedNotConverged, match="no solution") as caught:
         solve_condensed(W, q, Friction(0.3))
-    assert caught.value.best.error > 1e-3
+    assert caught.value.infeasible and caught.value.best.error > 1e-3
     assert {attempt.branch for attempt in caught.value.tried} >= {"newton", "proximal_point"}
+
+
+def squeezed(seed, contacts, rank, closing):
+    """W of a rank, whose null space has the pressures y >= 0 on half of the contacts; y . q = -closing."""
+    rng = np.random.default_rng(seed)
+    y = np.zeros((contacts, 3))
+    y[rng.permutation(contacts)[: 1 + contacts // 2], 2] = 1
+    y = y.ravel() * rng.uniform(0.3, 1, size=3 * contacts)
+    B = rng.normal(size=(3 * contacts, rank))
+    B -= np.outer(y, y @ B) / (y @ y)
+    q = rng.normal(size=3 * contacts)
+    return B @ B.T, (q - (closing + y @ q) / (y @ y) * y).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("unsymmetric", [0.0, 2.3e-16])
+def test_bodies_that_are_squeezed_are_refused_soon(unsymmetric):
+    """Gaps that no reaction opens are proved to have no solution, in few iterations; if the same pressures open them, nothing is claimed."""
+    for seed, contacts, rank in itertools.product(range(3), (2, 5, 20), ("contacts", "full")):
+        size = (seed, contacts, contacts if rank == "contacts" else 3 * contacts - 1)
+        W, q = squeezed(*size, closing=0.5)
+        W *= 1 + unsymmetric * np.random.default_rng(seed).integers(0, 3, size=W.shape)
+        with pytest.raises(CondensedNotConverged) as caught:
+            solve_condensed(W, q, Friction(0.3))
+        assert caught.value.infeasible and caught.value.best.iterations <= 200
+        W, q = squeezed(*size, closing=-0.5)
+        try:
+            solve_condensed(W, q, Friction(0.3))
+        except CondensedNotConverged as failure:
+            assert not failure.infeasible
 
 
 def test_a_limit_of_iterations_ends_a_refusal():

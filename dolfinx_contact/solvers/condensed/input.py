@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -87,6 +88,36 @@ def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
         turns[:, 0, 0], turns[:, 0, 1] = cos, sin
         turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
     return turns
+
+
+def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
+    """Whether it is proved that a gap is negative, whatever the reactions.
+
+    That is so if there are pressures ``y >= 0`` with ``W^T y = 0`` and ``q . y < 0``: then ``y . w = q . y + (W^T y) . r < 0`` (Farkas' lemma).
+    They are sought by nonnegative least squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974)].  What rounding leaves of
+    ``W^T y`` counts for reactions up to the largest that the kernel's judge takes for a solution.
+
+    Args:
+        W: ``shape=(dim n, dim n)``, with the normal component of a contact last.
+        q: ``shape=(n, dim)``.
+        tol: Largest error of a solution, relative to the load.
+    """
+    from scipy.optimize import nnls  # a large module, for what is refused alone
+
+    dim, gaps, eps = q.shape[1], q[:, -1], np.finfo(float).eps
+    columns = W[dim - 1 :: dim].T
+    sizes = [float(np.abs(part).max()) or 1.0 for part in (columns, gaps)]
+    system = np.vstack((columns / sizes[0], gaps / sizes[1]))
+    try:
+        y = nnls(system, -np.eye(len(system))[-1])[0]  # W^T y = 0 and q . y < 0
+    except RuntimeError:  # too many iterations
+        return False
+    own = W.diagonal()[dim - 1 :: dim]
+    own = np.maximum(own, 1e-12 * own.mean() or 1.0)  # as the kernel has it
+    load = np.linalg.norm(np.column_stack((q[:, :-1], np.minimum(gaps, 0))) / own[:, None])
+    moved = np.linalg.norm(columns @ y) + eps * np.linalg.norm(np.abs(columns) @ y)
+    allowed = math.sqrt(tol) * load * (own @ y)  # the judge would allow tol of it
+    return bool(-gaps @ y > moved * load / math.sqrt(eps) + allowed)
 
 
 def joint_friction(

@@ -8,6 +8,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.solvers.condensed.input import (
     checked_problem,
+    no_way_out,
     principal_axes,
 )
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
@@ -32,8 +34,16 @@ if TYPE_CHECKING:
 
 UNLIMITED = 200_000  # iterations; methods have limits of their own
 
-# Iterations by default for arrays: random problems with strong friction and crossed slip rules need up to some 6,000.
-USUAL = 20_000
+# Iterations by default for arrays, which need not have a solution: WORK over the unknowns squared, between both others.  Random problems of
+# up to 12 contacts, with strong friction and crossed slip rules, need up to some 6,500, of 156 piles of up to 300 contacts one more than 600.
+WORK, FEWEST, MOST = 9e6, 600, 7000
+
+# Iterations before it is asked whether there is a solution at all, and contacts up to which that takes less than a second.
+FIRST, PROVED = 100, 500
+
+# Where a smaller error is asked for: its steps below tol; how much of the next Newton step it must leave, rounding that forbids it, the
+# unknowns up to which all methods search again.
+NEARER, GAIN, NEAR_ROUNDING, SMALL = (1e-2, 1e-4), 0.1, 10, 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,21 +203,21 @@ def solve_condensed(
 
     Raises:
         ValueError: input that makes no sense.
-        CondensedNotConverged: no method reached ``tol``; has the best state.  ``CondensedNewton(max_iterations=200_000)`` searches longer.
+        CondensedNotConverged: no method reached ``tol``, or none can, ``failure.infeasible``; ``failure.best`` is the best state.
 
     Example:
         >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
         array([[-0.3,  1. ]])
     """
+    began = perf_counter()
     q, W, friction, r0 = checked_problem(q, W, friction, r0)
     solver, tol = _checked_options(solver, tol, max_seconds)
-    turns = principal_axes(friction, *q.shape)
-    starts = () if r0 is None else [_turned(r0.reshape(q.shape), turns)]
-    if friction.axes is not None:
-        W, q = _turned_matrix(W, turns), _turned(q, turns)
+    W, q, starts, turns = _along_axes(W, q, friction, r0)
     operator = condensed_operator(W, q.shape[1])
+    left = solver.max_seconds - (perf_counter() - began)  # copies of a large W take seconds
+    solver = replace(solver, max_seconds=max(left, 1e-9))
     try:
-        found = _usual(solver).solve_condensed(operator, friction, q, tol, starts)
+        found = _found(solver, operator, W, friction, q, tol, starts)
         return _turned_back(_nearer(solver, operator, friction, q, tol, found), turns)
     except CondensedNotConverged as failure:
         raise CondensedNotConverged(_turned_back(failure.best, turns)) from None
@@ -227,9 +237,37 @@ def _checked_options(
     return solver, tol
 
 
-def _usual(solver: CondensedNewton) -> CondensedNewton:
-    """The solver with the usual limit of iterations, if it has none."""
-    return replace(solver, max_iterations=solver.max_iterations or USUAL)
+def _along_axes(W: np.ndarray, q: np.ndarray, friction: Friction, r0: np.ndarray | None) -> tuple:
+    """``W``, ``q`` and starts along the principal axes of friction, and the turns to these."""
+    turns = principal_axes(friction, *q.shape)
+    starts = () if r0 is None else [_turned(r0.reshape(q.shape), turns)]
+    if friction.axes is not None:
+        W, q = _turned_matrix(W, turns), _turned(q, turns)
+    return W, q, starts, turns
+
+
+def _found(
+    solver: CondensedNewton,
+    operator: Any,
+    W: np.ndarray,
+    friction: Any,
+    q: np.ndarray,
+    tol: float,
+    starts: Sequence[np.ndarray],
+) -> CondensedResult:
+    """A solution.  Where few iterations find none, it is asked whether there is any before the search goes on."""
+    most = solver.max_iterations or min(MOST, max(FEWEST, int(WORK / q.size**2)))
+    problem = operator, friction, q, tol, starts
+    try:
+        return replace(solver, max_iterations=min(FIRST, most)).solve_condensed(*problem)
+    except CondensedNotConverged as failure:
+        best, left = failure.best, solver.max_seconds - failure.best.seconds
+        if left > 0 and len(q) <= PROVED and no_way_out(W, q, tol):
+            raise CondensedNotConverged(replace(best, branch="infeasible")) from None
+        if left <= 0 or best.iterations < FIRST or most <= FIRST:  # nothing else is to be tried
+            raise
+    # the same iterations once more, then others
+    return replace(solver, max_iterations=most, max_seconds=left).solve_condensed(*problem)
 
 
 def _nearer(
@@ -246,7 +284,7 @@ def _nearer(
     each other, those of some.  Large problems are not searched by all methods again: where W is rank deficient reactions
     stay open anyway.
     """
-    cheap = solver.fallbacks and q.size <= 100
+    cheap = solver.fallbacks and q.size <= SMALL
     most = min(solver.max_iterations or UNLIMITED, 100 * solver.newton_iterations)
     finer = replace(solver, slip_tol=None, fallbacks=cheap, max_iterations=most)
 
@@ -261,13 +299,13 @@ def _nearer(
         return replace(nearer, branch=found.branch, **both), done
 
     done = True
-    for factor in (1e-2, 1e-4):
-        if found.change <= tol or found.error <= 10 * found.rounding:
+    for factor in NEARER:
+        if found.change <= tol or found.error <= NEAR_ROUNDING * found.rounding:
             break
         if max(found.error, found.slip_error) > factor * tol:
             nearer, done = again(max(factor * tol, 1e-14))
             before, found = found, nearer if done else _better(nearer, found, tol)
-            if not done or found.change > 0.1 * before.change:  # no smaller error tells them
+            if not done or found.change > GAIN * before.change:  # no smaller error tells them
                 break
     if done and found.local_error > tol:
         nearer, done = again(tol, local_tol=tol)

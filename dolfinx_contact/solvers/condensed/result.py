@@ -39,7 +39,7 @@ class CondensedResult:
             nearest solution.  If W is ill conditioned, it is much larger than the error.  It says nothing about other solutions.
         iterations: Of all methods tried.
         seconds: Wall time of all methods tried.
-        branch: The method that gave the answer.
+        branch: The method that gave the answer; of a state that is no solution "", or "infeasible" if there is none.
         tried: All methods tried, in order.
         tied: Forces of the bilateral constraints of a kernel operator, if it has any.
 
@@ -70,6 +70,7 @@ class CondensedNotConverged(RuntimeError):
     Attributes:
         best: The ``CondensedResult`` of the smallest errors found; not a solution.
         tried: The methods tried, a tuple of ``Attempt``.
+        infeasible: Whether it is proved that there is no solution: whatever the reactions, a gap is negative.
 
     Example:
         >>> try:
@@ -80,6 +81,14 @@ class CondensedNotConverged(RuntimeError):
 
     def __init__(self, best: CondensedResult) -> None:
         self.best, self.tried = best, best.tried
+        self.infeasible = best.branch == "infeasible"
+        if self.infeasible:
+            super().__init__(
+                "no solution: whatever the reactions, the gaps of these contacts cannot all be zero or positive, since pressures on "
+                "some of them move nothing (W y = 0), while q closes their gaps (q . y < 0). Check the signs of the normal components of "
+                "q, and the motions that W leaves out."
+            )
+            return
         methods = ", ".join(f"{a.branch} ({a.iterations})" for a in best.tried)
         super().__init__(
             f"not converged: error {best.error:.3e}, slip error {best.slip_error:.3e} after "
