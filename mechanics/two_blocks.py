@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 from inspect import signature
+from types import SimpleNamespace
 
 import numpy as np
 import ufl
 from mpi4py import MPI
 
-import dolfinx_contact.compat as compat  # before DOLFINx, which one of its wheels needs
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
-from dolfinx import mesh
+from dolfinx import fem, mesh
 from dolfinx.mesh import CellType, create_mesh
+
+from dolfinx_contact import compat
+from mechanics.material import elasticity
 
 KINDS = {
     "triangle": CellType.triangle,
@@ -71,3 +75,54 @@ def pair(cell, cells, size=(1.0, 1.0), gap=0.0, comm=MPI.COMM_WORLD):
 
     ends = near(1.0 + gap), near(-1.0), near(gap, True), near(0.0, False)
     return domain, *ends, height > 0.0
+
+
+def build_two(
+    cell="quadrilateral", degree=1, cells=((4, 2), (5, 2)), moduli=(1.0, 1.0), E=210e3, nu=0.3, mu=0.3, p=None, size=(1.0, 1.0),
+    gap=0.0, shift=0.0, squeezed=1.0, radius=None, turn=None, length=1.0, swapped=False, sliding="large",
+):  # fmt: skip
+    """Linear elastic blocks of height one, the lower one from z = -1 to 0; its foot is held, ``move_top`` moves the head of the upper one.
+
+    Args:
+        moduli: Young's moduli of the upper and lower block over ``E``.
+        size: Edges of both along the interface.
+        gap: Between them; they overlap if it is negative.
+        shift: Of the upper block along the first axis.
+        squeezed: Factor of all heights: slender cells.
+        radius: Of the upper block's lower face.
+        turn: Rotation of the whole scene, ``shape=(d, d)``.
+        swapped: Whether the lower block is the slave.
+    """
+    domain, top, bottom, upper, lower, above = pair(cell, cells, size, gap, MPI.COMM_SELF)
+    d, x = domain.geometry.dim, domain.geometry.x
+    turn = np.eye(d) if turn is None else turn[:d, :d]
+    high = np.unique(compat.cell_points(domain)[: above.size][above])
+    if radius is not None:
+        off, height = x[high, 0] - size[1] / 2, x[high, d - 1] - gap
+        x[high, d - 1] += (1 - height) * off**2 / (2 * radius)
+    x[high, 0] += shift
+    x[:, d - 1] *= squeezed
+    x[:, :d] = length * x[:, :d] @ turn.T
+    V = compat.functionspace(domain, ("Lagrange", degree, (d,)))
+    u, v, held = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
+    modulus, moduli = fem.Function(compat.functionspace(domain, ("DG", 0))), E * np.array(moduli)
+    modulus.x.array[:] = np.where(above, *moduli)
+    F = elasticity(u, v, modulus, fem.Constant(domain, float(nu)))
+    dofs = [fem.locate_dofs_topological(V, d - 1, facets) for facets in (top, bottom)]
+    bcs = [fem.dirichletbc(held, dofs[0]), fem.dirichletbc(np.zeros(d), dofs[1], V)]
+    slave, master = (lower, upper) if swapped else (upper, lower)
+    surface = dc.DeformableSurface(V, master, axis=turn[:, 0] if d == 3 else None, sliding=sliding)
+    contact = dc.Contact(V, slave, surface, dc.Friction(mu, p))
+
+    height = length * squeezed
+
+    def move_top(way):
+        """By a displacement over the height of a block, scene's axes."""
+        held.x.array[:] = np.tile(height * turn @ np.array(way, dtype=float), held.x.array.size // d)  # fmt: skip
+
+    plain = nu == 0.0 and size[0] == size[1] and radius is None and shift == 0.0
+    return SimpleNamespace(
+        V=V, u=u, F=F, bcs=bcs, held=held, contact=contact, mesh=domain, slave=slave, master=master, turn=turn, length=length,
+        height=height, gap=gap * height, mu=mu, p=p, sliding=sliding, radius=radius, move_top=move_top, sign=-1.0 if swapped else 1.0,
+        moduli=moduli, thin=1 / squeezed**2, area=(length * size[0]) ** (d - 1), bars=moduli / height if plain else None,
+    )  # fmt: skip

@@ -21,6 +21,7 @@ from benchmarks.stress.matrix import SOLVERS, pairs
 from benchmarks.stress.picture import draw, summary
 from benchmarks.stress.rigs import corner_scenes, rig_scenes
 from benchmarks.stress.scenes import scenes, small
+from benchmarks.stress.two_bodies import pair_scenes
 
 SHOWN = ("outcome", "solver", "group", "name", "said", "error", "slip_error", "reactions")
 
@@ -29,7 +30,9 @@ def main(argv=None) -> list[dict]:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("results/stress"))
     parser.add_argument("--every", type=int, default=1, help="run every n-th scene only")
-    parser.add_argument("--group", help="scenes of this group only")
+    parser.add_argument(
+        "--group", default="", help="scenes of groups with names that begin so only"
+    )
     parser.add_argument("--solver", choices=SOLVERS, help="this solver only")
     parser.add_argument("--small", action="store_true", help="the same scenes on small bodies")
     options = parser.parse_args(argv)
@@ -38,9 +41,8 @@ def main(argv=None) -> list[dict]:
     log = options.output / f"{name}.jsonl"
     records = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {(r["group"], r["name"], r["solver"]) for r in records}
-    chosen = [
-        s for s in scenes() + rig_scenes() + corner_scenes() if options.group in (None, s.group)
-    ][:: options.every]
+    every = scenes() + rig_scenes() + corner_scenes() + pair_scenes()
+    chosen = [s for s in every if s.group.startswith(options.group)][:: options.every]
     if options.small:
         chosen = list(map(small, chosen))
     todo = [

@@ -13,6 +13,7 @@ import numpy as np
 import dolfinx_contact as dc
 from benchmarks.stress.rigs import CornerScene, RigScene
 from benchmarks.stress.scenes import Scene
+from benchmarks.stress.two_bodies import PairScene
 from mechanics import judge
 from mechanics.condensed import random_problem
 from mechanics.corners import build_corner
@@ -20,10 +21,13 @@ from mechanics.judge import Verdict
 from mechanics.judge_corners import CornerJudge
 from mechanics.judge_rigs import RigJudge
 from mechanics.judge_scene import SceneJudge
+from mechanics.judge_two_bodies import TwoBodiesJudge
 from mechanics.rigs import build_rig
 from mechanics.scenes import build, problem_of
+from mechanics.two_blocks import build_two
 
 REFUSALS = (dc.NotConverged, dc.CondensedNotConverged, dc.LinearSolverError, ValueError)
+GEOMETRY = 1e-6  # of faces that move: below what they are judged by
 SOLVERS = {
     "default": lambda: None,
     "condensed": lambda: dc.CondensedNewton(max_seconds=30),
@@ -45,6 +49,7 @@ def run(scene: Scene, solver) -> dict:
     steps = condensed_steps if scene.condensed else body_steps
     steps = rig_steps if isinstance(scene, RigScene) else steps
     steps = corner_steps if isinstance(scene, CornerScene) else steps
+    steps = pair_steps if isinstance(scene, PairScene) else steps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dc.RoundingWarning)
         for verdict, step, method in steps(scene, solver, record):
@@ -154,6 +159,22 @@ def corner_steps(scene: CornerScene, solver, record):
             return refuse(record, said)
         method = step.tried[-1].branch if step.tried else step.solver.split()[0]
         yield of.verdict(), step, method
+
+
+def pair_steps(scene: PairScene, solver, record):
+    """As ``body_steps``, of two deformable bodies."""
+    built = build_two(**scene.body)
+    of = TwoBodiesJudge(built)
+    problem = problem_of(built, solver, scene.tol, geometry_tol=GEOMETRY)
+    for way in scene.tops:
+        built.move_top(way)
+        try:
+            step = problem.solve()
+        except REFUSALS as said:
+            return refuse(record, said)
+        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+        admitted = max(GEOMETRY, step.geometry_error) if built.sliding == "large" else 0.0
+        yield of.verdict(-way[-1] * built.height, scene.tol, admitted), step, method
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:

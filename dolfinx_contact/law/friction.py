@@ -162,7 +162,7 @@ class Friction(Guarded):
         laws that returns a ``Friction``.
 
         Args:
-            first, second: Laws of numbers or of arrays per node, no fields; a number is isotropic friction.
+            first, second: Laws of numbers or of arrays per node; a number is isotropic friction.  Of a field pair what ``contact.friction`` has made of it.
             angle: From the first principal direction of the first side to that of the second, in radians about the normal.  Where bodies turn against each other, assign
                 the pair anew between steps.
 
@@ -177,7 +177,10 @@ class Friction(Guarded):
         first, second = as_friction(first), as_friction(second)
         for law in (first, second):
             if not isinstance(law, Friction) or law.field:
-                raise ValueError(f"of_pair takes laws of numbers or arrays per node, not {law!r}.")
+                raise ValueError(
+                    f"of_pair takes laws of numbers or arrays per node, not {law!r}: give a field to the contact first, whose contact.friction "
+                    "has the values at its nodes, and pair that."
+                )
         turned = float(number("angle", angle))
         sides = [(law.mu, law.Q, by + _angle(law.axes)) for law, by in ((first, 0.0), (second, turned))]  # fmt: skip
         mu, p, axes = mean(*sides)

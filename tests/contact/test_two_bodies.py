@@ -145,6 +145,14 @@ def test_two_textures_work_as_the_mean(along, angle):
     assert done == pytest.approx(np.mean(works) * (pressed + force[2]) / 2 * 0.2, rel=1e-3)
 
 
+def test_a_field_is_paired_by_its_values():
+    """What a contact has made of a field at its nodes pairs with the other side's number: the mean of both, node by node."""
+    contact = blocks("quadrilateral", 1, ((4, 2), (5, 2))).contact
+    contact.friction = dc.Friction(lambda x: 0.2 + 0.1 * x[0])
+    contact.friction = dc.Friction.of_pair(contact.friction, 0.1)
+    assert contact.friction.mu[:, 0] == pytest.approx(0.15 + 0.05 * contact.x[:, 0], rel=1e-12)
+
+
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
 @pytest.mark.parametrize("weight", ["2 pi r", "callable", "thickness"])
 def test_an_even_pressure_of_weighted_forms(weight, swapped):

@@ -12,7 +12,9 @@ from benchmarks.stress import matrix as stress
 from benchmarks.stress.scenes import LAWS
 from mechanics.judge import Verdict
 from mechanics.judge_scene import SceneJudge
-from mechanics.scenes import build
+from mechanics.judge_two_bodies import TwoBodiesJudge
+from mechanics.scenes import build, problem_of
+from mechanics.two_blocks import build_two
 
 TOL = 1e-8
 
@@ -60,6 +62,40 @@ def test_negative_moduli_are_refused_or_rejected():
     found = of.verdict(TOL)
     assert found.notes and not found.accepts(TOL)
     assert found.excess("normal") > 1e-2
+
+
+@pytest.mark.parametrize(
+    "way, defect", [((0.0, 0.0), ""), ((0.0, -1e-3), "normal"), ((0.0, 1e-3), "normal"), ((1e-3, 0.0), "slip")]
+)  # fmt: skip
+def test_bodies_moved_rigidly_are_rejected(way, defect):
+    """What the library found for two bodies is accepted; the upper one moved as a whole has its forces, but presses at a distance or slips where it sticks."""
+    built = build_two(gap=1e-3, moduli=(1.0, 3.0))
+    of, problem = TwoBodiesJudge(built), problem_of(built, tol=TOL, geometry_tol=1e-6)
+    for aside in (0.0, 2e-4):
+        built.move_top((aside, -0.01))
+        problem.solve()
+        if not aside:
+            assert of.verdict(0.01, TOL, 1e-6).accepts(TOL)
+    upper = built.V.tabulate_dof_coordinates()[:, 1] > 5e-4
+    for u in (built.u, built.held):
+        u.x.array.reshape(-1, 2)[upper] += way
+    found = of.verdict(0.01, TOL, 1e-6)
+    assert found.accepts(TOL) == (not defect)
+    assert not defect or found.excess(defect) > 1e-3
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.999])
+def test_friction_of_two_bodies_beyond_the_cone_is_rejected(factor):
+    """Of bodies that slide, with a coefficient that the judge takes to be smaller by a thousandth."""
+    built = build_two(sliding="small")
+    problem = problem_of(built, tol=TOL)
+    built.mu *= factor
+    of = TwoBodiesJudge(built)
+    for aside in (0.0, 0.03):
+        built.move_top((aside, -0.01))
+        problem.solve()
+        found = of.verdict(0.01, TOL)
+    assert found.accepts(TOL) == (factor == 1.0)
 
 
 def outcome(excess, step_error):

@@ -8,6 +8,7 @@ from benchmarks.stress import matrix as stress
 from benchmarks.stress.__main__ import main
 from benchmarks.stress.rigs import rig_scenes
 from benchmarks.stress.scenes import hard_scenes, scenes, small
+from benchmarks.stress.two_bodies import pair_scenes
 
 LONG = ("six cycles", "1000 tiny steps")
 # Four solutions are known, and rounding decides whether a start leads to one, see docs/solvers.md.
@@ -39,6 +40,20 @@ def test_default_solves_or_says_so(scene):
 def test_default_solves_rigs(scene):
     """Surfaces that force drives: the judge confirms body, contact and the balance of the surface."""
     assert stress.run(scene, None)["outcome"] == "solved"
+
+
+@pytest.mark.parametrize(
+    "scene", pair_scenes()[::13], ids=lambda scene: f"{scene.group}: {scene.name}"
+)
+def test_default_solves_two_bodies(scene):
+    """Two deformable bodies: the judge confirms forces by the form, and gaps and slips by the moved faces."""
+    assert stress.run(scene, None)["outcome"] == "solved"
+
+
+def test_there_are_enough_pairs():
+    """At least 120, no two alike."""
+    every = pair_scenes()
+    assert len(every) >= 120 and len({(s.group, s.name) for s in every}) == len(every)
 
 
 def test_there_are_enough_rigs():
