@@ -18,7 +18,7 @@ COMMANDS = {
 # Themes of the index and their demos, the picture that says most first.
 THEMES = {
     "The paper's punch": ("punch", "quarter_punch", "own_loop"),
-    "Pressed": ("hertz", "ball_on_flat", "press_fit", "grooves"),
+    "Pressed": ("hertz", "ball_on_flat", "press_fit", "conforming_pin", "grooves"),
     "Partial slip, fretting, wear": ("partial_slip", "two_cylinders", "dead_weight", "fretting", "wear"),
     "Sliding": ("turning_path", "turntable", "impact"),
     "Held by contact alone": ("pushed_cube", "box", "v_groove"),
