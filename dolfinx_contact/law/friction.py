@@ -184,9 +184,9 @@ class Friction(Guarded):
         turned = float(number("angle", angle))
         sides = [(law.mu, law.Q, by + _angle(law.axes)) for law, by in ((first, 0.0), (second, turned))]  # fmt: skip
         mu, p, axes = mean(*sides)
+        straight = bool((axes[..., 0] == 1.0).all())
         if axes.ndim == 2:
-            return Friction(np.broadcast_to(mu, axes.shape), np.broadcast_to(p, axes.shape), axes=axes)  # fmt: skip
-        straight = axes[0] == 1.0
+            return Friction(np.broadcast_to(mu, axes.shape), np.broadcast_to(p, axes.shape), axes=None if straight else axes)  # fmt: skip
         return Friction(mu, p, axes=None if straight else _Direction(axes))
 
     def _take(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
