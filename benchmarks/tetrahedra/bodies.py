@@ -53,7 +53,7 @@ class Body:
         free[body.fixed] = False
         points = ContactPoints(dofs, np.tile(frame, (len(nodes), 1, 1)), owned)
         rows = points.rows(np.tile(np.eye(3), (len(nodes), 1, 1)), free)
-        self._rows = Rows(body.comm, rows, 0, body.size)
+        self._rows = Rows(body.comm, *rows, 0, body.size)
         self.S, self._body = compliance(body, [self._rows]), body
         self.unknowns, self.seconds = body.size, process_time() - start
 

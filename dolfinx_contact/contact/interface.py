@@ -60,11 +60,14 @@ class ContactPoints:
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
         self.local, self.alone = m is None, np.zeros(self.count, dtype=bool)
+        self._sums = sparse.csr_matrix((np.ones(dofs.size), dofs.ravel(), np.arange(dofs.size + 1)), (dofs.size, size))  # fmt: skip
         columns = np.repeat(dofs, self.dim, axis=0).ravel()
         starts = np.arange(0, frames.size + 1, self.dim)
         self.B = self.S = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
         if m is not None:
-            self.B, self.S = self._of_several(m), self._of_several(s)
+            frame, S = block_diagonal(frames), self._of_several(s)
+            self._sums = self._of_several(m)
+            self.B, self.S = (frame @ self._sums).tocsr(), (frame @ S).tocsr()
             self.alone = m.tocsr().getnnz(axis=1) == 0
         self._forces = self.B.T.tocsr()
         self._magnitudes, self._sizes = abs(self.B), abs(self._forces)
@@ -73,13 +76,8 @@ class ContactPoints:
         )
 
     def _of_several(self, coefficients: sparse.spmatrix) -> sparse.csr_matrix:
-        """Local components of sums over the points' own nodes, ``shape=(n gdim, size)``."""
-        columns, starts = self.dofs.ravel(), np.arange(self.dofs.size + 1)
-        nodes = sparse.csr_matrix(
-            (np.ones(columns.size), columns, starts), (columns.size, self.size)
-        )
-        sums = sparse.kron(coefficients, sparse.eye(self.dim), "csr")
-        return (block_diagonal(self.frames) @ sums @ nodes).tocsr()
+        """Global components of sums over the points' own nodes, ``shape=(n gdim, size)``."""
+        return (sparse.kron(coefficients, sparse.eye(self.dim), "csr") @ self._sums).tocsr()
 
     def hold(
         self,
@@ -170,20 +168,24 @@ class ContactPoints:
         columns = product.indices + self.first
         return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
 
-    def rows(self, turns: np.ndarray, free: np.ndarray) -> sparse.csr_matrix:
-        """Rows of ``B`` along other directions of each point, columns in global numbers.
+    def rows(self, turns: np.ndarray, free: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
+        """Rows of ``B`` along other directions of each point: the product of these and of sums of displacements of nodes.
 
         Args:
             turns: The directions, local components, ``shape=(n, k, gdim)``.
             free: Which owned degrees of freedom count, booleans.
+
+        Returns:
+            ``shape=(n k, n gdim)`` and ``(n gdim, dofs)``, these in global numbers.
         """
-        B = self.B.copy()
-        B.data *= free[B.indices]
-        kept = (block_diagonal(turns) @ B).tocsr()
+        sums = self._sums.copy()
+        sums.data *= free[sums.indices]
+        directions = turns @ self.frames
+        kept = block_diagonal(directions) @ sums
         fixed = np.sqrt(kept.multiply(kept).sum(axis=1)) < FREE  # but for rounding
-        kept.data[np.repeat(np.ravel(fixed), np.diff(kept.indptr))] = 0.0
-        columns = kept.indices + self.first
-        return sparse.csr_matrix((kept.data, columns, kept.indptr), (kept.shape[0], self._whole))
+        directions[np.reshape(fixed, directions.shape[:2])] = 0.0
+        numbers = sums.data, sums.indices + self.first, sums.indptr
+        return block_diagonal(directions), sparse.csr_matrix(numbers, (sums.shape[0], self._whole))
 
     @property
     def reach(self) -> np.ndarray:

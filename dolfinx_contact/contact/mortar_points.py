@@ -157,8 +157,12 @@ class MortarPlacement(Placement):
 
     def begin(self, start: np.ndarray) -> None:
         """A step begins at a displacement, and its first rows are no renewal."""
+        (key, last), self._began = self._projected, None
+        known = last is not None and np.array_equal(key[: start.size], start)
+        if self._comm.allreduce(known, op=MPI.LAND):
+            self._began = last.points.turns
         self._start, self._used, self._renewed = start, self.settled.points, -1
-        self._left[:], self._leaving, self._began = False, False, None
+        self._left[:], self._leaving = False, False
 
     def carried(self, last: State) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
@@ -448,9 +452,11 @@ class MortarPoints(ContactPoints):
         counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
         ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
         at = np.arange(rows.size) - np.repeat(ends - counts - np.repeat(starts[:-1], self.dim), counts)  # fmt: skip
-        B = values[at, None] * frames.reshape(-1, self.dim)[rows]
-        columns = np.concatenate((self.first + dofs, opposite))[nodes[at]]
-        self._B = self._petsc(self.dim * np.append(0, ends), columns.ravel(), B)
+        values, columns = values[at], np.concatenate((self.first + dofs, opposite))[nodes[at]]
+        B = values[:, None] * frames.reshape(-1, self.dim)[rows]
+        starts = np.append(0, ends)
+        self._B = self._petsc(self.dim * starts, columns.ravel(), B)
+        self._sums = values, columns[np.arange(rows.size), rows % self.dim], starts
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
@@ -532,19 +538,17 @@ class MortarPoints(ContactPoints):
             matrix.destroy()
         return sparse.csr_matrix((values, columns, starts), (self.size, self._whole))
 
-    def rows(self, turns: np.ndarray, free: np.ndarray) -> sparse.csr_matrix:
-        """See ``ContactPoints``."""
-        kept, weights = self._B.copy(), self._body.duplicate()
-        weights.array_w[:] = free
-        kept.diagonalScale(None, weights)
-        starts, columns, values = kept.getValuesCSR()
-        kept.destroy()
-        weights.destroy()
-        B = sparse.csr_matrix((values, columns, starts), (self.dofs.size, self._whole))
-        own = np.linalg.norm(turns @ self.frames * free[self.dofs][:, None, :], axis=2)
-        out = (own < FREE) | self.closed[:, None]  # held: then what opposite nodes do is carried
-        own = np.where(out, 0.0, 1.0).ravel()
-        return (sparse.diags(own) @ block_diagonal(turns) @ B).tocsr()
+    def rows(self, turns: np.ndarray, free: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
+        """See ``ContactPoints``.  Collective."""
+        directions = turns @ self.frames
+        own = np.linalg.norm(directions * free[self.dofs][:, None, :], axis=2)
+        # Held: then what opposite nodes do is carried.
+        directions[(own < FREE) | self.closed[:, None]] = 0.0
+        values, columns, starts = self._sums
+        held = np.concatenate(self._comm.allgather(self.first + np.flatnonzero(~free)))
+        values = np.where(np.isin(columns, held), 0.0, values)
+        sums = sparse.csr_matrix((values, columns, starts), (self.dofs.size, self._whole))
+        return block_diagonal(directions), sums
 
     @property
     def reach(self) -> np.ndarray:

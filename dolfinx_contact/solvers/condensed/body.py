@@ -19,10 +19,12 @@ from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Responses,
     Rows,
+    along_diagonal,
     available_first,
     bytes_needed,
     check_memory,
     compliance,
+    one_below_other,
     tie,
 )
 from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
@@ -116,7 +118,9 @@ class BoundCondensedNewton:
                     W = self._surfaces.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
-                self.operator.prepare()  # pays after some ten iterations
+                slides = any(c.changes and c.surface.deformable for c in contacts)
+                if not slides:  # else the next solution has other rows
+                    self.operator.prepare()  # pays after some ten iterations
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
         self._scales = self._gathered_stiffness(stiffness) | {
             "tied_stiffness": np.append(a, np.ones(driven))
@@ -289,7 +293,7 @@ class BoundCondensedNewton:
         made, kept = self._memory.get("responses", (None, None))
         if made != self._body.assemblies:
             reach = [contact.points.reach for contact in self._contacts]
-            anchored = self._parts[1].all.indices
+            anchored = self._parts[1].sums.indices
             kept = Responses(np.unique(np.concatenate([*self.comm.allgather(np.concatenate(reach)), anchored])))  # fmt: skip
             self._memory["responses"] = self._body.assemblies, kept
         return kept
@@ -299,13 +303,15 @@ class BoundCondensedNewton:
         gdim, body = self._contacts[0].points.dim, self._body
         free = np.ones(body.size, dtype=bool)
         free[body.fixed] = False
-        rows, turns = [], []
+        turns, rows = [], []
         for contact, law in zip(self._contacts, self._laws):
             points = contact.points
             turns.append(principal_axes(law, points.count, gdim)[:, -self.dim :])
             rows.append(points.rows(turns[-1], free))
         self._turns = np.concatenate(turns)
-        return Rows(self.comm, sparse.vstack(rows), points.first, body.size)
+        directions, sums = zip(*rows)
+        both = along_diagonal(directions), one_below_other(sums)
+        return Rows(self.comm, *both, points.first, body.size)
 
     def _prescribed(self) -> tuple[np.ndarray, np.ndarray]:
         """Tangential rows of nodes that supports move in one direction, and that direction's dyads, in the order of rows."""
@@ -325,7 +331,8 @@ class BoundCondensedNewton:
         dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
         size, first, whole = self._body.displacements.owned
         rows = (np.ones(dofs.size), first + dofs, np.arange(dofs.size + 1))
-        return Rows(self.comm, sparse.csr_matrix(rows, (dofs.size, whole)), first, size)
+        sums = sparse.csr_matrix(rows, (dofs.size, whole))
+        return Rows(self.comm, sparse.eye(dofs.size, format="csr"), sums, first, size)
 
     def _motion(self, step: StepLike, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,21 +30,33 @@ class Rows:
 
     Args:
         comm: MPI communicator.
-        rows: This rank's, sparse, columns in global numbers of degrees of freedom.  Collective.
+        directions: This rank's are the product of these, sparse, ``shape=(k, l)``, and of ``sums``.
+        sums: Sparse, ``shape=(l, dofs)``, columns in global numbers of degrees of freedom.  Collective.
         first: Global number of this rank's first degree of freedom.
         owned: Number of its degrees of freedom.
     """
 
-    def __init__(self, comm: MPI.Comm, rows: sparse.csr_matrix, first: int, owned: int):
-        self.comm = comm
-        self.all = sparse.vstack(comm.allgather(rows)).tocsr()
-        self.size = self.all.shape[0]
-        self._mine = self.all[:, first : first + owned].tocsr()
-        self._forces = self._mine.T.tocsr()
+    def __init__(self, comm: MPI.Comm, directions: sparse.csr_matrix, sums: sparse.csr_matrix, first: int, owned: int):  # fmt: skip
+        if directions.shape[0] < directions.shape[1]:  # fewer products
+            directions, sums = (
+                sparse.eye(len(directions.indptr) - 1, format="csr"),
+                directions @ sums,
+            )
+        self.comm, self.directions, self.sums = comm, directions, sums
+        if comm.size > 1:
+            directions, sums = zip(*comm.allgather((directions, sums)))
+            self.directions, self.sums = along_diagonal(directions), one_below_other(sums)
+        self.size = self.directions.shape[0]
+        self._mine = self.sums[:, first : first + owned] if comm.size > 1 else self.sums
+
+    @property
+    def all(self) -> sparse.csr_matrix:
+        """All of them, columns in global numbers of degrees of freedom."""
+        return (self.directions @ self.sums).tocsr()
 
     def part(self, u: np.ndarray) -> np.ndarray:
         """What this rank's displacements, ``shape=(dofs, ...)``, add to the values of all rows."""
-        return self._mine @ u
+        return self.directions @ (self._mine @ u)
 
     def of(self, u: np.ndarray) -> np.ndarray:
         """Values of all rows for displacements of owned dofs, on all ranks.  Collective."""
@@ -51,7 +64,7 @@ class Rows:
 
     def add_forces(self, force: np.ndarray, forces: np.ndarray) -> None:
         """Add what a force on each row is on owned degrees of freedom."""
-        forces += self._forces @ force
+        forces += self._mine.T @ (self.directions.T @ force)
 
     def gather(self, local: np.ndarray) -> np.ndarray:
         """Values that ranks have for their own rows, on all ranks.  Collective."""
@@ -84,6 +97,18 @@ def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
     return W
 
 
+def one_below_other(parts: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
+    """Sparse matrices one below the other; none is copied if the others have no rows."""
+    some = [part for part in parts if part.shape[0]] or parts[:1]
+    return some[0] if len(some) == 1 else sparse.vstack(some).tocsr()
+
+
+def along_diagonal(parts: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
+    """Sparse matrices along a diagonal; none is copied if the others have no rows."""
+    some = [part for part in parts if part.shape[0]] or parts[:1]
+    return some[0] if len(some) == 1 else sparse.block_diag(some, "csr")
+
+
 class Responses:
     """``A^-1`` between the degrees of freedom that rows may ever have, solved for a block of columns at a time when rows need it.
 
@@ -99,7 +124,7 @@ class Responses:
 
     def needed(self, rows: list[Rows]) -> list[int]:
         """Blocks that these rows need."""
-        dofs = np.concatenate([part.all.indices for part in rows])
+        dofs = np.concatenate([part.sums.indices for part in rows])
         return np.unique(np.searchsorted(self.dofs, dofs) // _COLUMNS).tolist()
 
     def bytes_needed(self, rows: list[Rows]) -> int:
@@ -107,20 +132,22 @@ class Responses:
         return 8 * self.dofs.size * _COLUMNS * len(self._solved.union(self.needed(rows)))
 
     def compliance(self, solver: Any, rows: list[Rows]) -> np.ndarray:
-        """As the function of this name."""
+        """As the function of this name: sums of displacements first, which have few entries, then their directions."""
         comm, needed = rows[0].comm, self.needed(rows)
         self._solve(solver, comm, [k for k in needed if k not in self._solved])
         if comm.rank > 0:
             return np.zeros((0, 0))
-        loads = sparse.vstack([part.all for part in rows]).tocsr()
-        size, at = loads.shape[0], np.searchsorted(self.dofs, loads.indices)
-        R = sparse.csr_matrix((loads.data, at, loads.indptr), (size, self.dofs.size))
-        moved = np.zeros((len(needed) * _COLUMNS, size))  # rows by unit forces at what they need
+        sums = one_below_other([part.sums for part in rows])
+        directions = along_diagonal([part.directions for part in rows])
+        size, at = sums.shape[0], np.searchsorted(self.dofs, sums.indices)
+        R = sparse.csr_matrix((sums.data, at, sums.indptr), (size, self.dofs.size))
+        moved = np.zeros((len(needed) * _COLUMNS, size))  # sums by unit forces at what they need
         for k, first in zip(needed, range(0, len(moved), _COLUMNS)):
             block = self._blocks[k]
             moved[first : first + block.shape[1]] = (R @ block).T
         at = np.searchsorted(needed, at // _COLUMNS) * _COLUMNS + at % _COLUMNS
-        W = sparse.csr_matrix((loads.data, at, loads.indptr), (size, len(moved))) @ moved
+        W = sparse.csr_matrix((sums.data, at, sums.indptr), (size, len(moved))) @ moved
+        W = directions @ (directions @ W).T
         return (W + W.T) / 2
 
     def _solve(self, solver: LinearSolver, comm: MPI.Comm, blocks: list[int]) -> None:
