@@ -29,7 +29,8 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # and easy steps are nearly over. Where that does not converge it is tried SOONER: the second number. If the error
 # then grows by more than GROWTH, it was too early; if it is still more than USELESS of what it was when the next one is due,
 # the iterations until then do without.
-EVERY, SOONER, GROWTH, USELESS = 20, 10, 100.0, 0.9
+# Near a start whose error is less than NEAR, as of a step that is repeated, most nodes have theirs.
+EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, 100.0, 0.9, 0.1
 
 # Of a loose body, which may slide away, the error has to halve within so many iterations.
 PATIENCE = 60
@@ -172,8 +173,10 @@ class BoundFixedPoint:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
         patience = math.inf if search.step.statics is None else PATIENCE
         search.begin(self._options.max_iterations, patience)
+        near = NEAR
         while search.goes_on:
-            self._accelerate(search, self._set(factor), search.best, every)
+            self._accelerate(search, self._set(factor), search.best, every, near)
+            near = 0.0
 
     def _set(self, factor: float) -> list:
         """The maps with a rho, and a preconditioner that belongs to them."""
@@ -188,9 +191,9 @@ class BoundFixedPoint:
         return maps
 
     def _accelerate(
-        self, search: Search, maps: Sequence[MapLike], x: np.ndarray, every: int
+        self, search: Search, maps: Sequence[MapLike], x: np.ndarray, every: int, near: float
     ) -> None:
-        """Anderson's method from ``x``, until the search ends or a tangent misleads."""
+        """Anderson's method from ``x``, until the search ends or a tangent misleads; with one at once if the error is below ``near``."""
         step, tangent = search.step, np.inf  # error at the last tangent
         anderson = Anderson(x.size, self._options.depth, step.total)
         smallest, due = np.inf, search.left - every
@@ -199,8 +202,8 @@ class BoundFixedPoint:
             residual = search.residual(x, maps, forces)
             if not search.goes_on or search.error > GROWTH * tangent:
                 return
-            if search.left <= due:
-                due = search.left - every
+            if search.left <= due or search.error < near:
+                due, near = search.left - every, 0.0
                 useless = search.error > USELESS * tangent
                 # not where the end is as near as the last tangent is behind
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
