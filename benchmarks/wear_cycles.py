@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: MIT
 """Wear over many cycles by ``dc.cycle_jump``: the tables of docs/howto/wear.md.
 
-    python -m benchmarks.wear_cycles million [name ...]     (some minutes each on one core)
-    python -m benchmarks.wear_cycles errors [name ...]      (all by default; results/wear_cycles.json and .svg)
+    python -m benchmarks.wear_cycles truth 1000 [name ...]  (so many cycles one by one: a minute or two each; writes TRUTH)
+    python -m benchmarks.wear_cycles million [name ...]     (the same wear in a million cycles, in jumps: seconds each)
 
-``million``: the paper's punch, cases A and C, and a cylinder in partial slip, each under a dead weight on a plane that goes to and fro.
-Units: mm, N, MPa.  Beside them the same programmes in 300 cycles, simulated one by one, with so many times the coefficient.
-
-``errors``: small programmes of 1,000 cycles, which are also simulated one by one; errors of jumps of several accuracies, beside those
-that were estimated, and of jumps of fixed length with explicit wear.
+Small programmes: the paper's punch and cylinders on planes that go to and fro, under a dead weight, and others.  Units: mm, N, MPa.  For the
+report: errors of jumps of several accuracies, beside those that were estimated, and of jumps of fixed length with explicit wear.
 """
 
 from __future__ import annotations
@@ -17,14 +14,13 @@ from __future__ import annotations
 import json
 import sys
 import warnings
-from time import perf_counter, process_time
+from time import process_time
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import numpy as np
 from dolfinx import mesh
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from benchmarks.measurement import ROOT
@@ -32,9 +28,8 @@ from mechanics import scenes
 from studies.punch.model import Parameters, Punch
 
 CYCLES, ACCURACY = 10**6, 0.02
-TRUE = 300  # cycles simulated one by one
-SMALL, ACCURACIES, FIXED = 1000, (0.05, 0.02, 0.01, 0.005), (10, 25, 50, 100, 200)
-RECORD = ROOT / "results" / "wear_cycles.json"
+ACCURACIES, FIXED = (0.05, 0.02, 0.01), (10, 25, 50, 100, 200)
+TRUTH = ROOT / "notes" / "records" / "wear-truth-2026-11-28.json"
 
 
 def cycle_of(problem, stroke: float, quarter: int):
@@ -83,13 +78,6 @@ def settled(problem, weight, stroke: float, quarter: int, coefficient: float):
     return cycle
 
 
-PROGRAMMES = {
-    "punch, case A": (punch, "A", 1e-8),
-    "punch, case C": (punch, "C", 1e-8),
-    "cylinder in partial slip": (cylinder, (64, 16), 1e-8),
-}
-
-
 def block(coefficient: float):
     """Held by its top at a given approach, E = 1 GPa: it wears until it does not touch any more."""
     scene = scenes.block(cells=(4, 4, 2), mu=0.3, p=None, E=1000.0, tol=1e-8)
@@ -108,14 +96,20 @@ def growing(coefficient: float):
     return scene.problem, settled(scene.problem, (0, 1.0), 0.2, 1, coefficient)
 
 
-ERRORS = {  # the first three are those for which jumps were developed
-    "cylinder in partial slip": lambda: cylinder((24, 6), 1e-5, 0.002, 1),
-    "punch, case C": lambda: punch("C", 1e-5, 2),
-    "block at a given approach": lambda: block(7.5e-6),
-    "punch, case A": lambda: punch("A", 1e-5, 2),
-    "friction that grows": lambda: growing(1e-5),
-    "cylinder in gross slip": lambda: cylinder((24, 6), 2e-5, 0.05, 1),
+PROGRAMMES = {  # of the coefficient, and that times the cycles; the first three are those for which jumps were developed
+    "cylinder in partial slip": (lambda k: cylinder((24, 6), k, 0.002, 1), 1e-2),
+    "punch, case C": (lambda k: punch("C", k, 2), 1e-2),
+    "block at a given approach": (block, 7.5e-3),
+    "punch, case A": (lambda k: punch("A", k, 2), 1e-2),
+    "friction that grows": (growing, 1e-2),
+    "cylinder in gross slip": (lambda k: cylinder((24, 6), k, 0.05, 1), 2e-2),
 }
+
+
+def programme(name: str, cycles: int):
+    """Its problem, and its cycle, of which so many wear as much as any number does."""
+    make, wear = PROGRAMMES[name]
+    return make(wear / cycles)
 
 
 def off(contact, truth) -> dict[str, float]:
@@ -125,90 +119,68 @@ def off(contact, truth) -> dict[str, float]:
     return dict(volume=abs(area @ by) / volume, depth=np.abs(by).max() / depth.max(), profile=area @ np.abs(by) / volume)  # fmt: skip
 
 
-def true_depth(name: str) -> np.ndarray:
-    """Depths after all cycles one by one, kept."""
-    file = RECORD.parent / "wear_cycles" / f"{name}.npy"
-    if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        problem, cycle = ERRORS[name]()
-        for done in range(SMALL):
-            cycle(done)
-        np.save(file, problem.contacts[0].wear_depth)
-    return np.load(file)
+def one_by_one(name: str, cycles: int) -> dict:
+    """So many cycles: ``depth`` of the nodes, processor ``seconds``, and cycles, volume and largest depth in ``rows``."""
+    problem, cycle = programme(name, cycles)
+    contact, rows, start = problem.contacts[0], [], process_time()
+    for done in range(1, cycles + 1):
+        cycle(done - 1)
+        if done in (cycles // 10, 3 * cycles // 10, cycles):
+            depth = contact.wear_depth
+            rows.append([done, float(contact.area @ depth), float(depth.max())])
+    return dict(depth=depth, rows=rows, seconds=process_time() - start)
 
 
-def errors(names) -> None:
-    """Measure, print and draw errors of jumps."""
-    rows = []
-    for name in names or ERRORS:
-        truth = true_depth(name)
-        for accuracy in ACCURACIES:
-            problem, cycle = ERRORS[name]()
-            start = process_time()
-            try:
-                found = dc.cycle_jump(problem, cycle, SMALL, accuracy)
-            except RuntimeError:  # more cycles than it may simulate
-                continue
-            seconds = process_time() - start
-            estimated = {of: getattr(found, f"{of}_error") for of in ("volume", "depth", "profile")}
-            rows.append(dict(programme=name, accuracy=accuracy, simulated=found.simulated, seconds=seconds, estimated=estimated, true=off(problem.contacts[0], truth)))  # fmt: skip
-            print(rows[-1], flush=True)
-        for jump in FIXED:
-            problem, cycle = ERRORS[name]()
-            contact, start = problem.contacts[0], process_time()
-            contact.wear, contact.repeats = dc.Wear(contact.wear.coefficient, explicit=True), jump
-            try:
-                for done in range(0, SMALL, jump):
-                    cycle(done)
-            except dc.NotConverged:
-                continue
-            rows.append(dict(programme=name, jump=jump, simulated=SMALL // jump, seconds=process_time() - start, true=off(contact, truth)))  # fmt: skip
-            print(rows[-1], flush=True)
-    RECORD.write_text(json.dumps(rows, indent=0))
-    draw(rows).savefig(RECORD.with_suffix(".svg"))
+def measured(name: str, cycles: int):
+    """Rows of a small programme: errors of jumps of several accuracies beside those that are estimated, and of explicit jumps of fixed length."""
+    run = one_by_one(name, cycles)
+    for key, of in [("accuracy", of) for of in ACCURACIES] + [
+        ("jump", of) for of in FIXED if of <= cycles
+    ]:
+        problem, cycle = programme(name, cycles)
+        start, contact = process_time(), problem.contacts[0]
+        try:
+            row = jumped(problem, cycle, cycles, of) if key == "accuracy" else fixed(contact, cycle, cycles, of)  # fmt: skip
+        except (RuntimeError, dc.NotConverged):  # more cycles than it may simulate
+            continue
+        row |= {"seconds": process_time() - start, "true": off(contact, run["depth"]), "one_by_one": run["seconds"]}  # fmt: skip
+        yield {"programme": name, key: of} | row
 
 
-def draw(rows) -> Figure:
-    """Error of the profile against seconds: jumps of fixed length with explicit wear, and controlled ones."""
-    names = list(dict.fromkeys(row["programme"] for row in rows))
-    figure = Figure(figsize=(12, 6.5), layout="constrained")
-    axes = figure.subplots(2, -(-len(names) // 2), squeeze=False).ravel()
-    for ax, name in zip(axes, names):
-        for key, style, label in (
-            ("jump", "o--", "explicit, fixed"),
-            ("accuracy", "s-", "cycle_jump"),
-        ):
-            some = [row for row in rows if row["programme"] == name and key in row]
-            ax.loglog([row["seconds"] for row in some], [row["true"]["profile"] for row in some], style, label=label)  # fmt: skip
-        ax.set(title=name, xlabel="processor seconds", ylabel="error of the worn profile")
-    axes[0].legend()
-    return figure
+def jumped(problem, cycle, cycles: int, accuracy: float) -> dict:
+    found = dc.cycle_jump(problem, cycle, cycles, accuracy)
+    estimated = {of: getattr(found, f"{of}_error") for of in ("volume", "depth", "profile")}
+    return dict(simulated=found.simulated, estimated=estimated)
 
 
-def million(names) -> None:
-    """Print a row for each programme."""
+def fixed(contact, cycle, cycles: int, jump: int) -> dict:
+    contact.wear = dc.Wear(contact.wear.coefficient, explicit=True)
+    for done in range(0, cycles, jump):
+        contact.repeats = min(jump, cycles - done)
+        cycle(done)
+    return dict(simulated=-(-cycles // jump))
+
+
+def million(*names: str) -> None:
+    """Print a row for each programme, and how far the jumps were off from the truth."""
+    record = json.loads(TRUTH.read_text())
     for name in names or PROGRAMMES:
-        make, case, coefficient = PROGRAMMES[name]
-        problem, cycle = make(case, coefficient)
-        start = perf_counter()
+        problem, cycle = programme(name, CYCLES)
+        start = process_time()
         found = dc.cycle_jump(problem, cycle, CYCLES, ACCURACY)
-        seconds = perf_counter() - start
-        status = problem.counts()
-        print(f"{name}: {problem.body.size} unknowns, {CYCLES} cycles: {found.simulated} simulated, {found.rejected} jumps "
-              f"rejected, {seconds:.0f} s; depth {found.depth:.3g} mm, volume {found.volume:.3g} mm^3, estimated errors {found.volume_error:.1e} "
-              f"(volume) {found.profile_error:.1e} (profile); {status}", flush=True)  # fmt: skip
-        factor = CYCLES / TRUE
-        truth, cycle = make(case, factor * coefficient)
-        start = perf_counter()
-        for done in range(TRUE):
-            cycle(done)
-        contact, seconds = truth.contacts[0], perf_counter() - start
-        sides = problem.contacts[0].wear_depth, contact.wear_depth
-        off, volume = contact.area @ (sides[0] - sides[1]), contact.area @ sides[1]
-        print(f"    {TRUE} cycles one by one with {factor:.3g} times the coefficient, {seconds:.0f} s: volume {volume:.3g}, off by {off / volume:+.1e}, "
-              f"depth {sides[1].max():.3g}, off by {(sides[0].max() / sides[1].max() - 1):+.1e}", flush=True)  # fmt: skip
+        print(f"{name}: {problem.body.size} unknowns, {process_time() - start:.1f} s; {found}")
+        cycles, volume, depth = record[name][-1]
+        print(f"    beside {cycles} cycles: volume off by {found.volume / volume - 1:+.1e}, largest depth by {found.depth / depth - 1:+.1e}", flush=True)  # fmt: skip
+
+
+def truth(cycles: str, *names: str) -> None:
+    """Simulate so many cycles one by one; the record has cycles, volume and largest depth of each programme."""
+    record = json.loads(TRUTH.read_text()) if TRUTH.exists() else {}
+    for name in names or PROGRAMMES:
+        record[name] = one_by_one(name, int(cycles))["rows"]
+        TRUTH.write_text(json.dumps(record) + "\n")
 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    {"million": million, "errors": errors}[sys.argv[1]](sys.argv[2:])
+    {"million": million, "truth": truth}[sys.argv[1]](*sys.argv[2:])

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dolfinx_contact.contact.laws import rows
 from dolfinx_contact.results.record import NotConverged
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, by_first_rank, raised_together
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
 # The shortest jump: the cycles of its fine run are simulated one by one.
 SHORTEST = 2
 
-# Jumps aim at this part of the accuracy; from one to the next they grow and shrink by these factors at most.
-SAFETY, GROW, SHRINK = 0.7, 4.0, 0.1
+# Jumps aim at this part of the accuracy and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
+SAFETY, ACCEPTED, GROW, SHRINK = 0.75, 1.5, 6.0, 0.1
+
+# Part of the largest mu, or p, by which friction that evolves is to change in a jump.
+CHANGE = 0.25
 
 # Part of all that is worn, of which a jump may have the accuracy as its own error, however little it wears itself.
 SHARE = 0.05
@@ -96,8 +100,8 @@ def cycle_jump(
 
     The estimated error is what extrapolation leaves: how far the difference of the runs is from that of the last jump times the square of
     their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` times its wear, or a twentieth of that times all wear so
-    far.  A jump of a larger error, or in which a step does not converge, is repeated with fewer cycles.  The first jumps are of two cycles, which end like
-    two cycles simulated one by one, until stick and slip zones have settled.
+    far, and friction that evolves changes by a quarter: if by much more, differences do not tell the error.  A jump of a larger error, or in which a step
+    does not converge, is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, are of two cycles, and end like two one by one.
 
     Args:
         problem: The ContactProblem, in the state before the first cycle.
@@ -171,11 +175,12 @@ def _check(problem: Any, cycle: object, monitor: object) -> None:
 
 
 class _State(NamedTuple):
-    """Snapshot of the problem, depths at this rank's nodes that wear, and the sums of each contact."""
+    """Snapshot of the problem, depths at this rank's nodes that wear, sums of each contact, and friction at this rank's nodes."""
 
     snapshot: Any
     depth: np.ndarray
     sums: list[dict[str, np.ndarray]]
+    friction: np.ndarray  # mu and p, shape=(n, 4)
 
 
 class _Run:
@@ -200,7 +205,8 @@ class _Run:
         """The present state."""
         depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
         sums = [contact.sums for contact in self.problem.contacts]
-        return _State(self.problem.snapshot(), np.concatenate(depths), sums)
+        friction = [rows(c.friction, c.nodes.size)[:, :4] for c in self.problem.contacts]
+        return _State(self.problem.snapshot(), np.concatenate(depths), sums, np.concatenate(friction))  # fmt: skip
 
     def show(self) -> None:
         """Put the problem into the state after the last jump."""
@@ -252,8 +258,8 @@ class _Run:
         if coarse and fine and not plain:
             end = self._extrapolated(coarse, fine)
         worn, errors, local = self._compared(coarse, fine, end, length)
-        accepted = end is not None and (plain or local <= self._accuracy)
-        over = local / (SAFETY * self._accuracy)
+        over = max(local / (SAFETY * self._accuracy), self._changed(end) ** 2)
+        accepted = end is not None and (plain or over <= ACCEPTED)
         factor = min(max(over**-0.5, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
         self.record["next"] = max(factor * length, float(SHORTEST))
         if not accepted:
@@ -338,6 +344,17 @@ class _Run:
             before = [fall * last[name] * of for name, of in zip(ERRORS, (last["volume"], last["depth"], last["volume"]))]  # fmt: skip
         errors = [_part(a + b, of) for a, b, of in zip(before, (abs(new[0]), most, new[1]), whole)]
         return (volume, depth), errors, local if known else np.inf
+
+    def _changed(self, end: _State | None) -> float:
+        """By how much mu or p have changed in a jump, over CHANGE of the largest."""
+        if end is None:
+            return 0.0
+        sides, largest = (self.end.friction, end.friction), self.problem.body.largest
+        parts = []
+        for of in (slice(0, 2), slice(2, 4)):
+            before, now = (side[:, of].ravel() for side in sides)
+            parts.append(_part(largest(np.abs(now - before)), largest(np.maximum(before, now))))
+        return max(parts) / CHANGE
 
     def _off(self, length: int) -> np.ndarray:
         """Fine less coarse depth at the end of the last jump, of so many cycles; half of it went into an extrapolated end."""
