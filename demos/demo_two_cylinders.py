@@ -44,7 +44,7 @@
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.compat import functionspace
+from dolfinx_contact.compat import functionspace, second_order
 
 # isort: split
 import numpy as np
@@ -58,8 +58,8 @@ R, A = 1000.0, 0.1  # radius; half width for which the mesh is made
 L = 24 * A  # half width of the bodies, and their height
 
 
-def bodies(cells: int):
-    """A mesh of two bodies with ``2 cells`` by ``cells`` quadrilaterals each, half of them within A.
+def bodies(cells: int, order: int = 1):
+    """A mesh of two bodies with ``2 cells`` by ``cells`` quadrilaterals each, of an order, half of them within A.
 
     Returns:
         The mesh; facets of the upper and lower face near the contact, and of both far boundaries.
@@ -70,6 +70,7 @@ def bodies(cells: int):
     middle = 1 / (2 * cells + 1)
     halves = [mesh.locate_entities(whole, 2, lambda x, k=k: k * x[1] > 0.5 * middle) for k in (1, -1)]  # fmt: skip
     domain = mesh.create_submesh(whole, 2, np.sort(np.concatenate(halves)))[0]
+    domain = second_order(domain) if order == 2 else domain
     x = domain.geometry.x
     above = x[:, 1] > 0
 
@@ -95,10 +96,10 @@ def bodies(cells: int):
     return domain, above, *facets
 
 
-def problem_of(cells: int, swapped: bool = False, shear=SHEAR, nu=NU):
+def problem_of(cells: int, swapped: bool = False, shear=SHEAR, nu=NU, order: int = 1, **options):
     """The problem, and the displacement of the upper body's far boundary."""
-    domain, _, upper, lower, top, bottom = bodies(cells)
-    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    domain, _, upper, lower, top, bottom = bodies(cells, order)
+    V = functionspace(domain, ("Lagrange", order, (2,)))
     u, v, DG = fem.Function(V), ufl.TestFunction(V), functionspace(domain, ("DG", 0))
     G, ratio = fem.Function(DG), fem.Function(DG)
     for of, values in ((G, shear), (ratio, nu)):
@@ -110,7 +111,7 @@ def problem_of(cells: int, swapped: bool = False, shear=SHEAR, nu=NU):
         ends.append(fem.dirichletbc(value, fem.locate_dofs_topological(V, 1, facets), V))
     slave, master = (lower, upper) if swapped else (upper, lower)
     contact = dc.Contact(V, slave, dc.DeformableSurface(V, master), dc.Friction(MU))
-    return dc.ContactProblem(F, u, [contact], bcs=ends), held
+    return dc.ContactProblem(F, u, [contact], bcs=ends, **options), held
 
 
 def observe(contact: dc.Contact) -> dict:

@@ -14,6 +14,7 @@ from scipy.special import ellipk
 import dolfinx_contact as dc
 
 pytestmark = pytest.mark.slow
+DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 STROKE = demo.A**2 / (2 * demo.R)
 
 
@@ -23,10 +24,11 @@ def spread(state) -> float:
     return 2 * np.sqrt(weight @ state["x"] ** 2 / weight.sum())
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper", "lower"])
-def test_partial_slip(swapped):
+def test_partial_slip(swapped, order):
     """The largest pressure to 0.3 %, the half width to 1 %, shear to 4 % in L2, half a cycle's frictional work to 2 %."""
-    problem, held = demo.problem_of(40, swapped)
+    problem, held = demo.problem_of(40, swapped, order=order, petsc_options=DIRECT)
     contact = problem.contacts[0]
     held.value[:] = 0.0, -3.4 * STROKE
     problem.solve()
