@@ -74,7 +74,10 @@ def test_random_problems_of_every_rank():
 def test_crossed_slip_rules_at_many_contacts():
     """Sixty contacts of every rank, slip rules crossed by 3: right answer or exception, nine of ten solved."""
     scenes = (random_problem(seed, contacts=60, ratio=3) for seed in range(1000, 1020))
-    assert outcomes(scenes, max_seconds=20) >= 18
+    patient = CondensedNewton(
+        max_iterations=20_000
+    )  # one of ten needs up to 1,700, more than by default
+    assert outcomes(scenes, solver=patient, max_seconds=20) >= 18
 
 
 def test_random_problems_of_usual_friction():
