@@ -46,7 +46,7 @@ def changing(
 
 def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> str:
     """That elements at the surface are tall, in the mean, and what to do; empty if they are not.  Collective."""
-    ratios = np.concatenate([_ratios(contact) for contact in contacts])
+    ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
     if total <= TALL * count:
         return ""

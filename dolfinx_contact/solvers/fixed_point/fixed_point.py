@@ -173,7 +173,7 @@ class BoundFixedPoint:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
         patience = math.inf if search.step.statics is None else PATIENCE
         search.begin(self._options.max_iterations, patience)
-        near = NEAR
+        near = NEAR if self._contacts else 0.0
         while search.goes_on:
             self._accelerate(search, self._set(factor), search.best, every, near)
             near = 0.0
