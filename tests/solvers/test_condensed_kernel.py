@@ -14,7 +14,7 @@ import pytest
 
 from dolfinx_contact import Friction, RoundingWarning, _kernel
 from dolfinx_contact.solvers.condensed import kernel as condensed_kernel
-from dolfinx_contact.solvers.condensed.newton import CondensedNewton
+from dolfinx_contact.solvers.condensed.newton import CondensedNewton, solve_condensed
 from mechanics import judge
 
 TOL = 1e-10
@@ -37,6 +37,20 @@ def body(rng, nodes):
     W = np.kron(couple, np.diag([1.0, 1.2, 0.9]))
     q = np.column_stack((0.3 * rng.normal(size=(nodes, 2)) + (0.5, 0.2), -np.ones(nodes)))
     return (W + W.T) / 2, q
+
+
+@pytest.mark.parametrize("entry", [(129, 3), (3, 129), (70, 64), (64, 63), (1, 0), (129, 128)])
+def test_one_entry_makes_it_unsymmetric(entry):
+    """W of several tiles is its transpose but for one entry: w = q + W r with each of both."""
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(130, 200))
+    W, q = A @ A.T / 200, rng.normal(size=(65, 2))
+    for change in (0.0, 1e-3):
+        W[entry] += change
+        for stored in (W, np.asfortranarray(W)):
+            found = solve_condensed(stored, q, 0.2)
+            w = q + (W @ found.reaction.ravel()).reshape(q.shape)
+            assert found.displacement == pytest.approx(w, abs=1e-12)
 
 
 def test_every_compiled_algebra_gives_the_same_answer():

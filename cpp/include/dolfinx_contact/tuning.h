@@ -20,8 +20,9 @@ struct Tuning {
     static constexpr int homotopy_most = 20'000; ///< Newton's, of all paths
 
     // -- Newton's method -------------------------------------------------------------------------
-    static constexpr double rho_n = 10.0; ///< over the contact's normal compliance
-    static constexpr double rho_t = 1.0;  ///< over its tangential one; both measured on punches
+    static constexpr double rho_n = 10.0;  ///< over the contact's normal compliance
+    static constexpr double rho_t = 1.0;   ///< over its tangential one; both measured on punches
+    static constexpr double stiffer = 3.0; ///< of the second attempt: factor of rho_t
     static constexpr int newton_patience = 12;      ///< iterations without progress: a circle
     static constexpr std::size_t newton_memory = 8; ///< merits of the nonmonotone line search
     static constexpr double decrease = 1e-4;        ///< of the merit, over its slope (Armijo)
@@ -66,6 +67,8 @@ struct Tuning {
     // -- judge -----------------------------------------------------------------------------------
     static constexpr double near_rounding = 1e-2; ///< of the tolerance: sums in twice the precision
     static constexpr double local_rounding = 32;  ///< eps of its terms: no defect of a contact
+    static constexpr double unbounded = 67'108'864; ///< reactions over the forces that act, which
+                                                    ///< then have half their digits: no solution
 
     // -- linear algebra --------------------------------------------------------------------------
     static constexpr double smallest_rcond = 1e-12;      ///< of a W that is inverted
@@ -78,5 +81,7 @@ struct Tuning {
     static constexpr Index few_columns = 16;             ///< factorised one by one
     static constexpr Index few_rows_to_invert = 64;      ///< smaller halves save nothing
     static constexpr Index operations_between_polls = 500'000'000; ///< some 0.1 s
+    static constexpr int signals_every = 50; ///< milliseconds: Ctrl-C is heard
+    static constexpr Index tile = 64;        ///< rows and columns: two of 32 kB are in cache
 };
 } // namespace dolfinx_contact::condensed

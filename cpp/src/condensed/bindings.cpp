@@ -78,13 +78,12 @@ template <int T> AnyLaw<T> law(const Array &mu, const std::optional<Array> &p, I
     return make_law<T>(coefficients, rule, uniform);
 }
 
-/// Lets Python answer signals, Ctrl-C among them, every 50 ms; what their handlers raise ends the
-/// search.
+/// Lets Python answer signals, Ctrl-C among them; what their handlers raise ends the search.
 std::function<void()> heed_signals() {
     using Clock = std::chrono::steady_clock;
     return [last = Clock::now()]() mutable {
         const auto now = Clock::now();
-        if (now - last < std::chrono::milliseconds(50))
+        if (now - last < std::chrono::milliseconds(Tuning::signals_every))
             return;
         last = now;
         const py::gil_scoped_acquire acquire;

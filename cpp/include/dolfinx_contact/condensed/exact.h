@@ -27,7 +27,7 @@ template <int T> struct ExactState {
 template <class Law, int T = Law::tangents>
 Real boundary_root(const Law &law, const Eigen::Matrix<Real, T + 1, 1> &tau,
                    Eigen::Matrix<Real, T, 1> &d) {
-    constexpr int max_steps = 100; // bounded by 46 in double precision, secular.h
+    constexpr int max_steps = 100; // ends by itself (46 in double precision, secular.h): no choice
     const Real n = tau[T];
     Eigen::Matrix<Real, T, 1> a, b, c;
     Real s = 0.0L;

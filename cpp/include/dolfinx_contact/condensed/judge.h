@@ -80,7 +80,7 @@ template <int P> class Judge {
         s.rounding = eps * ratio(left.size, s.acting);
         s.slip_rounding = eps * ratio(left.slip_size, s.acting);
         const bool lost = acts_ && external_ <= eps * left.size;
-        if (lost || contacts > std::max(load_, external_) / std::sqrt(eps)) // without bound
+        if (lost || contacts > Tuning::unbounded * std::max(load_, external_))
             s.error = std::numeric_limits<double>::infinity();
     }
 

@@ -26,12 +26,15 @@ class Operator {
     Operator(const Eigen::MatrixBase<Derived> &W, int dim, Index tied = 0,
              const LinearAlgebra &algebra = linear_algebra())
         : size_(W.rows()), tied_(tied), dim_(dim), exponent_(Power::to_one(W)), algebra_(algebra),
-          symmetric_((W.array() == W.transpose().array()).all()) {
+          symmetric_(equals_transpose(W)) {
         values_.resize(size_, size_ + (symmetric_ ? 1 : 0));
-        if (symmetric_)
-            values_.rightCols(size_).template triangularView<Eigen::Upper>() = Power(exponent_)(W);
-        else
-            values_ = Power(exponent_)(W);
+        auto whole = values_.rightCols(size_);
+        // of a symmetric W what is left of the diagonal is written, too, but not read
+        in_tiles(size_, [&](Index i, Index j, Index rows, Index columns) {
+            if (!symmetric_ || i <= j)
+                whole.block(i, j, rows, columns) = Power(exponent_)(W.block(i, j, rows, columns));
+            return true;
+        });
         W_.emplace(square(values_.data() + (symmetric_ ? size_ : 0), Part::upper));
     }
     Operator(const Operator &) = delete; // views look into it
@@ -94,6 +97,22 @@ class Operator {
     }
 
   private:
+    /// all(i, j, rows, columns) of the tiles of a square until it is false. Where one matrix is
+    /// read along its rows and another along its columns, tiles stay in the processor's cache.
+    template <class Predicate> static bool in_tiles(Index size, Predicate all) {
+        for (Index j = 0; j < size; j += Tuning::tile)
+            for (Index i = 0; i < size; i += Tuning::tile)
+                if (!all(i, j, std::min(Tuning::tile, size - i), std::min(Tuning::tile, size - j)))
+                    return false;
+        return true;
+    }
+    template <class Derived> static bool equals_transpose(const Eigen::MatrixBase<Derived> &W) {
+        return in_tiles(W.rows(), [&](Index i, Index j, Index rows, Index columns) {
+            return i > j || (W.block(i, j, rows, columns).array() ==
+                             W.block(j, i, columns, rows).transpose().array())
+                                .all();
+        });
+    }
     Square square(const double *values, Part triangle) const {
         return {values, size_, size_, symmetric_ ? triangle : Part::all, algebra_};
     }

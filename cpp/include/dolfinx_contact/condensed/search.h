@@ -33,7 +33,8 @@ template <int T, int P> class Search {
     static std::array<Method, 5> methods() {
         return {{
             {"newton", false, Tuning::newton_most, From::start, 1.0, &Search::newton},
-            {"newton, 3 rho_t", true, Tuning::newton_most, From::start, 3.0, &Search::newton},
+            {"newton, 3 rho_t", true, Tuning::newton_most, From::start, Tuning::stiffer,
+             &Search::newton},
             {"interior_point", false, Tuning::interior_most, From::start, 1.0,
              &Search::interior_point},
             {"proximal_point", false, Tuning::proximal_most, From::last, 1.0, &Search::proximal},
