@@ -52,7 +52,8 @@ def run(scene: Scene, solver) -> dict:
     steps = pair_steps if isinstance(scene, PairScene) else steps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dc.RoundingWarning)
-        warnings.filterwarnings("ignore", "the body is strained")  # the answer to the linear form is asked for
+        # the answer to the linear form is asked for
+        warnings.filterwarnings("ignore", "the body is strained")
         for verdict, step, method in steps(scene, solver, record):
             at = level(step, scene.tol)
             note(record, verdict, at, at > scene.tol)
