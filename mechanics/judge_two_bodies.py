@@ -211,7 +211,8 @@ class TwoBodiesJudge:
         scene, slave = self.scene, self.faces[0]
         x = self.x + (scene.u.x.array.reshape(-1, self.d) @ scene.turn if scene.sliding == "large" else 0.0)  # fmt: skip
         middle = x[slave.nodes].mean(axis=0)
-        left = sum((np.cross(x[face.nodes] - middle, f).sum(axis=0) for face, f in zip(self.faces, (on_slave, on_master))))  # fmt: skip
+        product = sum((x[face.nodes] - middle).T @ f for face, f in zip(self.faces, (on_slave, on_master)))  # fmt: skip
+        left = (product - product.T)[np.triu_indices(self.d, 1)]
         gap = slave.of_nodes(gaps, lambda g: np.nanmax(np.abs(g)) if np.isfinite(g).any() else 0.0)
         if scene.sliding == "small":  # forces act across the gap of the undeformed bodies
             gap = gap + np.abs(self.x[slave.nodes, -1]) if scene.gap or scene.radius else 0.0 * gap
