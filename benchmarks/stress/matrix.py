@@ -108,16 +108,10 @@ def condensed_steps(scene: Scene, solver, record):
     yield judge.condensed(W, q, mu, p, found.reaction, scene.tol), found, found.branch
 
 
-def body_steps(scene: Scene, solver, record):
-    """Load step after load step that is not refused: (verdict, step, method)."""
-    built = build(**scene.body)
-    of = SceneJudge(built, scene.body.get("mu", 0.2), scene.body.get("p"))
-    problem = problem_of(built, solver, scene.tol)
-    for move in scene.tops:
-        if getattr(move, "fresh", False):
-            problem.reset()
-            of.restart()
-        built.move_top(move)
+def solved(scene: Scene, problem, apply, record):
+    """Load after load that ``apply`` puts on: (what it returns, step, method), until one is refused, or of all that are not."""
+    for load in scene.tops:
+        asked = apply(load)
         try:
             step = problem.solve()
         except REFUSALS as said:
@@ -125,7 +119,22 @@ def body_steps(scene: Scene, solver, record):
             if not scene.goes_on:
                 return
             continue
-        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+        yield asked, step, step.tried[-1].branch if step.tried else step.solver.split()[0]
+
+
+def body_steps(scene: Scene, solver, record):
+    """Load step after load step that is not refused: (verdict, step, method)."""
+    built = build(**scene.body)
+    of = SceneJudge(built, scene.body.get("mu", 0.2), scene.body.get("p"))
+    problem = problem_of(built, solver, scene.tol)
+
+    def apply(move):
+        if getattr(move, "fresh", False):
+            problem.reset()
+            of.restart()
+        built.move_top(move)
+
+    for _, step, method in solved(scene, problem, apply, record):
         yield of.verdict(scene.tol), step, method
 
 
@@ -135,17 +144,8 @@ def rig_steps(scene: RigScene, solver, record):
     of = RigJudge(built, scene.body.get("mu", 0.2), scene.body.get("p"))
     problem = problem_of(built, solver, scene.tol)
     problem.geometry_tol = np.inf  # the judge has the geometry of the start
-    for load in scene.tops:
-        asked = built.apply(load)
-        try:
-            step = problem.solve()
-        except REFUSALS as said:
-            return refuse(record, said)
-        yield (
-            of.verdict(asked, scene.tol),
-            step,
-            step.tried[-1].branch if step.tried else step.solver.split()[0],
-        )
+    for asked, step, method in solved(scene, problem, built.apply, record):
+        yield of.verdict(asked, scene.tol), step, method
 
 
 def corner_steps(scene: CornerScene, solver, record):
@@ -153,13 +153,7 @@ def corner_steps(scene: CornerScene, solver, record):
     built = build_corner(**scene.body)
     of = CornerJudge(built)
     problem = dc.ContactProblem(built.F, built.u, built.contacts, bcs=built.bcs, solver=solver, tol=scene.tol)  # fmt: skip
-    for push in scene.tops:
-        built.apply(push)
-        try:
-            step = problem.solve()
-        except REFUSALS as said:
-            return refuse(record, said)
-        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+    for _, step, method in solved(scene, problem, built.apply, record):
         yield of.verdict(), step, method
 
 
@@ -168,15 +162,14 @@ def pair_steps(scene: PairScene, solver, record):
     built = build_two(**scene.body)
     of = TwoBodiesJudge(built)
     problem = problem_of(built, solver, scene.tol, geometry_tol=GEOMETRY)
-    for way in scene.tops:
+
+    def apply(way):
         built.move_top(way)
-        try:
-            step = problem.solve()
-        except REFUSALS as said:
-            return refuse(record, said)
-        method = step.tried[-1].branch if step.tried else step.solver.split()[0]
+        return -way[-1] * built.height
+
+    for down, step, method in solved(scene, problem, apply, record):
         admitted = max(GEOMETRY, step.geometry_error) if built.sliding == "large" else 0.0
-        yield of.verdict(-way[-1] * built.height, scene.tol, admitted), step, method
+        yield of.verdict(down, scene.tol, admitted), step, method
 
 
 def pairs(chosen: list[Scene], solvers=SOLVERS) -> list[tuple[Scene, str]]:

@@ -141,8 +141,11 @@ class Unseen:
             self._check_turn(body, contacts, stiffness, u)
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
-            self._apart = not _check_apart(body, contacts)
-            self._approach = self._apart and self._approach and not _tell_gap(body, contacts)
+            smallest = -max(body.highest(-contact.gap) for contact in contacts)
+            self._apart = not _check_apart(body, contacts, smallest)
+            self._approach = (
+                self._apart and self._approach and not _tell_gap(body, contacts, smallest)
+            )
 
     def _check_facets(self, u: np.ndarray, stiffness: dict[ContactLike, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
@@ -307,9 +310,8 @@ def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
     return True
 
 
-def _check_apart(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) -> bool:
     """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
-    smallest = _smallest_gap(body, contacts)
     if smallest > FAR * body.extent:
         warnings.warn(
             f"no node touches: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}. If that is not meant, "
@@ -342,9 +344,8 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
     return True
 
 
-def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) -> bool:
     """Log by how much the nearest node misses its surface: on the way there no mistake, and no warning; whether it does.  Collective."""
-    smallest = _smallest_gap(body, contacts)
     if smallest <= CLEAR * body.extent:
         return False
     if contacts[0].comm.rank == 0:
@@ -354,10 +355,6 @@ def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
             body.extent,
         )
     return True
-
-
-def _smallest_gap(body: BodyLike, contacts: Sequence[ContactLike]) -> float:
-    return -max(body.highest(-contact.gap) for contact in contacts)
 
 
 def _between(
