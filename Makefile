@@ -41,7 +41,7 @@ test: .venv/ready
 	tools/ctest example
 
 # what .ci/run has beside it: the other parameters of these tests; those that are marked ranks on 2 ranks; the newest
-# DOLFINx on PyPI
+# DOLFINx on PyPI, of which 2 ranks run the few of `make test`
 test-rest: .venv/ready
 	tools/mpitest .venv 1 -m "not slow" --rest
 
@@ -52,7 +52,7 @@ test-wheel: .venv-wheel/ready
 	tools/mpitest .venv-wheel 1 -m "not slow" --once
 
 test-wheel-ranks: .venv-wheel/ready
-	tools/mpitest .venv-wheel 2 $(RANKS) --once
+	tools/mpitest .venv-wheel 2 -m "not slow" --once $(CORE)
 
 test-all:
 	tools/test-all

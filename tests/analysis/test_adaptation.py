@@ -53,7 +53,8 @@ def force():
     return 2 * found[1] - found[0]
 
 
-@pytest.mark.parametrize("accuracy", [pytest.param(0.05, marks=pytest.mark.slow), 0.01])
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", [0.05, 0.01])
 def test_the_force_of_a_flat_punch(accuracy, force):
     """As accurate as asked for, by a force of other meshes; not a mesh sooner, and with fewer cells than uniform ones need."""
     found = dc.adapt(solved, rectangle(8), accuracy, "normal_force")
@@ -91,6 +92,7 @@ def test_cells_are_divided_at_the_edges():
     assert rows[:, 1].max() > 8 * rows[:, 1].min() and rows[:, 1].sum() == pytest.approx(2.0)
 
 
+@pytest.mark.slow
 def test_units_change_nothing():
     """A body 2**20 times as large is divided in the same way; with other factors DOLFINx may take another one of equally long edges."""
     found = [

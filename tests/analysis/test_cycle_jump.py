@@ -66,6 +66,7 @@ def total(scene, array):
     return scene.contact.comm.allreduce(float(scene.contact.area @ array))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make, coefficient, stroke", [(pad, 1e-4, 0.2), (roller, 2e-4, 2e-3)])
 def test_estimates_are_the_errors_of_jumps(make, coefficient, stroke):
     """In gross and in partial slip, jumps wear what cycles one by one do: to the accuracy, and with the error that is estimated, within three.
@@ -143,6 +144,7 @@ def test_partial_slip_with_any_coefficient(power):
     assert error <= max(3 * found.depth_error, ACCURACY / 100)
 
 
+@pytest.mark.slow
 def test_strokes_that_wear_off_much_leave_a_side():
     """The scar is lopsided because the first stroke comes first: it is the mirror image if that goes the other way, and more increments change little."""
     scars = []
@@ -204,6 +206,7 @@ def test_the_limit_of_partial_slip_is_contact_of_the_stick_zone_alone():
         assert carried == pytest.approx(expected.get(x, 0.0), abs=0.01 * max(expected.values())), x
 
 
+@pytest.mark.slow
 def test_a_killed_programme_goes_on(tmp_path):
     """A programme that is ended and started again in the same folder makes the jumps of one that was not; so does one rank alone."""
     path = COMM.bcast(tmp_path, root=0) / "programme"
@@ -306,6 +309,7 @@ def test_snapshots_are_returned_to():
         assert other == pytest.approx(found[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_friction_that_grows_with_depth():
     """mu = mu0 (1 + w / h) under dead weight: the depth grows as h (exp(k mu0 p s n / h) - 1), in jumps, too."""
     h, coefficient, stroke, cycles = 1e-2, 1e-8, 2.0, 10**5

@@ -128,6 +128,7 @@ def test_hertz_with_the_edge_within_a_cell(edge):
     assert 0.7 < rows["half cells"]["pressure"]["effectivity"] < 1.5
 
 
+@pytest.mark.slow
 def test_cattaneo_and_mindlin():
     """In partial slip and after it has turned round so are those of shear, tangential force and work, at each state and along the programme."""
     states = partial_slip(8, names=["same cells"])

@@ -135,6 +135,7 @@ def test_a_pin_that_fits_touches_on_one_arc_whatever_the_load(nu, solver):
     assert carried == pytest.approx(1e-3 * total, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_looser_pin_touches_on_a_shorter_arc():
     """With clearance the angle grows with the way: each time that of the series to a node, forces to 2 %."""
     clearance, size, ends = 1e-6, np.pi / 90, []
@@ -148,6 +149,7 @@ def test_a_looser_pin_touches_on_a_shorter_arc():
     assert ends == sorted(ends) and ends[-1] < series(0.0, 1.0)[0][series(0.0, 1.0)[1] > 0].max()
 
 
+@pytest.mark.slow
 def test_the_series_has_the_closed_forms():
     """Lamé's ring, Hertz's line contact of a loose pin, and a thick plate's arc that does not change with its size."""
     a, b = 1.0, 2.0

@@ -103,6 +103,7 @@ def test_the_part_that_sticks_ends_where_it_should(nu, mu):
     }
 
 
+@pytest.mark.slow
 def test_the_part_that_sticks_is_that_of_any_load():
     """The same nodes stick under a load 1e6 times as large, and under one that was put on in three increments."""
     press = below(0.4, 0.15)

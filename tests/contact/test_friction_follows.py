@@ -116,9 +116,10 @@ def test_errors_are_those_of_the_law_at_the_final_pressure(law, solver):
     assert np.abs(contact.reaction - reaction).max(initial=0) < 1e-6 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law",
-    [pytest.param((weak, None), marks=pytest.mark.slow), (pair, None)],
+    [(weak, None), (pair, None)],
     ids=["isotropic", "orthotropic"],
 )
 def test_a_round_face_agrees_with_slow_gauss_seidel(law):

@@ -24,6 +24,7 @@ for n in (1, 2, 24):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMM.size > 1, reason="starts a process of its own")
 def test_a_full_matrix_does_not_end_the_process():
     """Ones plus the identity, n rows: the sum of a row is n + 1, so that the answer to ones is 1 / (n + 1)."""

@@ -394,6 +394,7 @@ def test_walls_may_turn_with_the_body(solver):
     assert np.abs(scene.contacts[0].force() - found[0][0]).max() > 0.05 * size
 
 
+@pytest.mark.slow
 def test_a_nonlinear_body_in_the_corner_of_a_box():
     """A body that is hardly nonlinear meets both laws and equilibrium of the linear one in every edge."""
     scene = cube([0.2, 0.0, 0.4])
@@ -410,6 +411,7 @@ def test_a_nonlinear_body_in_the_corner_of_a_box():
         assert verdict.accepts(max(TOL, step.error)), verdict.defects
 
 
+@pytest.mark.slow
 def test_nodes_of_three_faces_keep_the_start_that_served(monkeypatch):
     """An evaluation of a step solves each node's problem about once, not from all five starts, in few calls of the laws."""
     scene, calls = cube([0.3] * 3, dc.FixedPoint()), dict.fromkeys(("problems", "laws", "states"), 0)  # fmt: skip

@@ -141,6 +141,7 @@ def test_gap_of_an_inadmissible_pair_is_infinite():
     assert np.array_equal(found, [np.inf, np.inf, np.inf, 0])
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.sampled_from(sorted(LAWS)))
 def test_scaled_map_in_its_own_metric(seed, name):
     """Where nothing moves the scaled map is a projection of (M^-1 r_t, r_n): repeated without effect,

@@ -169,6 +169,7 @@ def test_what_cannot_be_reached_is_said(monkeypatch):
     assert caught.value.found.error > 1e-3 and len(caught.value.found.records) == 2
 
 
+@pytest.mark.slow
 def test_command(directory, capsys):
     """``--accuracy`` writes work, estimated errors and seconds beside the steps, and the picture."""
     options = "--case A --loading 1 --unloading 2 --accuracy 0.2 --tol 1e-8".split()

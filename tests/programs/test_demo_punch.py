@@ -238,6 +238,7 @@ def test_tracked_point():
     assert record["point_slip_increment"][0] > 0
 
 
+@pytest.mark.slow
 def test_contact_map(directory):
     """What is gathered to be drawn is the whole disc and all its forces, on any number of ranks."""
     punch = Punch(Parameters(case="B"), divisions=4, layers=2)
@@ -264,6 +265,7 @@ def test_contact_map(directory):
     assert (directory / "punch.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_command_line(directory, capsys):
     """The command writes the numbers, the picture and the fields, and says where they are; it draws its
     progress bar in a terminal alone."""

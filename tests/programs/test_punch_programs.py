@@ -17,6 +17,7 @@ from studies.punch.limits import Run, build, cycle, uniform
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="programs that one rank runs")
 
 
+@pytest.mark.slow
 def test_six_cycles(monkeypatch, tmp_path):
     """A row for each cycle of each case; the work of the first is that of the program of one cycle, shares of area are shares."""
     tiny = uniform(2, order=1)

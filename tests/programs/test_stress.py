@@ -81,6 +81,7 @@ def test_small_scenes_are_the_same_scenes():
         )
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_continues(tmp_path):
     """What is done is not done again, and the tables come from all of it."""
     pytest.importorskip("matplotlib")
@@ -99,6 +100,7 @@ def test_an_interrupted_run_continues(tmp_path):
     ).read_text() == before  # small bodies have a table of their own
 
 
+@pytest.mark.slow
 def test_many_problems_in_one_process():
     """PETSc 3.18 has room for 512 options: solvers take theirs away when they have been read."""
     from petsc4py import PETSc

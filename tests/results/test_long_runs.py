@@ -35,6 +35,7 @@ def fails(_):
     raise dc.CondensedNotConverged(result)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMM.size > 1, reason="starts processes of its own")
 def test_a_pool_of_processes_gets_the_failure():
     """What a worker raises arrives, instead of leaving the pool waiting for ever."""

@@ -59,6 +59,7 @@ def outcomes(scenes, **options):
     return solved
 
 
+@pytest.mark.slow
 def test_random_problems_of_every_rank():
     """Every rank, mu 1e-3..10, crossed p ratios up to 1e3: all are solved, a fifth by other methods than Newton's.
 
@@ -288,6 +289,7 @@ def test_bodies_that_are_squeezed_are_refused_soon(unsymmetric):
             assert not failure.infeasible
 
 
+@pytest.mark.slow
 def test_a_limit_of_iterations_ends_a_refusal():
     """Friction of 1e7, of which most are refused: no more iterations than asked for, but for the last method's, and more if more are."""
     refused = 0

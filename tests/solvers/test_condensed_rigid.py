@@ -65,6 +65,7 @@ def test_the_interior_point_method_is_a_start(kind):
     assert "interior_point" in branches
 
 
+@pytest.mark.slow
 def test_any_sparse_storage():
     """Formats, number types, entries given twice or given as zero: to the last bit the same answer as of the
     array, with friction and without; with principal axes accepted by the judge.  What is not finite is refused."""
@@ -180,6 +181,7 @@ def brute_force(W, q, mu):
     return False
 
 
+@pytest.mark.slow
 def test_the_plane():
     """One to four contacts in two dimensions, W positive definite or of any sign off its diagonal, mu
     to 3: solved where one of all states, tried here, is a solution, but for four of a hundred where W is

@@ -53,6 +53,7 @@ def endless(n: int):
     return W, q
 
 
+@pytest.mark.slow
 @ALONE
 def test_an_interrupt_ends_the_condensed_solver():
     """In the kernel, too, Ctrl-C is answered: long before a search that has half a minute left ends by itself."""

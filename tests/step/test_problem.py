@@ -278,6 +278,7 @@ def test_wrong_derivative_is_never_taken_for_convergence():
         problem.solve()
 
 
+@pytest.mark.slow
 def test_options_of_compilation_reach_the_compilers(tmp_path):
     """Forms are compiled where ``jit_options`` say, as ``form_compiler_options`` say, and stay what they are."""
     folder = Path(COMM.bcast(str(tmp_path)))
