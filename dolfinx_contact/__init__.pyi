@@ -1,4 +1,4 @@
-# What is public, once for all: __init__.py finds each name here when it is first used, type checkers and editors read it.
+# All public names: __init__.py imports each when it is first used; type checkers and editors read this file.
 from dolfinx_contact import condensed as condensed
 from dolfinx_contact import law as law
 from dolfinx_contact.analysis.adapt import Adapted as Adapted

@@ -292,7 +292,7 @@ def may_free_alone(comm: MPI.Comm) -> bool:
 
 
 def option_was_read(name: str) -> bool:
-    """Whether PETSc has asked for an option of its database, which petsc4py does not tell; True if nobody knows."""
+    """Whether PETSc has read an option of its database, which petsc4py does not report; True if it cannot be determined."""
     try:
         used = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     except (OSError, AttributeError, TypeError):

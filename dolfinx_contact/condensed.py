@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The contact problem of given arrays, ``w = q + W r`` and the law between ``w`` and ``r``; arrays alone, without DOLFINx."""
+"""The condensed contact problem: ``w = q + W r`` and the friction law between ``w`` and ``r``; arrays alone, without DOLFINx."""
 
 from dolfinx_contact.solvers.condensed.newton import CondensedNewton, solve_condensed
 from dolfinx_contact.solvers.condensed.result import CondensedNotConverged, CondensedResult

@@ -99,9 +99,9 @@ class ContactProblem(Guarded):
         jit_options: Options of the compilation of generated code, as in ``fem.form``.
         entity_maps: Relation between meshes, if ``F`` has Functions on another mesh than that of ``u``, as in ``fem.form``: a
             dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Not available in older releases.
-        undetermined: What to do if a body held by contact alone can move without a change of reactions: "refused" raises a
-            ``ValueError`` that names the motion, "nearest" takes the state nearest to the last one, with the smallest integral of
-            ``|du|^2`` over the volume.
+        undetermined: What to do if a body held by contact alone can move without changing the reactions: "refused" raises a
+            ``ValueError`` that names the motion; "nearest" takes the state nearest to the last one, that with the smallest
+            integral of ``|du|^2`` over the volume.
         geometry_tol: Largest ``step.geometry_error`` of a converged step, on curved, rotating, wavy, textured or deformable
             surfaces, see docs/surfaces.md.
 
@@ -120,7 +120,7 @@ class ContactProblem(Guarded):
     does this, and a run that makes many meshes must close its problems.
 
     Raises:
-        ValueError: on all ranks, for input that makes no sense; the message says what and why.
+        ValueError: on all ranks, for invalid input; the message names the argument and its value, and says what to do.
 
     Example:
         >>> other = dc.Contact(V, foot, plane, friction)  # of this problem alone
@@ -212,7 +212,7 @@ class ContactProblem(Guarded):
         support moves from its present displacement to the prescribed value; the force of a released one vanishes.
 
         Raises:
-            ValueError: on all ranks, for conditions that make no sense; the previous ones stay.
+            ValueError: on all ranks, for invalid conditions; the previous ones stay.
         """
         return tuple(self.body.bcs)
 
@@ -242,7 +242,7 @@ class ContactProblem(Guarded):
 
     @property
     def undetermined(self) -> str:
-        """What to do with rigid motions that nothing determines, "refused" or "nearest"; may change between steps, on all ranks."""
+        """What to do with undetermined rigid motions, "refused" or "nearest"; may change between steps, on all ranks."""
         return self._undetermined
 
     @undetermined.setter
@@ -250,7 +250,7 @@ class ContactProblem(Guarded):
         self._undetermined = checked_undetermined(choice)
 
     def close(self) -> None:
-        """Free what PETSc holds: matrices, factors, levels.  Collective; results stay, no step can follow."""
+        """Free PETSc's matrices, factors and multigrid levels; results stay, but no step can follow.  Collective."""
         self._unbind()
         self.body.close()
 
@@ -273,8 +273,9 @@ class ContactProblem(Guarded):
 
         Raises:
             NotConverged: the error stayed above ``tol``; carries the record and the best state.
-            ValueError: loads, boundary values, planes or ``u`` that are not finite, or a body that nothing holds.  After any
-                exception, the problem is in its last converged state.
+            ValueError: loads, boundary values, surfaces or ``u`` are not finite, or nothing holds the body.
+
+        After any exception, the problem is in its last converged state.
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
@@ -338,13 +339,16 @@ class ContactProblem(Guarded):
     def load_step(
         self, holding: HeldSurfaces | None = None, at: np.ndarray | None = None
     ) -> LoadStep:
-        """The next step as solvers see it: present loads, boundary values and planes.  Collective.
+        """The next step as solvers see it, with the present loads, boundary values and surfaces.  Collective.
 
-        For solvers of your own and for measurements; ``solve`` makes its own.
+        For your own solvers and for measurements; ``solve`` makes its own.
 
         Args:
             holding: Planes that held nodes hold, or cannot hold, if that is known.
-            at: Displacement for which tangent planes and arms are taken, owned degrees of freedom; None is the last one.
+            at: Displacement at which tangent planes and lever arms are taken, owned degrees of freedom; None takes the last one.
+
+        Returns:
+            A ``LoadStep``, for a nonlinear body a ``NonlinearStep``.
         """
         body, here = self.body, self._states.last if at is None else at
         assembled = body.refresh(self._states.last)
@@ -609,15 +613,15 @@ class ContactProblem(Guarded):
         laws stay as they are.  Only one step can be undone, until another one is accepted.
 
         Raises:
-            ValueError: no step has been accepted since the beginning, the last ``reset``, ``load`` or ``rewind``.
+            ValueError: no step has been accepted since the beginning or the last ``reset``, ``load`` or ``rewind``.
         """
         check_alive(self, self.body, self.contacts)
         self._states.rewind()
 
     def snapshot(self) -> Kept:
-        """The last converged state, for ``restore``, which may be called any number of times; kept in memory, nothing is copied.
+        """The last converged state, kept in memory for ``restore``, which may be called any number of times.
 
-        It contains displacement, history variables of contacts, and planes.  ``save`` writes the same to a file.
+        It contains displacement, history variables of contacts, and positions of surfaces.  ``save`` writes the same to a file.
         """
         check_alive(self, self.body, self.contacts)
         return self._states.snapshot()

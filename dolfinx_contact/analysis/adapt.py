@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Cells divided where the error is, one mesh after another, until a quantity is as accurate as asked for."""
+"""Adaptive refinement: cells with large errors are divided, mesh after mesh, until a quantity is accurate enough."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Pair = tuple["ContactProblem", "ContactProblem"]
 
 
 class Tried(NamedTuple):
-    """A mesh that ``adapt`` has tried: number of its cells, value, and estimated error over its size."""
+    """A mesh that ``adapt`` has tried: its number of cells, the value of the quantity, and its estimated relative error."""
 
     cells: int
     value: float
@@ -91,7 +91,7 @@ def adapt(
         An ``Adapted``; ``reached`` says whether the meshes sufficed.
 
     Raises:
-        ValueError: other cells, an unknown quantity, numbers out of range, problems that are not on the mesh.
+        ValueError: the mesh has other cells, the quantity is unknown, a number is out of range, or the problems are not on the mesh.
 
     Example:
         >>> def press(cube, order):  # and all steps of the load history

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Finer meshes and smaller increments, one after another, until a number is as accurate as asked for."""
+"""Finer meshes and smaller increments, one after another, until a number is accurate enough."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ def converge(
     Increments are halved first on the coarser meshes, where this is cheap.  The estimates, which are not bounds:
 
     - increments: twice the change caused by halving them on the previous mesh, their error if convergence is of first order;
-    - mesh: the change from the mesh before, over ``s - 1``, where ``s`` is the factor by which changes shrank last, but 2 at
-      least and 4 at most.  With cells of half the size ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226
-      (1927) 299).  With two meshes s = 2.  From mesh to mesh the estimate falls to an eighth at most, since two values may agree by chance.
+    - mesh: the change from the previous mesh, divided by ``s - 1``, where ``s`` is the factor by which the last change was smaller
+      than the one before, within 2 to 4 (2 for two meshes).  With cells of half the size, ``s = 2**p`` for errors of order p (L. F. Richardson,
+      Phil. Trans. R. Soc. A 226 (1927) 299).  From mesh to mesh, it falls to an eighth at most: two values may agree by chance.
 
     Args:
         compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that runs the load history with every increment
@@ -84,7 +84,7 @@ def converge(
         A ``Converged``; ``reached`` says whether meshes and halvings sufficed.
 
     Raises:
-        ValueError: fewer than two meshes, one given twice, an accuracy that is not positive, or a value that is zero, not a
+        ValueError: there are fewer than two meshes, or one is given twice; the accuracy is not positive; or a value is zero, not a
             finite real number, or not the same on all ranks.
 
     Example:

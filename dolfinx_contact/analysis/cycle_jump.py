@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Wear over many cycles: one that is simulated counts for many, in second order, and the estimated error says for how many it may."""
+"""Wear over many cycles: a simulated cycle counts for many, and an estimated error determines for how many."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ class CycleJump:
 
     Attributes:
         cycles: Number of cycles.
-        simulated: Cycles that were simulated for it, including those of rejected jumps.
+        simulated: Number of simulated cycles, including those of rejected jumps.
         accepted, rejected: Number of jumps.
-        volume: Worn, of all contacts.
-        depth: The largest.
-        volume_error: Estimated error of the volume, over it.
-        depth_error: The largest of the estimated errors of the nodes' depths, over the largest depth.
-        profile_error: The integral of these errors, over the volume.
-        reached: Whether all three are at most what was asked for.
-        table: A dictionary for each accepted jump: ``cycle`` at its end, ``jump``, its length, and of the attributes above
-            ``volume``, ``depth``, the errors and ``simulated``.
+        volume: Worn volume of all contacts, length cubed (per thickness in two dimensions).
+        depth: Largest worn depth, length.
+        volume_error: Estimated error of the volume, relative to it.
+        depth_error: Largest estimated error of a node's depth, relative to ``depth``.
+        profile_error: Integral of the nodes' estimated errors over the surface, relative to the volume.
+        reached: Whether all three errors are at most the requested accuracy.
+        table: A dictionary for each accepted jump: ``cycle``, the cycle at its end; ``jump``, its length; and ``volume``,
+            ``depth``, the errors and ``simulated`` as above.
 
     Example:
         >>> def cycle(done):
@@ -92,34 +92,34 @@ def cycle_jump(
     path: str | os.PathLike[str] | None = None,
     monitor: Callable[[dict[str, Any]], object] | None = None,
 ) -> CycleJump:
-    """Wear through a number of cycles, of which only a few are simulated.  Collective.
+    """Simulate wear over many load cycles, of which only a few are computed.  Collective.
 
-    In a jump of n cycles, wear, work and slip of each step of one simulated cycle count n times (``contact.repeats``).  Each jump is made twice
-    from the same state: in a coarse run of one simulated cycle, and in a fine one of two, each for half of the jump.  First-order errors of the
-    coarse run are twice those of the fine one; Richardson extrapolation removes them.  The jump ends with a step in which nothing moves and nothing wears.
+    In a jump of n cycles, wear, work and slip of each step of one simulated cycle count n times (``contact.repeats``).  Each jump is computed
+    twice from the same state: a coarse run of one simulated cycle, and a fine run of two, each for half of the jump.  First-order errors of the
+    coarse run are twice those of the fine one, and Richardson extrapolation removes them.  The jump ends with a step without motion or wear.
 
-    The estimated error is what extrapolation leaves: how far the difference of the runs is from that of the last jump times the square of
-    their ratio in length.  Lengths are chosen so that the error of a jump is ``accuracy`` times its wear, or a twentieth of that times all wear so
-    far, and friction that evolves changes by a quarter: if by much more, differences do not tell the error.  A jump of a larger error, or in which a step
-    does not converge, is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, are of two cycles, and end like two one by one.
+    The estimated error is what extrapolation leaves: the difference between the two runs, compared with that of the last jump scaled by the
+    square of the ratio of their lengths.  The length of a jump is chosen such that its error is ``accuracy`` times its wear, or a twentieth of
+    that times all wear so far, and that evolving friction changes by at most about a quarter.  If the error is larger, or if a step does not
+    converge, the jump is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, have two cycles.
 
     Args:
         problem: The ContactProblem, in the state before the first cycle.
-        cycle: Function of the number of cycles done that takes the problem through one cycle by ``problem.solve()``.  It is
-            called again from earlier states, so all loads that its steps need are set in it.
+        cycle: Function of the number of cycles done, which takes the problem through one cycle by ``problem.solve()``.  It is called
+            repeatedly from earlier states, so it must set all loads that its steps need.
         cycles: Number of cycles.
-        accuracy: Relative, of worn volume, largest depth and profile.
-        longest, max_cycles: Most cycles in a jump, and most cycles simulated in this call; a jump that has begun is finished.
-        path: Folder of checkpoints, written after every jump; if it has some, the run continues from the last.
+        accuracy: Requested relative error of worn volume, largest depth and profile.
+        longest, max_cycles: Largest number of cycles in a jump, and to simulate in this call; a jump that has begun is finished.
+        path: Folder of checkpoints, one after every jump; if it contains some, the run continues from the last.
         monitor: None, or a function of a row of the table, called after every jump, in the state at its end.
 
     Returns:
         A ``CycleJump``; the problem is in the state after the last cycle.  On a terminal there is a progress bar if tqdm is installed.
 
     Raises:
-        NotConverged: a step of cycles simulated one by one did not converge; after any error the problem is at the end of the last jump.
-        RuntimeError: ``max_cycles`` were simulated; with ``path`` the same call goes on.
-        ValueError: no contact wears, a cycle has no step, a number is out of range, or the folder is of another run.
+        NotConverged: a step of cycles simulated one by one did not converge; after any exception, the last jump's end is restored.
+        RuntimeError: ``max_cycles`` were simulated; with ``path``, the same call continues.
+        ValueError: no contact wears, a cycle has no step, a number is out of range, or the folder belongs to another run.
 
     Example:
         >>> def cycle(done):

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""How far results are off because of the mesh: by a second problem with a better space, stepped along the same load history."""
+"""Estimates of the discretisation error, from a more accurate problem that is taken through the same load history."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Estimated(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Error over the size of the value; 0 where both are nothing."""
+        """Error relative to the size of the value; 0 if both are zero."""
         return 0.0 if self.error == 0 else float(np.divide(self.error, abs(self.value)))
 
 
@@ -101,17 +101,17 @@ def estimate(
         problem: The problem whose error is estimated.
         reference: The more accurate one.  On the same mesh object, with a space that contains that of the problem, tractions are
             compared, and cells get indicators.
-        quantities: Functions by name, which take a problem and return a number, the same on all ranks, or several, such as the
-            force after each step so far.  Of several numbers, the value is the largest, and the error is the largest of theirs.
-            They are added to
-            ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``, the sum of the sizes of tangential
-            reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same mesh object, or where all
-            contacts are with planes, there are also ``pressure`` and ``shear``, root mean squares over all facets of the contacts of
-            the nodal normal and tangential tractions, reaction over area, with those of the differences as errors.
+        quantities: Further functions by name, which take a problem and return a number, the same on all ranks, or several numbers,
+            such as the force after each step so far.  Of several numbers, the value is the largest, and the error is the largest of
+            theirs.  The built-in quantities are ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``,
+            the sum of the sizes of tangential reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same
+            mesh object, or if all contacts are with planes, there are also ``pressure`` and ``shear``: root mean squares of the nodal
+            normal and tangential tractions (reaction over area) over all contact facets.  Their errors are the root mean squares of
+            the differences.
         share: Error over difference, ``1 / (1 - 2**-p)`` for a reference on cells of half the size and convergence of order p.
 
     Raises:
-        ValueError: problems that do not belong together, or quantities that are not finite numbers.
+        ValueError: the problems do not belong together, or a quantity is not a finite number.
 
     Example:
         >>> W = functionspace(block, ("Lagrange", 2, (3,)))  # the same body in second order
@@ -144,9 +144,9 @@ def estimate(
 
 
 def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
-    """Energy norm of the difference of displacements, over that of the reference's, and on each cell.  Collective.
+    """Energy norm of the difference of displacements, relative to that of the reference, and on each cell.  Collective.
 
-    With the tangent ``a(v, w)`` of the reference at its displacement ``U`` the square on a cell K is ``a_K(e, e)``,
+    With the tangent ``a(v, w)`` of the reference at its displacement ``U``, the squared norm on a cell K is ``a_K(e, e)`` with
     ``e = U - u``.  Terms on facets count for their cells.
     """
     body = reference.body

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A load history in increments that are halved where a step fails, and grow again."""
+"""A load history in increments that are halved if a step fails, and grow again."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def advance(
         monitor: None, or a function of parameter and record, called after every step.
 
     Returns:
-        The table.
+        The ``History``.
 
     Raises:
         NotConverged: a step with the smallest increment did not converge; problem and table are at the last converged step.
-        ValueError: points that do not increase.
+        ValueError: ``points`` do not increase.
 
     Example:
         >>> def load_history(t): held.value = (0, 0, -0.01 * t)

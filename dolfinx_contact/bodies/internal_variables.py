@@ -26,7 +26,7 @@ class InternalVariables(Guarded):
         after_step: None, or ``f(u)``, called once after every converged step.  It updates ``state``.
 
     Raises:
-        ValueError: a ``state`` that is not a Function, or an argument that cannot be called.
+        ValueError: an entry of ``state`` is not a Function, or one of the other arguments is not callable.
 
     Example:
         >>> creep = fem.Function(V)

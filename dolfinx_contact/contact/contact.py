@@ -67,10 +67,11 @@ class Contact(Guarded):
         plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder``, ``RigidSurface`` or ``DeformableSurface``.
         friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.  Coefficients may be given per
             node, ``shape=(n, 2)`` for this rank's n nodes, or as fields, which the contact evaluates at its nodes.
-        wear: Archard's law, whose worn depth opens the gap; None is no wear.  Between two deformable bodies a law for each, see ``Wear``.
-        weight: Factor of the surface measure, the one in the forms: ``2 * pi * r`` with axial symmetry, or a thickness.  A
+        wear: Archard's law, whose worn depth opens the gap; None is no wear.  Between two deformable bodies, the law has a
+            coefficient for each, see ``Wear``.
+        weight: Factor of the surface measure, the same as in the forms: ``2 * pi * r`` with axial symmetry, or a thickness.  A
             number, a UFL expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and thus pressures, worn depths
-            and pressure-dependent friction; reactions follow from the forms, which contain it.
+            and pressure-dependent friction.  Reactions follow from the forms, which must contain it.
 
     Raises:
         ValueError: on all ranks, for facets that are not boundary facets of the mesh, an unsuitable space, a plane of another
@@ -322,7 +323,7 @@ class Contact(Guarded):
 
     @property
     def points(self) -> ContactPoints:
-        """The ``ContactPoints``: motion as a sparse operator, directions that supports hold."""
+        """The ``ContactPoints``: the motion as a sparse operator, and the directions that supports hold."""
         return self._placement.now.points
 
     def points_in(self, frames: np.ndarray) -> ContactPoints:

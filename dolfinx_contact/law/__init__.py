@@ -1,4 +1,4 @@
-"""The friction law: coefficients, cone, maps, work and wear; arrays alone, without DOLFINx."""
+"""The friction law: coefficients, cone, maps, frictional work and wear; arrays alone, without DOLFINx."""
 
 from dolfinx_contact.law.bipotential import bipotential_gap
 from dolfinx_contact.law.friction import Friction

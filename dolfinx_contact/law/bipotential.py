@@ -17,22 +17,21 @@ from dolfinx_contact.law.friction_cone import as_nodes
 def bipotential_gap(
     r: ArrayLike, gap: ArrayLike, slip_increment: ArrayLike, friction: Friction | float
 ) -> np.ndarray:
-    """Gap ``b_c(-du, r) + du . r`` of the bi-potential of [dSFMH07, Section 1].
+    """Gap ``b_c(-du, r) + du . r`` of the bi-potential [dSFMH07, Section 1], zero exactly where the law holds.
 
-    For a reaction in the friction cone and no penetration it is
-    ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, and zero exactly where the law holds. It is
-    computed as a sum of non-negative terms. Elsewhere the gap is infinite: for a certificate, first project reactions and clip
-    gaps at zero, and report these changes separately.
+    For a reaction in the friction cone and no penetration, it is ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, computed as
+    a sum of non-negative terms. Elsewhere it is infinite. To certify an approximate solution, first project reactions on the
+    cone and clip gaps at zero, and report these changes separately.
 
     Args:
         r: Reactions in the local frame, ``shape=(n, 3)``, or ``(n, 2)`` in two dimensions.
-        gap: Normal gap ``x_n`` at the end of the step, ``shape=(n,)``, a length.
-        slip_increment: ``du_t`` over the step, ``shape=(n, 2)`` or ``(n, 1)``, a length.
-        friction: The coefficients.
+        gap: Normal gap ``x_n`` at the end of the step, ``shape=(n,)``, length.
+        slip_increment: ``du_t`` over the step, ``shape=(n, 2)`` or ``(n, 1)``, length, local frame.
+        friction: A ``Friction``, or a number, the isotropic coefficient.
 
     Returns:
-        ``shape=(n,)``, force times length. ``inf`` where ``r`` is outside the cone by more than
-        rounding (16 units of it) or ``gap`` is negative.
+        ``shape=(n,)``, force times length; ``inf`` where ``r`` is outside the cone by more than rounding (16 machine epsilons
+        of ``r_n``) or ``gap`` is negative.
 
     Raises:
         ValueError: Wrong shape or type.
@@ -54,7 +53,7 @@ def bipotential_gap(
     outside = law.load_function(r) > 16 * np.finfo(float).eps * np.abs(r[:, -1])
     value = law.bipotential_gap(r, gap, slip)
     slippery = (friction.mu == 0).all(axis=-1)
-    if slippery.any():  # the cone is the half line: what divides by mu says nothing there
+    if slippery.any():  # the cone is a half line, and terms divided by mu are meaningless
         off = (r[:, :-1] != 0).any(axis=1) | (r[:, -1] < 0)
         outside, value = np.where(slippery, (off, r[:, -1] * gap), (outside, value))
     return np.where((outside != 0) | (gap < 0), np.inf, value)

@@ -1,18 +1,18 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""Frictional work of a load step, node by node: never negative, exact for rigid sliding.
+r"""Frictional work of a load step at each node: never negative, exact for rigid sliding.
 
-A node that slips along the unit vector ``e`` under the normal force N works ``N m(e)`` per way, with
+A node that slips along the unit vector ``e`` under the normal force N dissipates ``N m(e)`` per length of slip, with
 
 .. math:: m(e) = \frac{e \cdot P^2 e}{|M^{-1} P^2 e|} = \sum_i \mu_i e_i s_i, \qquad
           s = \frac{M^{-1} P^2 e}{|M^{-1} P^2 e|},
 
-because its force is ``-N M s``.  The rule is the mean of both ends of the step times the way,
+because its friction force is ``-N M s``.  The rule takes the mean of this at both ends of the step, times the slip:
 
-    D = |du| (N0 m0 + N1 m(e1)) / 2,    e1 = du / |du|,    m0 = c m(e0) + (1 - c) m(e1),
+    D = |du| (N0 m0 + N1 m(e1)) / 2,    e1 = du / |du|,    m0 = c m(e0) + (1 - c) m(e1).
 
-with the direction e0 in which the last step's force says that the node was slipping then, and ``c = max(e0.e1, 0)``;
-c = 0 if it did not slip, and has no force on the cone.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
+e0 is the direction of slip at the end of the last step, which follows from the force then, and ``c = max(e0.e1, 0)``; c = 0
+if the node did not slip and had no force on the cone.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from dolfinx_contact.law.friction import Friction, split
 
-# Part of its cone within which a force that sticks points still along the slip before: a pause leaves it there but for rounding.
+# A sticking force this near its cone still points along the previous slip: after a pause it is on the cone but for rounding.
 PAUSED = 1e-3
 
 
@@ -33,20 +33,21 @@ def work_of_friction(
     slip_increment: np.ndarray,
     law_before: Friction | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Frictional work of one step along the principal friction directions, all entries >= 0, and what of it is owed to a turn.
+    """Frictional work of one step along the principal friction directions, and the part of it that is due to a turn of slip.
 
     Args:
-        friction: The law.
-        before: Reactions at the end of the last step, ``shape=(n, gdim)``, local frame.
+        friction: The friction law of the step.
+        before: Reactions at the end of the last step, ``shape=(n, gdim)``, local frame, force.
         slipped: Nodes that slipped in the last step, ``shape=(n,)``, bool.
-        reaction: Reactions at the end of this one; of these the normal components count.
-        slip_increment: Slip during this one, ``shape=(n, gdim - 1)``, local frame.
-        law_before: The law of the last step, if friction was exchanged or its axes have turned since: it says along which
-            direction the node slipped then, and axes alone count as they were.
+        reaction: Reactions at the end of this step, ``shape=(n, gdim)``; only normal components are used.
+        slip_increment: Slip during this step, ``shape=(n, gdim - 1)``, local frame, length.
+        law_before: The law of the last step, if friction was exchanged or its axes have turned since.  It determines the
+            direction of slip then; if only axes have turned, the work at the start of the step is taken with the old axes.
 
     Returns:
-        The work, ``shape=(n, gdim - 1)``, force times length, that of a node is the sum of its row; and by how much it is more than the
-        work of slip along ``e1`` alone.  Normal forces below zero, which only a state that is no solution has, count as none.
+        The work, all entries >= 0, ``shape=(n, gdim - 1)``, force times length (that of a node is the sum of its row); and by how
+        much it exceeds the work of slip along ``e1`` alone, the same shape.  Negative normal forces, which only states that are not
+        solutions have, count as zero.
     """
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
@@ -58,7 +59,7 @@ def work_of_friction(
         start, straight = mu * e0 * s0, per_way
     else:
         back = -law_before.against_slip(before[:, :-1])
-        # Of the same friction axes have turned: grooves as they stood.
+        # If only the axes have turned, take the grooves as they stood.
         then = law_before if _same_coefficients(friction, law_before) else friction
         e0, both = friction.along_axes(back), (then.along_axes(a) for a in (back, slip_increment))
         start, straight = (_per_way(mu, Q, split(along)[1]) for along in both)
@@ -70,13 +71,13 @@ def work_of_friction(
 
 
 def _per_way(mu: np.ndarray, Q: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Work per way and normal force along unit vectors ``e``, by principal directions."""
+    """Work per slip length and normal force along unit vectors ``e``, by principal directions."""
     _, s = split(Q**2 * mu * e)  # M^-1 P^2 e
     return mu * e * s
 
 
 def _same_coefficients(one: Friction, other: Friction) -> bool:
-    """Whether two laws differ by their axes at most."""
+    """Whether two laws have the same coefficients; axes may differ."""
     pairs = ((one.mu, other.mu), (one.Q, other.Q))
     return all(bool(np.all(a == b)) for a, b in pairs)
 
@@ -92,12 +93,12 @@ def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndar
 
 
 def slipped_last(friction: Friction, reaction: np.ndarray, slipped: np.ndarray) -> np.ndarray:
-    """Nodes whose force says along which direction they slipped: that slip, or stick with a force that is on the cone, ``shape=(n,)``, bool.
+    """Nodes whose force gives the direction of their last slip: those that slip, or stick with a force on the cone; ``shape=(n,)``, bool.
 
     Args:
-        friction: The law.
+        friction: The friction law.
         reaction: Reactions, ``shape=(n, gdim)``, local frame.
-        slipped: Nodes that slip.
+        slipped: Nodes that slip, ``shape=(n,)``, bool.
     """
     force, normal = friction.along_axes(reaction[:, :-1]), reaction[:, -1]
     mu = friction.mu[..., : force.shape[1]]

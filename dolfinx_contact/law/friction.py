@@ -20,7 +20,7 @@ from dolfinx_contact import _kernel
 from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, number
 
-Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not know
+Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not import
 
 OWNERS = ("body", "surface")  # of a texture
 
@@ -31,16 +31,16 @@ REMEDY = (
     "has shape (n, 2)."
 )
 
-# What stands for infinity: nodes slide only where their normal reaction is less than a ten-thousandth of the tangential one.
-# What nodes that are about to open make of it falls with 1 / ROUGH; solvers find states with them up to here at once, beyond it by luck.
+# Replaces infinite coefficients. A node then slides only where its normal reaction is below a thousandth of the tangential one. The error
+# at nodes about to open falls with 1 / ROUGH; with larger values, solvers do not converge reliably.
 ROUGH = 1e3
 
 
 def rough(mu: Any):
-    """Coefficients with ``ROUGH`` where they are infinite; all others as they were given."""
+    """Coefficients with ``ROUGH`` in place of infinite ones; all others as given."""
     try:
         infinite = np.isposinf(mu)
-    except (TypeError, ValueError):  # no real numbers: others say so
+    except (TypeError, ValueError):  # not real numbers: checked elsewhere
         return mu
     return mu if np.ma.is_masked(mu) or not np.any(infinite) else np.where(infinite, ROUGH, mu)
 
@@ -78,44 +78,45 @@ def _coefficients(name: str, value: ArrayLike | Callable | Any) -> np.ndarray:
 
 
 class Friction(Guarded):
-    """Orthotropic dry friction with a slip rule that need not be associated.
+    """Orthotropic dry friction with a slip rule that need not be associated; immutable.
 
-    The cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip rule
-    ``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` with ``P = diag(p)`` [dSFMH07, Section 1]; x and y are
-    the principal friction directions. Only the ratio of the two ``p`` matters. Immutable.
+    The friction cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip rule
+    ``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` with ``P = diag(p)`` [dSFMH07, Section 1]. ``r`` is the reaction on the body,
+    ``du_t`` the slip increment; x and y are the principal friction directions. Only the ratio of the two ``p`` matters.
 
     Args:
-        mu: Coefficients of friction. A number (isotropic), a pair ``(mu_x, mu_y)``, or an array
-            ``shape=(n, 2)`` with a pair for each node, n = 0 on a rank that has none. Zero is frictionless, infinity perfectly
-            rough: touching nodes stick; a contact replaces values above 1e3 by 1e3. Or a field, see below.
-        p: Coefficients of the slip rule, in the same forms, positive. Omitted: associated, ``p = mu``.
+        mu: Coefficients of friction: a number (isotropic), a pair ``(mu_x, mu_y)``, an array ``shape=(n, 2)`` with a pair for
+            each of this rank's contact nodes, or a field, see below. Zero is frictionless; infinity is perfectly rough, so
+            touching nodes stick. A contact replaces values above 1e3 by 1e3.
+        p: Coefficients of the slip rule, positive, in the same forms. By default ``p = mu``, the associated rule.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
-        axes: Principal friction direction x at each node, e.g. of grooves: unit vectors ``(cos, sin)`` in the tangential part of
-            the local frame, ``shape=(n, 2)``, which rotate with it. Omitted: the first direction of the frame. A field may also
-            give directions in space, ``(3, n)``, of any length, which are projected on the surface.
-        of: Owner of a field of ``axes``. "body": evaluated at reference positions; directions stay while surfaces rotate.
-            "surface": a callable of positions on the surface; directions move and rotate with it. ``mu``, ``p`` and wear belong
-            to the body.
+        axes: Principal friction direction x at each node, for example along grooves: unit vectors ``(cos, sin)`` in the
+            tangential axes of the local frame, ``shape=(n, 2)``, which rotate with it. By default, the first axis of the frame. A
+            field may also return directions in space, ``shape=(3, n)``, of any length, which are projected on the surface.
+        of: Owner of ``axes`` given as a field. "body": evaluated at reference positions; surfaces that rotate do not turn the
+            directions. "surface": a callable of positions on the surface; directions move and rotate with the surface. ``mu``,
+            ``p`` and wear always belong to the body.
 
     ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as for DOLFINx's ``interpolate``, that return
     values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them at
-    its own nodes when it gets the law, and again at the start of each step: ``contact.friction`` has the values. A callable for
-    ``mu`` or ``p`` may also have an argument named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth``: it gets that
-    array of the contact, ``shape=(n,)``, the pressure at the end of the step, the others at its start, see docs/howto/fields.md.
+    its nodes when the friction is assigned and at the start of each step; ``contact.friction`` has the values. A callable for
+    ``mu`` or ``p`` may have further arguments named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth``. It then gets
+    that array of the contact, ``shape=(n,)``: the pressure at the end of the step, the others at its start, see
+    docs/howto/fields.md.
 
     Raises:
-        ValueError: A coefficient is negative, not finite, not real or of the wrong shape, exactly one
-            of a pair ``mu`` is zero, ``p`` is not positive, ``p`` and ``k`` are both given.
+        ValueError: A coefficient is negative, NaN, not real or of the wrong shape; exactly one of a pair ``mu`` is zero or
+            infinite; ``p`` is not positive and finite; ``p`` and ``k`` are both given; ``of`` does not fit ``axes``.
 
     Attributes:
         mu: ``shape=(2,)`` or ``(n, 2)``.
         p: Normalised to ``max(p / mu) = 1``, same shape as ``mu``; zero where ``mu`` is.
         axes: ``shape=(n, 2)`` or None.
-        frictionless: All ``mu`` are zero.
-        isotropic: Both directions have the same ``mu`` and ``p`` everywhere.
-        associated: ``p`` is proportional to ``mu`` everywhere.
-        field: Something is given as a field; the values above are then available only in ``contact.friction``.
-        exponent: ``k`` of a field.
+        frictionless: Whether all ``mu`` are zero.
+        isotropic: Whether both directions have the same ``mu`` and ``p`` everywhere.
+        associated: Whether ``p`` is proportional to ``mu`` everywhere.
+        field: Whether ``mu``, ``p`` or ``axes`` is a field; the attributes above are then available only in ``contact.friction``.
+        exponent: ``k``, if it was given; otherwise None.
 
     Example:
         >>> friction = dc.Friction(mu=(0.30, 0.15), p=(0.05, 0.20))  # along and across the axis
@@ -155,19 +156,24 @@ class Friction(Guarded):
 
     @staticmethod
     def of_pair(first: Friction | float, second: Friction | float, angle: float = 0.0) -> Friction:
-        """The law of two sides with a texture each: the mean of both in the sense of works, see ``law/pair.py``.
+        """Friction between two textured sides: the mean of both, such that the frictional work is the mean of theirs; see ``law/pair.py``.
 
-        Sliding along axes that both sides share works as the mean of theirs, with ``mu`` the mean of both.  In other directions the law works at most as the mean, in the
-        worst one 5 % less for ``mu`` 2 : 1 across 1 : 2, and 11 % less for 3 : 1 across 1 : 3: no orthotropic law is exact there.  A rule of your own is a function of two
-        laws that returns a ``Friction``.
+        If both sides have the same principal directions, ``mu`` is the mean of both and the frictional work is exact.  In other
+        directions the work is at most the mean: in the worst direction, 5 % less for ``mu`` 2 : 1 across 1 : 2, and 11 % less for
+        3 : 1 across 1 : 3.  No orthotropic law is exact there.  For another rule, write a function of two ``Friction`` that returns
+        one.
 
         Args:
-            first, second: Laws of numbers or of arrays per node; a number is isotropic friction.  Of a field pair what ``contact.friction`` has made of it.
-            angle: From the first principal direction of the first side to that of the second, in radians about the normal.  Where bodies turn against each other, assign
-                the pair anew between steps.
+            first, second: Friction of each side, given by numbers or by arrays per node, not by fields; a number is isotropic
+                friction.  Instead of a field, pass the ``contact.friction`` of a contact that has it.
+            angle: Angle from the first principal direction of the first side to that of the second, radians about the normal.  If
+                the bodies turn relative to each other, assign a new pair between steps.
+
+        Returns:
+            A ``Friction`` in the local frame of the first side.
 
         Raises:
-            ValueError: fields, or another angle than one finite number.
+            ValueError: a law is a field, or the angle is not one finite number.
 
         Example:
             >>> crossed = dc.Friction.of_pair(dc.Friction((0.3, 0.1)), dc.Friction((0.3, 0.1)), angle=np.pi / 2)
@@ -228,7 +234,7 @@ class Friction(Guarded):
         raise AttributeError(f"Friction has no attribute {name!r}")
 
     def given(self) -> dict[str, Any]:
-        """What ``mu``, ``p`` and ``axes`` were given as, if any is a field."""
+        """``mu``, ``p`` and ``axes`` as the user gave them."""
         return self._given
 
     def __reduce__(self) -> tuple:
@@ -248,11 +254,11 @@ class Friction(Guarded):
 
     @property
     def Q(self) -> np.ndarray:
-        """Diagonal of Q = P M^-1, largest entry 1, same shape as ``mu``; zero where ``mu`` is."""
+        """Diagonal of ``Q = P M^-1`` [dSFMH07, Section 1], scaled to a largest entry of 1; same shape as ``mu``, dimensionless, zero where ``mu`` is."""
         return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
 
     def at(self, nodes: np.ndarray) -> Friction:
-        """The law of some of the nodes, of indices ``shape=(k,)``; coefficients for all of them stay what they are."""
+        """The friction of some of the nodes, given by their indices, ``shape=(k,)``; coefficients common to all nodes do not change."""
         if self.mu.ndim == 1 and self.axes is None:
             return self
         mu, p = (rows if rows.ndim == 1 else rows[nodes] for rows in (self.mu, self.p))
@@ -260,14 +266,14 @@ class Friction(Guarded):
         return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
 
     def along_axes(self, t: np.ndarray) -> np.ndarray:
-        """Components of tangential vectors along the principal friction directions, ``shape=(n, 2)`` or ``(n, 1)``."""
+        """Components of tangential vectors (local frame) along the principal friction directions, ``shape=(n, 2)`` or ``(n, 1)``."""
         if self.axes is None:
             return t
         (x, y), (cos, sin) = t.T, self.axes.T
         return np.column_stack((cos * x + sin * y, cos * y - sin * x))
 
     def against_slip(self, r_t: np.ndarray) -> np.ndarray:
-        """Unit vectors along ``P^-2 r_t``, opposite to slip [dSFMH07, Section 1].
+        """Unit vectors along ``P^-2 r_t``, opposite to the slip at a reaction on the cone [dSFMH07, Section 1].
 
         Args:
             r_t: Tangential reactions, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions, local frame.
@@ -283,19 +289,19 @@ class Friction(Guarded):
         return self._from_axes(against)
 
     def drag(self, slip: np.ndarray) -> np.ndarray:
-        """Friction ``P^2 s / |M^-1 P^2 s|`` of unit normal reaction that slip ``s`` meets: ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
+        """``d(s) = P^2 s / |M^-1 P^2 s|``, the friction per unit normal reaction that opposes a slip ``s``: ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
 
         Args:
-            slip: ``shape=(n, T)``, local frame; lengths do not matter.
+            slip: ``shape=(n, T)``, local frame, ``T = gdim - 1``; only directions matter.
 
         Returns:
-            The same shape, dimensionless; zero where ``slip`` or ``mu`` is.
+            The same shape, local frame, dimensionless; zero where ``slip`` or ``mu`` is.
         """
         unit, _ = self._resisted(slip)
         return self._from_axes(self.mu[..., : slip.shape[1]] * unit)
 
     def drag_with_slope(self, slip: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``drag(slip)``, and the derivative of ``drag(slip + w along)`` by w, the same shape, per length of the slip."""
+        """``drag(slip)``, and the derivative of ``drag(slip + w along)`` with respect to w at 0, the same shape, in the inverse unit of ``slip``."""
         (unit, length), along = self._resisted(slip), self.along_axes(along)
         mu, T = self.mu[..., : slip.shape[1]], slip.shape[1]
         rate = np.divide(self._softness(T) * along, length, out=np.zeros_like(along), where=length > 0)  # fmt: skip
@@ -312,7 +318,7 @@ class Friction(Guarded):
         return self._from_axes(self.mu[..., : t.shape[1]] * self.along_axes(t))
 
     def _resisted(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit vector and length of ``M^-1 P^2 slip``, the latter up to a factor, along the principal directions."""
+        """Unit vector and length (up to a constant factor) of ``M^-1 P^2 slip``, along the principal directions."""
         length, unit = split(slip)
         factor, resisted = split(self._softness(slip.shape[1]) * self.along_axes(unit))
         return resisted, length * factor
@@ -326,14 +332,14 @@ class Friction(Guarded):
         return self._soft[T]
 
     def _from_axes(self, t: np.ndarray) -> np.ndarray:
-        """Tangential vectors of these components along the principal friction directions."""
+        """Tangential vectors in the local frame, from components along the principal friction directions."""
         if self.axes is None:
             return t
         (x, y), (cos, sin) = t.T, self.axes.T
         return np.column_stack((cos * x - sin * y, sin * x + cos * y))
 
     def law(self, dim: int):
-        """The kernel's law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw`` of ``solvers/protocols.py``.
+        """The compiled law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw``, see ``solvers/protocols.py``.
 
         Raises:
             ValueError: Friction is not isotropic and ``dim`` is 2, where there is only one
@@ -354,7 +360,7 @@ class Friction(Guarded):
 
 
 class _Direction:
-    """One direction in the frames of all nodes, as a field."""
+    """A constant direction in the local frames of all nodes, as a field."""
 
     def __init__(self, axis: np.ndarray):
         self._axis = axis
@@ -368,7 +374,7 @@ def _angle(axes: np.ndarray | None) -> Any:
 
 
 def at_most_rough(friction: Friction) -> Friction:
-    """The law with ``ROUGH`` for coefficients beyond it, which are as rough, but beside which rounding of slips is large."""
+    """The friction with coefficients limited to ``ROUGH``: larger ones act alike, but amplify rounding errors of slip."""
     if not (friction.mu > ROUGH).any():
         return friction
     mu = np.minimum(friction.mu, ROUGH)
@@ -377,8 +383,7 @@ def at_most_rough(friction: Friction) -> Friction:
 
 
 def _q_from_exponent(mu: np.ndarray, k: float | str) -> np.ndarray:
-    """Q = P M^-1 up to a factor for ``p_y / p_x = (mu_y / mu_x)**k``, by logarithms: the powers alone
-    could overflow."""
+    """``Q = P M^-1``, up to a factor, for ``p_y / p_x = (mu_y / mu_x)**k``; logarithms avoid overflow."""
     exponent = finite("k", k)
     if exponent.shape != ():
         raise ValueError(f"k must be one real number, not {k!r}")
@@ -406,7 +411,7 @@ def _unit_vectors(axes: ArrayLike, mu: np.ndarray) -> np.ndarray:
 
 
 def as_friction(friction: Any) -> Any:
-    """A number as isotropic friction; anything else as it is."""
+    """Isotropic friction for a number; anything else unchanged."""
     number = isinstance(friction, Real) or (isinstance(friction, np.ndarray) and friction.ndim == 0)
     return Friction(friction) if number and not isinstance(friction, (bool, np.bool_)) else friction
 
@@ -417,6 +422,6 @@ def is_field(value: object) -> bool:
 
 
 def split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero ones stay zero."""
+    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero vectors stay zero."""
     length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
     return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)

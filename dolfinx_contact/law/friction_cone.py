@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction
 
-# Numbers above this are projected in another unit, so that no sum of theirs overflows.
+# Points with larger components are scaled before projection, so that no sum overflows.
 HUGE, HUGE_UNIT = 1e300, 2.0**20
 
 
@@ -50,16 +50,16 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
 
     Args:
         tau: Points in the local frame ``(t1, t2, n)``, ``shape=(n, 3)``, any unit.
-        mu: Coefficients of friction, a number, ``shape=(2,)`` or ``(n, 2)``. Zero: the cone is the
-            half line ``r_t = 0, r_n >= 0``.
+        mu: Coefficients of friction: a number, ``shape=(2,)`` or ``(n, 2)``. With zero, the cone is the half line
+            ``r_t = 0, r_n >= 0``.
 
     Returns:
-        The projected points, ``shape=(n, 3)``. A row of ``tau`` with an infinite or NaN entry gives a row of NaN, a projection
-        beyond the range of double precision gives infinity; other rows are not affected. (For a frictionless cone, only ``tau_n``
-        counts.)
+        The projected points, ``shape=(n, 3)``, in the unit of ``tau``. A row of ``tau`` with an infinite or NaN entry gives a row
+        of NaN (for a frictionless cone only if it is ``tau_n``); a projection beyond the range of double precision gives infinity.
+        Other rows are not affected.
 
     Raises:
-        ValueError: Wrong shape or type, negative or infinite ``mu``, exactly one of a pair zero.
+        ValueError: ``tau`` has another shape or type; ``mu`` is negative, NaN, or zero in exactly one direction.
 
     Example:
         >>> dc.law.project_cone([[0.1, 0, 1], [0.1, 0, -1]], (0.30, 0.15))

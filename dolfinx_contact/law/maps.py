@@ -1,10 +1,10 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Nodal maps whose fixed points are the law: predictor and corrector with their augmentation parameters.
+"""Nodal maps, predictor and corrector with their augmentation parameters; their fixed points are the solutions of the law.
 
-Each takes a law, reactions, gaps and slip increments, ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame,
-and returns new reactions and statuses; ``linearised`` adds their (Clarke) derivatives.  ``springs`` are the stiffnesses
-that a preconditioner needs at the nodes, ``shape=(n, gdim)``.
+A map takes a law, reactions, gaps and slip increments, ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame,
+and returns new reactions and statuses; ``linearised`` also returns their (Clarke) derivatives.  ``springs`` are stiffnesses
+at the nodes for a preconditioner, ``shape=(n, gdim)``, force per length.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class BipotentialMap:
 
     @property
     def normal(self) -> np.ndarray:
-        """Along the normal, as of the other map."""
+        """Augmentation parameter along the normal, ``shape=(n,)``, force per length; as in the return map."""
         return self.rho
 
     def __call__(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
@@ -49,11 +49,11 @@ class BipotentialMap:
 
 @dataclass(frozen=True)
 class ReturnMap:
-    """A predictor without the translated normal term and a projection in the metric of the slip rule.
+    """The predictor without the shift along the normal, and a projection in the metric in which the slip rule is normal to the cone.
 
     Args:
         normal: Augmentation parameter along the normal, ``shape=(n,)``, force per length.
-        tangential: The same along slip.
+        tangential: Augmentation parameter along the surface, ``shape=(n,)``, force per length.
     """
 
     normal: np.ndarray
@@ -66,7 +66,7 @@ class ReturnMap:
         return law.return_jacobian(reaction, gap, slip, self.normal, self.tangential)
 
     def springs(self, friction: Friction, dim: int) -> np.ndarray:
-        """The parameters themselves; none along the plane without friction."""
+        """The parameters themselves; zero along the surface at frictionless nodes."""
         springs = np.empty((len(self.normal), dim))
         springs[:, -1] = self.normal
         springs[:, :-1] = (friction.Q[..., : dim - 1] > 0) * self.tangential[:, None]

@@ -1,33 +1,34 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""The friction law of two textured sides: the mean of both in the sense of works.
+r"""The friction law of two textured sides: an orthotropic law whose frictional work is the mean of theirs, or a little less.
 
-Sliding along a unit vector ``e`` an associated law works ``h(e) = |M e| = sqrt(e . A e)`` per normal force and way, with ``A = M^2`` in common axes.
-The mean ``(h_1 + h_2) / 2`` of two sides is a support function, too: that of the Minkowski mean of their ellipses, which is an ellipse only if
-their axes and ``mu_y / mu_x`` are the same.  Its square is ``(e . A_1 e + e . A_2 e + 2 h_1 h_2) / 4``; the quadratic form
+An associated law that slides along a unit vector ``e`` dissipates ``h(e) = |M e| = sqrt(e . A e)`` per normal force and length of slip, with
+``A = M^2`` in common axes.  The mean ``(h_1 + h_2) / 2`` of two sides is the support function of the Minkowski mean of their ellipses, which is
+an ellipse only if their axes and ``mu_y / mu_x`` are the same.  Its square is ``(e . A_1 e + e . A_2 e + 2 h_1 h_2) / 4``; the quadratic form
 
 .. math:: A = (A_1 + A_2 + 2 A_1 \# A_2) / 4,
 
-with the geometric mean ``#`` of matrices in the place of the product, is never above it [Kubo, Ando, Math. Ann. 246, 1980: ``x . (A # B) x``
-is at most ``sqrt(x . A x  x . B x)``], and is equal to it along common axes: there ``M = (M_1 + M_2) / 2``.
+in which the geometric mean ``#`` of matrices replaces the product, is never above it [Kubo, Ando, Math. Ann. 246, 1980: ``x . (A # B) x``
+is at most ``sqrt(x . A x  x . B x)``].  Along common axes both are equal, and ``M = (M_1 + M_2) / 2``.
 
-The slip rule is that of the mean of ``ln Q``, as far as it lies along the axes of ``A``: sides with one ``Q`` have it as a pair, two associated sides make an associated law.
+The slip rule follows from the mean of ``ln Q``, projected on the axes of ``A``.  So two sides with the same ``Q`` and axes keep that ``Q``, and two
+associated sides make an associated law.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-# Part of a matrix that is not isotropic, below which it has no axes.
+# A matrix whose anisotropic part is below this has no axes.
 ROUND = 1e-12
 
 
 def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
-    """Coefficients ``mu`` and ``p``, and axes, of the pair, ``shape=(n, 2)`` each.
+    """Coefficients ``mu`` and ``p``, and unit vectors along the first principal direction, of the pair, ``shape=(n, 2)`` each.
 
     Args:
-        first, second: ``mu``, ``Q`` and the angle of the first principal direction, ``shape=(n, 2)``, ``(n, 2)`` and ``(n,)`` or what
-            broadcasts to that; zero ``mu`` is no friction.
+        first, second: ``mu``, ``Q`` and the angle of the first principal direction (radians) of each side, ``shape=(n, 2)``, ``(n, 2)`` and
+            ``(n,)``, or shapes that broadcast to these; zero ``mu`` is frictionless.
     """
     A, B = (_tensor(mu**2, angle) for mu, _, angle in (first, second))
     a, b = (np.prod(mu, axis=-1) for mu, *_ in (first, second))  # roots of the determinants
@@ -50,6 +51,6 @@ def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
 
 
 def _tensor(values: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Half the trace, and the rest along doubled angles, of tensors with these principal values."""
+    """Half the trace of tensors with these principal values, and their deviators as components along doubled angles."""
     iso, rest = (values[..., 0] + values[..., 1]) / 2, (values[..., 0] - values[..., 1]) / 2
     return iso + 0.0 * angle, rest * np.cos(2 * angle), rest * np.sin(2 * angle)

@@ -1,18 +1,18 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""The law at nodes whose motion along the surface supports prescribe, wholly or but for one direction ``f``.
+r"""The law at nodes whose motion along the surface is prescribed by supports, entirely or except along one direction ``f``.
 
-A reaction along a prescribed direction moves nothing: the support carries the rest of what acts there.  So it is a
-function of the normal reaction R and of the slip, not an unknown.  With the friction of unit normal reaction against a slip s,
+A reaction along a prescribed direction moves nothing: the support carries the rest of the force there.  So the reaction is a
+function of the normal reaction R and of the slip, not an unknown.  With the friction per unit normal reaction against a slip s,
 
 .. math:: d(s) = \frac{P^2 s}{|M^{-1} P^2 s|},
 
-- a node that is moved along ``k`` slips by ``s = k + w f``: ``r_t = -R d(s)``, where ``r_f = tau_f + rho w`` makes of the
-  predictor ``tau`` what the body can balance, the only unknown ``w`` being the slip along ``f``;
-- one that is not moved, ``k = 0``, slips along ``f`` alone: ``|r_f| <= R f.d(f)``, with the part across in the ratio of ``d(f)``;
-  beside it, it keeps the friction of the last step, as far as the cone leaves room, until it slips.
+- a node that the support moves along ``k`` slips by ``s = k + w f`` and has ``r_t = -R d(s)``.  The only unknown is the slip ``w`` along
+  ``f``; it follows from ``r_f = tau_f + rho w``, with the predictor ``tau``;
+- a node that the support does not move, ``k = 0``, slips along ``f`` alone: ``|r_f| <= R f.d(f)``, and the component across has the ratio
+  of ``d(f)``.  Until it slips, it keeps the friction of the last step, cut back to the cone.
 
-These are the law of [dSFMH07, Section 1] for all components together.  Needs NumPy alone.
+This is the law of [dSFMH07, Section 1] for all components together.  Needs NumPy alone.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from dolfinx_contact.law.friction import Friction
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import LawLike
 
-# Rounding in directions and friction kept, over their size.
+# Relative rounding of directions and of kept friction.
 ROUNDED = 32 * np.finfo(float).eps
 
-# Steps for the slip along a free direction: Newton's, or halves of the interval.
+# Iteration limit for the slip along a free direction: Newton steps and bisections.
 STEPS = 100
 
 OPEN, STICK, SLIP = 0, 1, 2
 
 
 def across(friction: Friction, along: np.ndarray) -> np.ndarray:
-    """Friction per friction along ``f`` of nodes that slip along it, ``d(f) / f.d(f)``, ``shape=(n, T)``; zero where ``f`` is."""
+    """``d(f) / f.d(f)``, friction relative to its component along ``f`` for slip along ``f``, ``shape=(n, T)``; zero where ``f`` is."""
     ratio = friction.drag(along)
     forward = _dot(ratio, along)[:, None]
     ratio = np.divide(ratio, forward, out=along.copy(), where=forward > 0)
@@ -55,14 +55,14 @@ def supported(
     known: np.ndarray,
     last: np.ndarray,
 ):
-    """The kernel's law, or the one that takes its place where supports move, guide, or have moved a node.
+    """The compiled law, or, if supports move, guide, or have moved a node, a ``SupportedLaw`` in its place.
 
     Args:
-        law: Of the kernel, of ``n`` nodes.
+        law: The compiled law of ``n`` nodes.
         friction: Its coefficients.
-        nodes: Those that supports hold in any tangential direction, ``shape=(k,)``.
-        along: ``f`` of these nodes, unit vectors, zero where none is free, ``shape=(k, T)``, local frame.
-        known: Slip along the other directions, ``shape=(n, T)``; zero where it is no more than rounding.
+        nodes: Indices of the nodes that supports hold in a tangential direction, ``shape=(k,)``.
+        along: Free tangential direction ``f`` of these nodes, unit vectors, zero where none is free, ``shape=(k, T)``, local frame.
+        known: Slip along the held directions, ``shape=(n, T)``; zero where it is no more than rounding.
         last: Tangential reactions of the last step, ``shape=(n, T)``.
     """
     coefficients = friction.at(nodes)
@@ -79,14 +79,14 @@ def supported(
 
 @dataclass(frozen=True)
 class SupportedLaw:
-    """The kernel's law, but for ``k`` nodes; see ``supported``.
+    """The compiled law with other maps at ``k`` supported nodes; see ``supported``.
 
     Args:
-        law: Of the kernel, of ``n`` nodes.
+        law: The compiled law of ``n`` nodes.
         friction: Coefficients of the ``k`` nodes.
-        known: Slip along held directions, ``shape=(n, T)``, part of the slip that maps are given.
-        nodes, along, ratio, moved, kept: Of the ``k`` nodes: indices, ``f``, ``d(f) / f.d(f)``, ``known``, and the friction
-            of the last step that is not along the ratio.
+        known: Slip along held directions, ``shape=(n, T)``; the slip passed to the maps contains it.
+        nodes, along, ratio, moved, kept: For the ``k`` nodes: indices, ``f``, ``d(f) / f.d(f)``, ``known``, and the part of the
+            last step's friction that is not along the ratio.
     """
 
     law: LawLike
@@ -100,7 +100,7 @@ class SupportedLaw:
 
     @cached_property
     def kinds(self) -> tuple:
-        """Which of the nodes are moved, are guided, are both; what slip alone tells: ``d(known)``, ``f.d(f)``, the law of both."""
+        """Masks of moved and of guided nodes, indices of those that are both; and ``d(known)``, ``f.d(f)``, the friction of those that are both."""
         moved, guided = self.moved.any(axis=1), self.along.any(axis=1)
         both = np.flatnonzero(moved & guided)
         most = _dot(self.friction.drag(self.along), self.along)
@@ -149,7 +149,7 @@ class SupportedLaw:
         normal: np.ndarray,
         tangential: np.ndarray,
     ) -> tuple:
-        """What the kernel has found, with the ``k`` nodes' own."""
+        """The compiled map's results, replaced at the ``k`` nodes."""
         nodes, f = self.nodes, self.along
         R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
         tau = _dot(reaction[nodes, :-1] - tangential[nodes, None] * slip[nodes], f)
@@ -164,7 +164,7 @@ class SupportedLaw:
 
 
 class _Answer:
-    """Friction of ``k`` supported nodes, and its derivatives by R and by the predictor along ``f``."""
+    """Friction of ``k`` supported nodes, and its derivatives with respect to R and to the predictor along ``f``."""
 
     def __init__(self, of: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
         self._law, self._f, self._rho = of.friction, of.along, rho
@@ -189,7 +189,7 @@ class _Answer:
         self.slips = moved | (guided & slips)
 
     def _room(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Largest part of ``kept`` up to one with which ``friction`` stays within the cone, ``shape=(k, 1)``."""
+        """Largest factor <= 1 of ``kept`` that, added to ``friction``, stays in the cone, ``shape=(k, 1)``."""
         a, b = (self._law.over_radii(part) for part in (friction, kept))
         A, B, C = _dot(b, b), _dot(a, b), np.minimum(_dot(a, a) - R**2, 0.0)
         root = np.sqrt(B**2 - A * C) - B
@@ -203,7 +203,7 @@ class _Answer:
         touches: np.ndarray,
         normal: np.ndarray,
     ) -> list:
-        """The kernel's derivatives with these nodes' own, by the reaction before and by the motion."""
+        """Derivatives with respect to the previous reaction and to the motion, those of the compiled map replaced at these nodes."""
         f, T = self._f, self._f.shape[1]
         by_reaction = np.zeros((len(nodes), T + 1, T + 1))
         by_reaction[:, :T, :T] = self.by_predictor[:, :, None] * f[:, None, :]
@@ -227,9 +227,9 @@ def _slipped(
     tau: np.ndarray,
     known: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``d(known + w f)`` and its derivative by w, where ``rho w + R f.d + tau = 0``.
+    """``d(known + w f)`` and its derivative with respect to w at the root w of ``rho w + R f.d + tau = 0``.
 
-    The left side grows with w: Newton's steps within an interval.
+    The left side increases with w, so Newton's method, safeguarded by bisection, finds the root.
     """
     most = R * np.linalg.norm(friction.mu[..., : known.shape[1]], axis=-1)
     low, high = (-tau - most) / rho, (-tau + most) / rho

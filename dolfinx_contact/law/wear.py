@@ -11,33 +11,34 @@ from dolfinx_contact.support.checks import finite, number
 
 
 class Wear(Guarded):
-    """Archard wear with feedback: worn depth opens the gap.
+    """Archard wear, in which the worn depth opens the gap; immutable.
 
-    The depth of a node grows by ``sum_i k_i w_i / A``, with ``w_i >= 0`` the frictional work along principal direction i in the
-    step (``dissipation.py``) and ``A`` the nodal area.  So the worn volume, the sum of depth times area, is ``sum k_i
-    w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
+    In a step, the depth of a node grows by ``sum_i k_i w_i / A``, with the frictional work ``w_i >= 0`` along principal
+    direction i (``dissipation.py``) and the nodal area ``A``.  So the worn volume, the sum of depth times area, grows by ``sum_i
+    k_i w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
     hardness H [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 
-    The depth worn in a step is part of its equations, so that a node is never worn below contact, whatever the coefficient.  The
-    work is that of ``contact.dissipation``, with the mean of the forces at both ends of the step, as long as it takes less than a fiftieth of
-    its force from a node; beyond that the force at the end counts more, and at last alone (backward Euler).  The step is solved
-    again until depths are off by at most a tenth of ``geometry_tol`` of the reactions; once is enough for gentle wear.
+    By default wear is implicit: the depth worn in a step is an unknown of the step, so a node never wears out of contact, whatever
+    the coefficient.  If wear in the step reduces a node's force by less than a fiftieth, the work is that of ``contact.dissipation``,
+    with the mean of the forces at both ends of the step.  Beyond that, the force at the end has a larger weight, up to one (backward
+    Euler).  The step is solved repeatedly until the error of the depths changes reactions by at most a tenth of ``geometry_tol``;
+    for gentle wear, one repetition suffices.
 
     Explicit wear opens the gap of the next step, and the work is always that of ``contact.dissipation``.  If the depth worn in a
-    step, times the node's stiffness, then exceeds the node's reaction, the step is too large: a warning says into how many steps
+    step, times the node's stiffness, exceeds the node's reaction, the step is too large: a warning says into how many steps
     to divide it.
 
     Args:
-        coefficient: k, a number, or a pair for the two friction directions; volume per work, the inverse of a stress, >= 0.  Or a field:
-            a callable of ``x``, ``shape=(3, n)``, that returns ``shape=(n,)`` or ``(2, n)``, or a DOLFINx Function in a continuous Lagrange
-            space, evaluated at the contact nodes when the contact takes the law.
-        explicit: Whether the depth worn in a step opens the gap of the next one only.
-        threshold: Frictional work per area that a node takes before it wears, force per length.
-        opposite: Coefficient of the other side, a ``DeformableSurface``, in the same forms but no field.  The gap opens by the depths of both,
-            each of which stays with its own body; a rigid surface does not wear.
+        coefficient: k >= 0, a number, or a pair for the two principal directions; volume per work, the inverse of a stress.  Or a
+            field: a callable of ``x``, ``shape=(3, n)``, that returns ``shape=(n,)`` or ``(2, n)``, or a DOLFINx Function in a
+            continuous Lagrange space.  A field is evaluated at the contact nodes when ``contact.wear`` is assigned.
+        explicit: Whether the depth worn in a step opens only the gap of the next step.
+        threshold: Frictional work per area that a node dissipates before it begins to wear, force per length.
+        opposite: k of the other side, a ``DeformableSurface``; a number or a pair, not a field.  The gap opens by the depths of both
+            sides, and each depth stays with its own body.  A rigid surface does not wear.
 
     Raises:
-        ValueError: a coefficient or threshold that is negative, not finite or not real, or more than two coefficients.
+        ValueError: a coefficient or the threshold is negative, not finite or not real, or there are more than two coefficients.
 
     Example:
         >>> contact.wear = dc.Wear(1e-6)  # mm³ per N mm
@@ -58,24 +59,34 @@ class Wear(Guarded):
     def depth(
         self, work: np.ndarray, area: np.ndarray, coefficient: np.ndarray | None = None
     ) -> np.ndarray:
-        """Depth worn by ``work``, ``shape=(n, gdim - 1)``, on ``area``, ``shape=(n,)``, of both sides; length.  None where there is no area.
+        """Depth that frictional work wears off both sides together: ``sum_i k_i w_i / A``, with the sum of both sides' k.
 
         Args:
-            work, area: Of the nodes.
-            coefficient: Values of a field at the nodes, ``shape=(n, 2)``.
+            work: Frictional work along the principal directions, ``shape=(n, gdim - 1)``, force times length.
+            area: Nodal areas, ``shape=(n,)``.
+            coefficient: Values of a field at the nodes, ``shape=(n, 2)``; None takes the law's own coefficient.
+
+        Returns:
+            ``shape=(n,)``, length; zero where the area is zero.
         """
         k = self.coefficient if coefficient is None else coefficient
         volume = _volume(k + self.opposite, work)
         return np.divide(volume, area, out=np.zeros_like(volume), where=area > 0.0)
 
     def opposite_share(self, work: np.ndarray, coefficient: np.ndarray | None = None) -> np.ndarray:
-        """Part of the depth that ``work`` wears which the other side loses, ``shape=(n,)``; arguments as ``depth`` has them."""
+        """Fraction of ``depth`` that the other side loses, ``shape=(n,)``, between 0 and 1; arguments as for ``depth``."""
         k = self.coefficient if coefficient is None else coefficient
         both, other = _volume(k + self.opposite, work), _volume(self.opposite, work)
         return np.divide(other, both, out=np.zeros_like(both), where=both > 0.0)
 
     def part(self, work: np.ndarray, before: np.ndarray, area: np.ndarray) -> np.ndarray:
-        """Part of the work of a step, beyond ``before``, that is above the threshold; all arrays ``shape=(n,)``."""
+        """Fraction of the step's work that wears, being above the threshold, ``shape=(n,)``, between 0 and 1.
+
+        Args:
+            work: Frictional work of the step, ``shape=(n,)``, force times length.
+            before: Frictional work before the step, ``shape=(n,)``.
+            area: Nodal areas, ``shape=(n,)``.
+        """
         beyond = before + work - self.threshold * area
         return np.clip(np.divide(beyond, work, np.ones_like(work), where=work > 0.0), 0.0, 1.0)
 

@@ -149,7 +149,7 @@ def raise_interrupt(failure: BaseException) -> None:
 
 
 class LinearSolverError(RuntimeError):
-    """PETSc's linear solver failed; the message has its reason and options.
+    """PETSc's linear solver did not converge; the message has PETSc's reason and the options.
 
     Example:
         >>> try:

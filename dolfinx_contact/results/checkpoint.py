@@ -1,9 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""All that the next step starts from, in one file.
+"""Checkpoints: everything that the next step starts from, in one file.
 
-Rows belong to nodes by their index in the mesh as it was read or made: partitioners share a mesh anew in
-every run, so neither the ranks' shares nor their number need be those that wrote.
+Rows are identified by the index of their node in the mesh as it was read or made.  So a checkpoint can be read with another
+partition and another number of ranks.
 """
 
 from __future__ import annotations

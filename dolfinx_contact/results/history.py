@@ -1,4 +1,4 @@
-"""A table of a run, one row a step: totals of the contacts and what tracked nodes do."""
+"""A table of a run with one row per step: totals of the contacts, and results at tracked nodes."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class History:
         resume: Number of rows to keep of an existing file, those of the steps before a checkpoint.
 
     Raises:
-        ValueError: points of another dimension, or fewer rows in the file than ``resume``.
+        ValueError: ``points`` have another dimension, or the file has fewer rows than ``resume``.
 
     Attributes:
         rows: List of dictionaries, the same on all ranks.
-        positions: Of the tracked nodes, ``shape=(m, 3)``, global frame.
+        positions: Reference positions of the tracked nodes, ``shape=(m, 3)``, global frame, length units.
 
     Example:
         >>> history = dc.History(problem)

@@ -49,8 +49,7 @@ def plot(
         factor: Magnification of displacements, also those of surfaces; rotations are not magnified.
 
     Raises:
-        ValueError: on all ranks, for a path that does not end in ``.png``, a ``colour`` that is not scalar, or a ``factor`` that
-            is not finite.
+        ValueError: on all ranks, if ``path`` does not end in ``.png``, ``colour`` is not scalar, or ``factor`` is not finite.
         ModuleNotFoundError: on all ranks, without PyVista.
         RuntimeError: on all ranks, if PyVista cannot draw here; the message quotes it.
 

@@ -39,7 +39,7 @@ def profile(
     *,
     contact: int = 0,
 ) -> dict[str, np.ndarray]:
-    """Contact results at points of the contact surface, linear between nodes, in a table and a CSV file.  Collective.
+    """Contact results at points of the contact surface, interpolated between nodes, as a table and a CSV file.  Collective.
 
     Args:
         problem: The ContactProblem.
@@ -53,7 +53,7 @@ def profile(
         ``shear_traction_x``, ...; ``gap``; ``slip_x``, ...; ``wear_depth``; ``displacement_x``, ...; ``status`` of the nearest node.
 
     Raises:
-        ValueError: on all ranks, for points of another shape, or farther from the surface than the size of a facet.
+        ValueError: on all ranks, if ``points`` have another shape, or one is farther from the surface than the size of a facet.
         OSError: on all ranks, if the file cannot be written.
 
     Example:

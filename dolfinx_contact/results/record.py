@@ -111,7 +111,7 @@ class NotConverged(RuntimeError):
     Attributes:
         step: Record of the step, with what was tried.
         displacement: The best state found, owned degrees of freedom; not a solution.
-        reactions: Reactions of each contact in that state, local frame.
+        reactions: Reactions of each contact in that state, a list of arrays ``shape=(n, gdim)``, local frame, force units.
 
     Example:
         >>> try:

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The choice of a solver, where the user makes none."""
+"""The default choice of a solver."""
 
 from __future__ import annotations
 
@@ -22,24 +22,28 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.errors import NodalStiffness
 
 
-# Solves by multigrid for the condensed operator, where the fixed point has failed: about a thousand cycles.
+# Largest number of multigrid solves for the condensed operator after the fixed point has failed: about a thousand cycles.
 MOST_SOLVES = 100
 
 
 def most_nodes(unknowns: int, friction: bool) -> int:
-    """The most contact nodes of a body for which the condensed solver is tried first, see docs/solvers.md.
+    """Largest number of contact nodes for which the condensed solver is tried first, see docs/solvers.md.
 
-    Its time grows with the cube of the nodes, that of the fixed point with the unknowns.
+    Its time grows with the cube of the contact nodes, that of the fixed point with the unknowns.
+
+    Args:
+        unknowns: Unknowns of the body.
+        friction: Whether any contact has friction.
     """
     equal, measured = 4e4, 1010
     return min(measured, round((equal * unknowns) ** (1 / 3))) if friction else measured
 
 
 class Automatic:
-    """Newton's method on the condensed problem for small contacts, else the fixed point.
+    """Newton's method on the condensed problem for small contacts, the fixed point for large ones.
 
-    For a nonlinear body Newton's method on both together, if linear systems are factorised; else the fixed point on the
-    linearised body, also with planes driven by force.  If the choice fails, the other one is tried; the result says what was done and why.
+    For nonlinear bodies, Newton's method on body and contact together; or, if linear systems are not factorised or planes are driven
+    by force, the fixed point on the linearised body.  If the first choice fails, the other is tried; ``SolverResult.reason`` says so.
     """
 
     nonlinear = True
@@ -56,7 +60,7 @@ class Automatic:
 
 
 class BoundAutomatic:
-    """Both solvers for one body, each set up when it is first used."""
+    """The candidate solvers for one body, each set up when it is first used."""
 
     def __init__(
         self,
@@ -99,7 +103,7 @@ class BoundAutomatic:
             self._solvers = self._solvers[:1]
 
     def destroy(self) -> None:
-        """Free both.  Collective."""
+        """Free all solvers.  Collective."""
         for bound in self._bound.values():
             bound.destroy()
 
@@ -108,7 +112,7 @@ class BoundAutomatic:
         for solver in list(self._bound):
             if not self._bound[solver].renew_law():
                 self._bound.pop(solver).destroy()
-        if self._components is None:  # nothing was chosen by it
+        if self._components is None:  # nonlinear: the choice does not depend on friction
             return True
         return components(self._arguments[1]) == self._components
 
@@ -116,7 +120,7 @@ class BoundAutomatic:
         """See ``BoundSolver``."""
         iterations, smallest, best, start, ended = 0, np.inf, None, None, []
         solvers = self._solvers
-        # Of a body that contact alone holds the fixed point finds at once what takes Newton's fallbacks thousands of iterations.
+        # For bodies held by contact alone, the fixed point quickly solves cases that take Newton's fallbacks thousands of iterations.
         brief = step.statics is not None and isinstance(solvers[0], CondensedNewton)
         for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
             if solver not in self._bound:
@@ -128,11 +132,11 @@ class BoundAutomatic:
             ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
             done = errors.within(step.tol if near else 0.0)
-            # Where nothing acts errors are over no force that could be compared.
+            # Without acting forces, relative errors cannot be compared.
             size = errors.largest if errors.acts else np.inf
             if best is None or done or size < smallest:
                 smallest, best = size, found
-                # far from a solution the errors of an end tell nothing: the other solver has a start of its own
+                # far from a solution, the state is no better than the other solver's own start
                 start = found.x if smallest <= ASTRAY else None
             if done:
                 break

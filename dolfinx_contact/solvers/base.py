@@ -1,9 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What a solver is: options that can be bound to a body and its contacts, and then solves load steps.
+"""The interface of solvers.
 
-A solver is an object with options and ``bind(body, contacts, stiffness, memory)``, which returns a ``BoundSolver``.  That owns
-everything set up for the body's present stiffness, and is thrown away when the stiffness changes.
+A solver is an object with options and a method ``bind(body, contacts, stiffness, memory)``, which returns a ``BoundSolver``.  The
+bound solver solves load steps.  It owns everything set up for the body's present stiffness, and is discarded when the stiffness changes.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
     from dolfinx_contact.step.errors import NodalStiffness
 
-KEPT = 64  # earlier steps in the memory of a problem: more than a cycle has
+KEPT = 64  # earlier steps in the memory of a problem: more than most load cycles have
 
 
 class SolverName(str, Enum):
-    """The solvers of this package, as ``step.solver`` names them; ``NONE`` where there was nothing to solve.
+    """Names of this package's solvers in ``step.solver``; ``NONE`` if the contact-free solution was the answer.
 
     Example:
         >>> step.solver == dc.SolverName.CONDENSED_NEWTON  # equal to "CondensedNewton", too
@@ -41,15 +41,15 @@ class SolverName(str, Enum):
 
 
 class SolverResult(NamedTuple):
-    """What a solver found for a load step; the problem judges it.
+    """What a solver found for a load step; the problem computes the errors and decides whether to accept it.
 
     Attributes:
-        x: Displacement of owned degrees of freedom, the best one found.
+        x: The best displacement found, owned degrees of freedom, length units.
         iterations: Iterations of the solver.
-        forward_error: Estimate of how far the reactions are from the exact ones, over the forces that act.
-        solver: A ``SolverName``, or the name of another one.
-        tried: Methods that were tried, in order, where the solver has more than one.
-        reason: Why this solver, where the user did not choose it, and what it says of its way; in words.
+        forward_error: Estimated error of the reactions, relative to the acting forces.
+        solver: A ``SolverName``, or the name of your own solver.
+        tried: Methods that were tried, in order, if the solver has several.
+        reason: In words: why this solver was chosen, if the user did not choose, and the solver's remarks.
     """
 
     x: np.ndarray
@@ -64,22 +64,22 @@ class BoundSolver(Protocol):
     """A solver bound to a body and its contacts."""
 
     def solve(self, step: StepLike) -> SolverResult:
-        """Search a displacement whose errors are at most ``step.tol``.  Collective."""
+        """Search for a displacement whose errors are at most ``step.tol``; return the best one found.  Collective."""
 
     def destroy(self) -> None:
-        """Free what PETSc holds.  Collective."""
+        """Free PETSc objects.  Collective."""
 
-    # Optional, without it the solver is bound anew:
+    # Optional; without it, the solver is bound again when friction changes:
     # def renew_law(self) -> bool
-    #     Take what the contacts' friction is now; whether what was set up is of use.  Collective.
+    #     Take the present friction of the contacts; return whether the set-up is still valid.  Collective.
 
 
 class Solver(Protocol):
-    """Options of a solver; one object may be used for many problems."""
+    """Options of a solver; one object may serve several problems."""
 
-    # Optional, without it steps of nonlinear bodies come as a sequence of linear ones:
+    # Optional; without it, a step of a nonlinear body is passed to the solver as a sequence of linear ones:
     # nonlinear = True
-    #     Whether it solves steps whose forces out of balance are no linear function of the displacement.
+    #     Whether the solver handles steps whose residual is a nonlinear function of the displacement.
 
     def bind(
         self,
@@ -88,12 +88,15 @@ class Solver(Protocol):
         stiffness: Sequence[NodalStiffness],
         memory: dict[str, Any],
     ) -> BoundSolver:
-        """Set up for a body with its assembled stiffness.  Collective.
+        """Set up the solver for a body with its assembled stiffness.  Collective.
 
         Args:
             body: The body.
             contacts: Its contacts.
             stiffness: ``NodalStiffness`` of each contact.
-            memory: Dictionary that outlives the binding.  Its ``past``, a deque of at most ``KEPT`` earlier steps, from which
-                the condensed solver starts, is saved in checkpoints.
+            memory: Dictionary that outlives the bound solver.  ``memory["past"]`` is a deque of at most ``KEPT`` earlier steps, the
+                starting points of the condensed solver; checkpoints contain it.
+
+        Returns:
+            A ``BoundSolver``.
         """

@@ -1,9 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What parts of a step may ask of each other: of the body, of a contact, of the step, of a nodal map and its law.
+"""Interfaces between the parts of a load step: body, contact, step, nodal map and law.
 
-Type checkers read these; nothing is imported for them at run time.  Arrays are of this rank: owned degrees of freedom, or
-the ``n`` nodes of a contact, local frame.  What each member is, the classes say: ``ElasticBody``, ``Contact``, ``LoadStep``, and ``law/maps.py``.
+They serve type checkers only; nothing is imported for them at run time.  Arrays hold this rank's owned degrees of freedom, or the
+``n`` nodes of a contact in the local frame.  For the meaning of each member see ``ElasticBody``, ``Contact``, ``LoadStep`` and ``law/maps.py``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class LawLike(Protocol):
-    """What nodal maps ask of the law at ``n`` nodes: the kernel's, or what takes its place where supports move nodes."""
+    """The law at ``n`` nodes as nodal maps use it: the compiled one, or a ``SupportedLaw``."""
 
     def return_map(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, normal: np.ndarray, tangential: np.ndarray) -> tuple: ...  # fmt: skip
     def return_jacobian(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, normal: np.ndarray, tangential: np.ndarray) -> tuple: ...  # fmt: skip
@@ -45,7 +45,7 @@ class LawLike(Protocol):
 
 
 class ContactLaw(LawLike, Protocol):
-    """The law of a contact, ``Friction.law(dim)``: also what the errors and the record of a step ask of it, see docs/extending.md."""
+    """The law of a contact, ``Friction.law(dim)``, with what errors and records need beside the maps; see docs/extending.md."""
 
     def slip_defect(self, reaction: np.ndarray, slip: np.ndarray, status: np.ndarray) -> np.ndarray: ...  # fmt: skip
     def bipotential_gap(self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray) -> np.ndarray: ...  # fmt: skip
@@ -53,7 +53,7 @@ class ContactLaw(LawLike, Protocol):
 
 
 class MapLike(Protocol):
-    """A nodal map with its augmentation parameters: new reactions and statuses, with ``linearised`` their derivatives, too."""
+    """A nodal map with its augmentation parameters: a call returns new reactions and statuses, ``linearised`` also derivatives."""
 
     @property
     def normal(self) -> np.ndarray: ...
@@ -63,7 +63,7 @@ class MapLike(Protocol):
 
 
 class BodyLike(Protocol):
-    """The body: what DOLFINx assembles and PETSc solves."""
+    """The body, assembled by DOLFINx and solved by PETSc."""
 
     comm: MPI.Comm
     u: fem.Function
@@ -125,7 +125,7 @@ class BodyLike(Protocol):
 
 
 class NonlinearBodyLike(BodyLike, Protocol):
-    """A body whose ``K`` is the tangent where it was linearised last."""
+    """A body whose ``K`` is the tangent at its last linearisation."""
 
     @property
     def factorised(self) -> bool: ...
@@ -134,7 +134,7 @@ class NonlinearBodyLike(BodyLike, Protocol):
 
 
 class ContactLike(Protocol):
-    """A contact: nodes, where they stand, their law, and their states."""
+    """A contact: its nodes, their positions, law and states."""
 
     comm: MPI.Comm
     V: fem.FunctionSpace
@@ -277,7 +277,7 @@ class ContactLike(Protocol):
 
 
 class StepLike(Protocol):
-    """A load step: forces out of balance, their derivatives and errors as functions of a displacement."""
+    """A load step: residual, derivatives and errors as functions of the displacement."""
 
     body: Any
     contacts: Sequence[ContactLike]

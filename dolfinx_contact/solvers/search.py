@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The best iterate of a step so far, how far it may be off, and whether the search goes on."""
+"""The state of a search: its best iterate, the estimated error, and whether to continue."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ import numpy as np
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import MapLike, StepLike
 
-# Steps over which the fall of the errors is taken.
+# Iterations from which the convergence rate is estimated.
 WINDOW = 3
 
-# States whose statuses are kept.
+# Iterates whose statuses are kept.
 KEPT = 50
 
 
 class Search:
-    """Keeps the best iterate.
+    """Keeps the best iterate and decides when a search ends.
 
     Args:
         step: The ``LoadStep``.
-        x: Where the search begins.
-        max_seconds: Wall time after which it ends, seconds.
+        x: Initial displacement, owned degrees of freedom.
+        max_seconds: Wall time after which the search ends, seconds.
         most: Iterations after which it ends.
 
     Attributes:
-        best: The iterate of the smallest errors.
-        error: The largest error of the last one.
-        forward_error: Of the best one, see docs/errors.md.
-        iterations: Done so far.
-        left: Iterations left.
-        over: Solved, or out of time or iterations.
-        statuses: Of each contact in the last states.
+        best: The iterate with the smallest errors.
+        error: The largest error of the last iterate.
+        forward_error: Forward error of the best iterate, see docs/errors.md.
+        iterations: Iterations so far.
+        left: Iterations left in the present attempt.
+        over: Whether the step is solved, or time or iterations have run out.
+        statuses: Statuses of each contact in the last iterates.
     """
 
     def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float, most: float = math.inf):
@@ -52,7 +52,7 @@ class Search:
         self.over = self._lost = False
 
     def begin(self, most: int, patience: float = math.inf) -> None:
-        """Once more, with so many iterations at most, in each ``patience`` of which the smallest error has to halve."""
+        """Begin an attempt of at most ``most`` iterations; it is lost if the smallest error does not halve within ``patience`` of them."""
         self.left, self._lost, self._patience = most, False, patience
         self._halved, self._since = np.inf, self.iterations
 
@@ -63,22 +63,22 @@ class Search:
 
     @property
     def goes_on(self) -> bool:
-        """Neither over nor lost nor at its last iteration."""
+        """Whether the attempt continues: not over, not lost, and with iterations left."""
         return not (self.over or self._lost) and self.left > 0
 
     def count(self, iterations: int) -> None:
-        """Iterations that were done."""
+        """Count iterations that were done."""
         self.iterations += iterations
         self.left -= iterations
 
     def residual(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray) -> np.ndarray:
-        """Forces out of balance of ``x``, with the step's ``forces`` there; takes note of its errors."""
+        """Residual at ``x``, given the step's ``forces`` there; records the errors of ``x``."""
         residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol
         self._errors.append(self.error)
         self.statuses.append([contact.status for contact in self.step.contacts])
         change = errors.change * self._contraction()
-        within = self.error <= tol  # of those the forward error counts, too
+        within = self.error <= tol  # then the forward error counts, too
         rank = (not within, max(self.error, change) if within else self.error)
         if rank < self._rank:
             self._rank, self.best, self.forward_error = rank, x, change
@@ -94,7 +94,7 @@ class Search:
         return residual
 
     def _contraction(self) -> float:
-        """What is left to go over the last step, were errors to fall on as in the last steps."""
+        """Ratio of the remaining error to the last change, if convergence continues at its present rate."""
         last, first, steps = self._errors[-1], self._errors[0], len(self._errors) - 1
         if last == 0.0 or steps == 0:
             return 0.0 if last == 0.0 else 1.0
@@ -102,7 +102,7 @@ class Search:
         return rate / (1 - rate) if rate < 0.9 else 9.0
 
     def _late(self) -> bool:
-        """Whether the time is up on any rank; asks them only if there is a limit."""
+        """Whether time is up on any rank; communicates only if there is a limit."""
         if self._seconds == math.inf:
             return False
         return bool(self.step.total([perf_counter() - self._start > self._seconds])[0] > 0)

@@ -71,7 +71,7 @@ def number(name: str, value: Any) -> float:
 
 
 def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -> float:
-    """A positive number, or a ``ValueError``; of a whole one infinity is none."""
+    """A positive number, or a ``ValueError``; a whole number must be finite."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError):

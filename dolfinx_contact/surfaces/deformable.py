@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The surface of a second body, or of another part of the same mesh, as what a contact presses on."""
+"""The surface of a second deformable body, in the same mesh, on which a contact presses."""
 
 from __future__ import annotations
 
@@ -20,22 +20,24 @@ SLIDING = ("large", "small")
 
 
 class DeformableSurface(Surface):
-    """Facets of a second deformable body, onto which the facets of a contact press; the meshes need not match.
+    """Facets of a second deformable body, on which the facets of a contact press; the facets need not match.
 
-    Both bodies are in one mesh, as parts that need not be connected.  The facets of the ``Contact`` are the slave side, which
-    carries the unknowns; dual mortar functions transfer the forces, see ``contact/mortar.py``.  As slave, prefer the softer,
-    finer or curved side.
+    Both bodies are parts of one DOLFINx mesh, usually unconnected.  The facets of the ``Contact`` are the slave side: its nodes
+    carry the reactions, and dual mortar shape functions transfer them to this side, see docs/theory/two_bodies.md.  As slave, prefer the
+    softer, finer or curved side.
 
     Args:
-        V: The space of displacements, that of the contact.
+        V: The space of displacements, the same as that of the contact.
         facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
-        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node; it
-            is the slave's, and turns with its facets as a whole; needed unless friction is isotropic or bodies two-dimensional.
-        sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end; "small" pairs them once,
-            in the undeformed state, which saves time as long as nothing slides farther than a part of a facet.
+        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node.
+            It belongs to the slave and turns with the best-fit rotation of the slave's facets.  Needed unless friction is
+            isotropic or bodies two-dimensional.
+        sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end.  "small" pairs them
+            once, in the undeformed state; this saves time if slip stays below a fraction of a facet.
 
     Raises:
-        ValueError: on all ranks, for facets that are not on the boundary, or another value of ``sliding``.
+        ValueError: on all ranks, if ``V`` is not a function space, facets are empty or not on the boundary, ``axis`` is not a
+            vector of ``gdim`` numbers, or ``sliding`` has another value.
 
     Example:
         >>> below = dc.DeformableSurface(V, foot)  # then: dc.Contact(V, facets_above, below, friction)
@@ -71,7 +73,7 @@ class DeformableSurface(Surface):
 
     @property
     def displacement(self) -> np.ndarray:
-        """Zero: it moves with its body."""
+        """Zero: the surface moves with its body."""
         return self._displacement
 
     @displacement.setter
@@ -80,7 +82,7 @@ class DeformableSurface(Surface):
 
     @property
     def rotation(self) -> np.ndarray:
-        """Zero: it moves with its body."""
+        """Zero: the surface turns with its body."""
         return self._rotation
 
     @rotation.setter
@@ -92,7 +94,7 @@ class DeformableSurface(Surface):
             raise ValueError(f"surface.{name} cannot be {value!r}: {self._remedy}")
 
     def described(self) -> np.ndarray:
-        """How many facets, and the axis."""
+        """Number of facets, and the axis."""
         count = self.V.mesh.comm.allreduce(self.facets.size)
         return np.concatenate(([count], np.zeros(3) if self.axis is None else self.axis))
 

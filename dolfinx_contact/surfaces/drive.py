@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What drives a rigid surface: free motions, and the forces, moments and springs that these are balanced with."""
+"""Rigid surfaces driven by force: free motions, and the forces, moments and springs in equilibrium along them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 
 
 class Drive:
-    """Forces that drive a surface along its free motions.
+    """Forces, moments and springs that drive a surface along its free motions.
 
     sum of the reactions = force + stiffness (drive - displacement),
     sum of their moments about the point = moment - stiffness rotation.
@@ -56,20 +56,20 @@ class Drive:
         self._taken = self._since = 0  # the problem that drove it last, and when
 
     def of(self, surface: Surface) -> Drive:
-        """The same forces on another surface."""
+        """A copy that drives another surface."""
         other = copy(self)
         vars(other)["_surface"] = surface
         return other
 
     def take(self, problem: int, now: int) -> None:
-        """Let a problem step with the surface: what force has moved belongs to the problem that drove it last.
+        """Register the problem that solves a step with this surface; only the one that drove it last may continue.
 
         Args:
-            problem: Its number; problems made later have larger ones.
+            problem: Number of the problem; problems made later have larger ones.
             now: A number larger than that of any problem so far.
 
         Raises:
-            ValueError: another problem has driven it since this one was made.
+            ValueError: another problem has driven the surface since this one was made.
         """
         if problem != self._taken and problem < self._since:
             raise ValueError(
@@ -81,7 +81,7 @@ class Drive:
 
     @property
     def turnings(self) -> tuple[str, ...]:
-        """Names of the rotations that may be free, about the surface's ``directions``."""
+        """Names of the rotations about the surface's ``directions``, which may be free."""
         return ("r",) if self._size == 2 else tuple(f"r{name[-1]}" for name in self._directions)
 
     @property
@@ -90,7 +90,7 @@ class Drive:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Motions that forces drive, see docs/force.md: names among ``directions`` and ``turnings``, in the order given; none at first."""
+        """Motions driven by force, see docs/force.md: names from ``directions`` and ``turnings``, in the order given; empty at first."""
         return self._free
 
     @free.setter
@@ -127,8 +127,9 @@ class Drive:
 
     @property
     def stiffness(self) -> np.ndarray | dict[str, float]:
-        """Of springs that pull the surface, by the name of the free motion; or one number for all of them, or one for each in the
-        order of ``free``.  Zero, a dead load, at first and for what is not named."""
+        """Stiffness of the springs that pull the surface, force per length or moment per radian: a dictionary by the name of the
+        free motion, one number for all, or one for each in the order of ``free``.  Zero, a dead load, by default.
+        """
         return dict(self._stiffness) if isinstance(self._stiffness, dict) else self._stiffness
 
     @stiffness.setter
@@ -160,9 +161,9 @@ class Drive:
 
     @property
     def guides(self) -> np.ndarray:
-        """Directions "x", "y", "z" of ``free``, rows, ``shape=(gdim, gdim)``, global frame; at first its axes.
+        """Directions that "x", "y", "z" in ``free`` denote, one per row, ``shape=(gdim, gdim)``, orthonormal; at first the global axes.
 
-        They stay when the surface turns.
+        They do not turn with the surface.
         """
         return whole("surface.guides", self._guides)
 
@@ -183,12 +184,12 @@ class Drive:
         return any(name in self.turnings for name in self._free)
 
     def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
-        """From now on these free motions are held by contact nodes, or it slides ``past`` them, see ``held.py``."""
+        """Let contact nodes hold these free motions, or let the surface slide ``past`` them, see ``held.py``."""
         self._held, self._past_held = names, past
 
     @property
     def motions(self) -> list[Motion]:
-        """The free motions that no contact nodes hold, rotations first."""
+        """The free motions that are not held by contact nodes, rotations first."""
         if not self._free:
             return []
         axes = self._surface.drive_axes
@@ -208,18 +209,18 @@ class Drive:
 
     @property
     def freedom(self) -> tuple:
-        """Free motions and springs, which what solvers set up depends on; empty if there are none."""
+        """Free motions and springs, on which a solver's set-up depends; empty without free motions."""
         motions = [(motion.name, motion.spring) for motion in self.motions]
         return (motions, self._guides.tolist(), self._past_held) if motions else ()
 
     @property
     def radial(self) -> bool:
-        """Whether a translation along the first coordinate, or with a part along it, is free."""
+        """Whether a free translation has a component along the first coordinate."""
         along = [motion.axis[0] for motion in self.motions if not motion.turns]
         return any(abs(part) > SQUARE for part in along)
 
     def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
-        """Force or moment that drives each motion where the surface is; or the size of the terms that add up to it."""
+        """Force or moment, springs included, that drives each motion in the present position; or the sum of the magnitudes of its terms."""
         size = np.abs if magnitudes else np.asarray
         less = np.add if magnitudes else np.subtract
         displacement, rotation, spin = self._surface.stands
@@ -234,14 +235,14 @@ class Drive:
         )  # fmt: skip
 
     def driven(self) -> str:
-        """What drives the surface, in words."""
+        """A description of what drives the surface."""
         given = (self._free, self._force, self._stiffness, self._drive)
         if self.spins:
             given += (self._moment,)
         return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
 
     def check(self) -> None:
-        """Raise a ``ValueError`` if no force drives what is free, or a plane would leave the body."""
+        """Raise a ``ValueError`` if a free motion has neither force nor spring, or a plane would leave the body."""
         self._check_springs()
         if not self._ever_free and not (self._force is None and self._moment is None):
             self._ever_free = True
@@ -262,7 +263,7 @@ class Drive:
         self._surface.check_pressing(moving[-1])
 
     def _check_springs(self) -> None:
-        """Raise a ``ValueError`` if numbers without names do not tell which spring is which."""
+        """Raise a ``ValueError`` if stiffnesses without names are ambiguous."""
         count, stiffness = len(self._free), self._stiffness
         if isinstance(stiffness, dict):
             return
@@ -279,7 +280,7 @@ class Drive:
 
 
 def check_guides(value: ArrayLike, size: int) -> np.ndarray:
-    """Orthonormal directions, ``shape=(size, size)``, orthonormal to the last digit."""
+    """The user's directions, ``shape=(size, size)``, made orthonormal to rounding; a ``ValueError`` if they are not nearly so."""
     rows = finite("surface.guides", value)
     square = rows.shape == (size, size)
     if not square or np.abs(rows @ rows.T - np.eye(size)).max() > SQUARE:

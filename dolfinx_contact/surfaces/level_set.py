@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Rigid surfaces given by a function of position: a signed distance, or any function that is zero on the surface."""
+"""Rigid surfaces given by a level set function: a signed distance, or any function that is zero on the surface."""
 
 from __future__ import annotations
 
@@ -15,35 +15,36 @@ from dolfinx_contact.support.checks import finite, vector
 from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 from dolfinx_contact.surfaces.ufl_distance import by_ufl, is_ufl
 
-# Step of central differences over the size of the nodes' positions: rounding and truncation alike.
+# Step of central differences, relative to the size of the nodes' positions: it balances rounding and truncation errors.
 STEP = float(np.cbrt(np.finfo(float).eps))
 
-# Part of its length by which a gradient may be off differences: as far as those of values in single precision may be.
+# A gradient may differ from central differences by this part of its length: values may be in single precision.
 APART = 0.05
 
-# A gradient is none if it is that much smaller than the largest one.
+# A gradient is treated as zero if it is below this part of the largest one.
 FLAT = 1e-12
 
 
 class RigidSurface(CurvedSurface):
     """A rigid surface given by its signed distance, driven by displacement, rotation or force.
 
-    Any smooth function will do that is zero on the surface and positive where the body may be.  Gaps are its value over the
-    length of its gradient, which is exact on the surface, and everywhere for a true distance.  Within a step, each node sees the
+    Any smooth function will do that is zero on the surface and positive where the body may be.  Gaps are ``distance`` divided by
+    the length of its gradient: exact on the surface, and everywhere if it is a true distance.  Within a step, each node sees the
     tangent plane at its position at the end of the step, see docs/surfaces.md.
 
     Args:
-        distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface and are the global ones at
-            first; returns ``shape=(n,)``.  Or a scalar UFL expression in ``SpatialCoordinate``, numbers and ``Constant`` of any
+        distance: Function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the surface (the global ones at
+            first); returns ``shape=(n,)``.  Or a scalar UFL expression in ``SpatialCoordinate``, numbers and ``Constant`` of any
             mesh, which UFL then differentiates.
-        point: Centre of rotation and point at which force acts, ``shape=(gdim,)``, global frame, length units.
+        point: Centre of rotation, and the point at which ``force`` acts, ``shape=(gdim,)``, global frame, length units.
         gradient: Function of the same positions that returns the derivatives of ``distance``, ``shape=(gdim, n)``; None takes
-            central differences, exact to ten digits.  A Contact checks it against differences at its nodes.
+            central differences, accurate to ten digits.  A Contact compares it with differences at its nodes.
         axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
             unless friction is isotropic or the body two-dimensional.
 
     Raises:
-        ValueError: vectors that make no sense, or an argument that is not a function.
+        ValueError: a vector of the wrong size, zero, complex or not finite; a distance or gradient that is not a function; a
+            gradient beside a distance in UFL.
 
     Attributes:
         point, axis: As given, ``axis`` of unit length; read-only.
@@ -63,7 +64,7 @@ class RigidSurface(CurvedSurface):
         axis: ArrayLike | None = None,
     ) -> None:
         super().__init__(vector("point", point))
-        self._derived = gradient is None  # and nothing to be checked
+        self._derived = gradient is None  # nothing to check
         if is_ufl(distance):
             if gradient is not None:
                 raise ValueError(
@@ -90,33 +91,33 @@ class RigidSurface(CurvedSurface):
         return values
 
     def _slopes(self, y: np.ndarray) -> np.ndarray:
-        """Gradient at positions, ``shape=(n, gdim)``."""
+        """Gradient of ``distance`` at positions, ``shape=(n, gdim)``."""
         if self._gradient is not None:
             return self._of("gradient", self._gradient, y, y.T.shape).T
         after, before = self._beside(y, 1), self._beside(y, -1)
         return (after[0] - before[0]) / (after[1] - before[1])
 
     def _beside(self, y: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-        """Values a small step along each axis from positions, and the coordinates there, ``shape=(n, gdim)`` each."""
+        """Values at a small step along each axis from the positions, and the coordinates there, ``shape=(n, gdim)`` each."""
         step = STEP * (np.abs(y - self.point).max(initial=0.0) or 1.0)
         moved = [y + side * shift for shift in step * np.eye(y.shape[1])]
         values = [self._of("distance", self._values, z, y.shape[:1]) for z in moved]
         return np.column_stack(values), np.column_stack([z[:, k] for k, z in enumerate(moved)])
 
     def check_at(self, y: np.ndarray) -> None:
-        """See ``Surface``: compare the gradient given with differences of the distance.
+        """Compare the user's gradient with one-sided differences of the distance.
 
-        Where slopes jump any between those of both sides will do.
+        At a kink, any value between those of both sides is accepted.
 
         Raises:
-            ValueError: it has another sign, direction or length.
+            ValueError: the gradient has another sign, direction or length.
         """
         if self._derived or not len(y):
             return
         given, here = self._slopes(y), self._of("distance", self._values, y, y.shape[:1])
         try:
             sides = [self._beside(y, side) for side in (1, -1)]
-        except ValueError:  # beside these positions the function has no values
+        except ValueError:  # the function cannot be evaluated beside these positions
             return
         found = np.array([(values - here[:, None]) / (at - y) for values, at in sides])
         off = np.linalg.norm(given - np.clip(given, found.min(axis=0), found.max(axis=0)), axis=1)
@@ -131,7 +132,11 @@ class RigidSurface(CurvedSurface):
             )
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Value over the length of the gradient, ``shape=(n,)``."""
+        """``distance`` divided by the length of its gradient, ``shape=(n,)``, length units.
+
+        Raises:
+            ValueError: the gradient vanishes at a position, or a function returns another shape or values that are not finite.
+        """
         if not len(y):
             return np.zeros(0)
         return self._of("distance", self._values, y, y.shape[:1]) / self._lengths(
@@ -139,10 +144,10 @@ class RigidSurface(CurvedSurface):
         )
 
     def normals(self, y: np.ndarray) -> np.ndarray:
-        """Along the gradient, ``shape=(n, gdim)``.
+        """Unit vectors along the gradient, ``shape=(n, gdim)``.
 
         Raises:
-            ValueError: a position where there is no gradient.
+            ValueError: the gradient vanishes at a position.
         """
         if not len(y):
             return np.zeros_like(y)

@@ -1,4 +1,4 @@
-"""Rigid planes: position, normal and the directions in which friction is measured."""
+"""Rigid planes: position, normal and principal friction directions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dolfinx_contact.surfaces.surface import Surface, unit
 
 
 class RigidPlane(Surface):
-    """A rigid plane, driven by displacement or by force.
+    """A rigid plane, driven by displacement, rotation or force.
 
     Along the directions in ``free``, the plane moves until its forces are in equilibrium, see docs/force.md:
 
@@ -26,8 +26,8 @@ class RigidPlane(Surface):
         normal: Direction towards the side where the body may be, ``shape=(gdim,)``, of any length.
         axis: First principal friction direction, ``shape=(gdim,)``; made orthogonal to the normal.
             Needed unless friction is isotropic or the body two-dimensional.
-        height: None, or a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with the plane, which returns the
-            waviness of the plane, ``shape=(n,)``, length units.  Slopes are neglected.
+        height: None, or the waviness of the plane: a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with
+            the plane, which returns heights above it, ``shape=(n,)``, length units.  Slopes are neglected.
 
     Raises:
         ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
@@ -40,8 +40,8 @@ class RigidPlane(Surface):
         rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.  Assign
             another one between steps; normal and axis rotate with the plane, and slip is relative to it.
         free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the frame, "r1", "r2", "rn" about
-            them; in two dimensions "t", "n" and "r".  Empty at first.  With a rotation among them these axes stand as
-            ``rotation`` was last assigned: what a step finds does not turn them.
+            them; in two dimensions "t", "n" and "r".  Empty at first.  If a rotation is among them, these axes turn with
+            the ``rotation`` that you assign, not with the one that a step finds.
         force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Components along directions
             that are not free have no effect: a guide carries them.
         moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
@@ -89,12 +89,12 @@ class RigidPlane(Surface):
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """Names of the rows of ``frame``."""
+        """Names of the rows of ``frame``, ("t1", "t2", "n") or ("t", "n")."""
         return ("t", "n") if self.point.size == 2 else ("t1", "t2", "n")
 
     @property
     def drive_axes(self) -> np.ndarray:
-        """The rows of ``frame``; where a rotation is free, as ``rotation`` was last assigned: guides do not tilt with the plane."""
+        """Unit vectors of ``directions``: the rows of ``frame``.  If a rotation is free, at the ``rotation`` assigned last: guides do not tilt with the plane."""
         return self.as_placed(self._frame) if self.spins else self.frame
 
     def check_pressing(self, motion: Any) -> None:
@@ -110,16 +110,16 @@ class RigidPlane(Surface):
 
     @property
     def frame(self) -> np.ndarray:
-        """Rows (t1, t2, n) in three dimensions, (t, n) in two; global components, orthonormal.
+        """Local frame in the present position, ``shape=(gdim, gdim)``: orthonormal rows (t1, t2, n), in two dimensions (t, n), global components.
 
-        Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal.
-        In two dimensions t is the normal turned by -90 degrees.  They turn with the plane.
+        Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal to the normal.
+        In two dimensions, t is the normal turned by -90 degrees.
         """
         return self.turned(self._frame)
 
     @cached_property
     def _frame(self) -> np.ndarray:
-        """The frame as long as the plane is not turned."""
+        """The frame before any rotation."""
         n = self.normal
         if n.size == 2:
             return frozen(np.array([[n[1], -n[0]], n]))
@@ -131,11 +131,15 @@ class RigidPlane(Surface):
         return frozen(np.array([t1, np.cross(n, t1), n]))
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """The same frame at all positions, ``shape=(gdim, gdim)``."""
+        """The frame in the plane's own axes, ``shape=(gdim, gdim)``, the same at all positions."""
         return self._frame
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Distance to the plane, ``shape=(n,)``, less the height of its face."""
+        """Distance to the plane minus ``height``, ``shape=(n,)``, length units.
+
+        Raises:
+            ValueError: ``height`` returns values of another shape, or not finite.
+        """
         flat = (y - self.point) @ self.normal
         if self.height is None or not len(y):
             return flat

@@ -13,12 +13,12 @@ from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import positive, vector
 from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 
-# Part of the radius within which a position has no direction from the centre.
+# Within this part of the radius, a position has no direction from the centre.
 NEAR = 1e-9
 
 
 class _Round(CurvedSurface):
-    """A surface of given distance from a point or a line."""
+    """A surface at a constant distance from a point or a line."""
 
     def __init__(self, point: ArrayLike, radius: float, inside: bool) -> None:
         super().__init__(point)
@@ -28,19 +28,19 @@ class _Round(CurvedSurface):
         self.inside = bool(inside)
 
     def _arms(self, y: np.ndarray) -> np.ndarray:
-        """From the centre or the cylinder's axis to positions."""
+        """Vectors from the centre, or from the axis of the cylinder, to positions, ``shape=(n, gdim)``."""
         return y - self.point
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """``|y - c| - R``, from inside ``R - |y - c|``, ``shape=(n,)``."""
+        """Signed distance ``|y - c| - R``, or ``R - |y - c|`` if the body is inside; ``shape=(n,)``, length units."""
         outside = np.linalg.norm(self._arms(y), axis=1) - self.radius
         return -outside if self.inside else outside
 
     def normals(self, y: np.ndarray) -> np.ndarray:
-        """Away from the centre, from inside towards it, ``shape=(n, gdim)``.
+        """Unit normals, ``shape=(n, gdim)``: away from the centre, or towards it if the body is inside.
 
         Raises:
-            ValueError: a position at the centre.
+            ValueError: a position is at the centre.
         """
         arms = self._arms(y)
         length = np.linalg.norm(arms, axis=1)
@@ -58,7 +58,7 @@ class _Round(CurvedSurface):
 
 
 class RigidSphere(_Round):
-    """A rigid sphere, in two dimensions a circle, driven by displacement and rotation.
+    """A rigid sphere, in two dimensions a circle, driven by displacement, rotation or force.
 
     Within a step, each node sees the tangent plane of the sphere at its position at the end of the step, see docs/surfaces.md.
 
@@ -70,16 +70,18 @@ class RigidSphere(_Round):
         inside: Whether the body is inside the sphere, which is then a spherical socket.
 
     Raises:
-        ValueError: vectors or a radius that make no sense.
+        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not positive.
 
     Attributes:
         point, radius, axis, inside: As given, ``point`` the centre, ``axis`` of unit length; read-only.
-        displacement: From the first position, ``shape=(gdim,)``, global frame, length units; assign another one
-            between steps.
-        rotation: About the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle.
+        displacement: Displacement from the first position, ``shape=(gdim,)``, global frame, length units; assign another
+            one between steps.
+        rotation: Rotation about the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; assign
+            another one between steps.
         free, force, moment, stiffness, drive: As in ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
-            dimensions "x", "y", "r", along and about ``guides``.
-        guides: Directions of these names, one per row, ``shape=(gdim, gdim)``, global frame; they do not rotate.
+            dimensions "x", "y", "r": translations along ``guides`` and rotations about them.
+        guides: Directions of "x", "y", "z", one per row, ``shape=(gdim, gdim)``, global frame, orthonormal; the global axes
+            at first.  They do not rotate with the surface.
 
     Example:
         >>> ball = dc.RigidSphere(centre=(0.5, 0.5, -2), radius=2, axis=(1, 0, 0))
@@ -94,7 +96,7 @@ class RigidSphere(_Round):
         self._made = True
 
     def described(self) -> np.ndarray:
-        """Centre, radius, negative from inside, and axis."""
+        """Centre, radius (negative if the body is inside) and axis."""
         return self._numbers(np.zeros(self.point.size) if self.axis is None else self.axis)
 
     def __repr__(self) -> str:
@@ -103,7 +105,7 @@ class RigidSphere(_Round):
 
 
 class RigidCylinder(_Round):
-    """An infinite rigid cylinder, driven by displacement and rotation; in two dimensions use ``RigidSphere``.
+    """An infinite rigid cylinder, driven by displacement, rotation or force; in two dimensions use ``RigidSphere``.
 
     Its axis is the first principal friction direction.  Within a step, each node sees the tangent plane of the cylinder at its
     position at the end of the step, see docs/surfaces.md.
@@ -115,13 +117,13 @@ class RigidCylinder(_Round):
         inside: Whether the body is inside the cylinder, which is then a bore.
 
     Raises:
-        ValueError: vectors or a radius that make no sense.
+        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not positive; two dimensions.
 
     Attributes:
         point, axis, radius, inside: As given, ``axis`` of unit length; read-only.
-        displacement: From the first position, ``shape=(3,)``, global frame, length units; assign another one between
-            steps.
-        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``.
+        displacement: Displacement from the first position, ``shape=(3,)``, global frame, length units; assign another one
+            between steps.
+        rotation: Rotation about ``point``, radians, a rotation vector, ``shape=(3,)``; assign another one between steps.
         free, force, moment, stiffness, drive, guides: As in ``RigidSphere``.
 
     Example:
@@ -146,7 +148,7 @@ class RigidCylinder(_Round):
         return arms - np.outer(arms @ self.axis, self.axis)
 
     def described(self) -> np.ndarray:
-        """Point, radius, negative from inside, axis, and a one that a sphere has not."""
+        """Point, radius (negative if the body is inside), axis, and a one that tells it from a sphere."""
         return self._numbers(self.axis, [1.0])
 
     def __repr__(self) -> str:

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What rigid surfaces have in common: a rigid motion, distances and frames of points near them."""
+"""The base class of surfaces: rigid motion, distances and local frames."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.surfaces.drive import Drive, Motion
 
-# Part of a length across another vector below which both are parallel.
+# Two vectors are parallel if the part of one across the other is below this.
 PARALLEL = 1e-12
 
-# Part of a direction that has to be tangential.
+# An axis whose tangential part is below this is along the normal.
 ALONG = 1e-8
 
-# Digits by which components of a normal differ: on the diagonals of a mesh rounding is not to choose a tangent, nor what solvers leave.
+# Components of a normal are compared to this many decimals: where two are equal, neither rounding nor solver errors may choose the tangent.
 TIES = 6
 
 
 def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    """A vector that is not zero, of length one."""
+    """A user's vector, scaled to unit length, ``shape=(size,)``; a ``ValueError`` if it is zero."""
     along = vector(name, value, size)
     largest = np.abs(along).max()
     if largest == 0.0:
@@ -38,7 +38,7 @@ def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
 
 
 class _OfDrive:
-    """An attribute of the surface's ``Drive``, which is made when it is first asked for."""
+    """An attribute of the surface's ``Drive``, which is created on first access."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -51,19 +51,20 @@ class _OfDrive:
 
 
 class Surface(Guarded):
-    """A rigid surface: its motion, and distances and frames of positions ``y`` relative to it.
+    """Base class of surfaces: a rigid motion, distances and local frames.
 
-    Such positions are in axes that move with the surface: global components as long as it stands where it was made.  A surface of
-    your own has ``distance`` and ``frames``, or, on ``CurvedSurface``, ``normals``, see docs/extending.md.
+    Positions ``y`` are given in axes that move with the surface; before it moves, they are global coordinates.  For a surface of
+    your own, derive from this class and define ``distance`` and ``frames``, or derive from ``CurvedSurface`` and define
+    ``distance`` and ``normals``; see docs/extending.md.
 
     Args:
-        point: About which the surface rotates, ``shape=(gdim,)``, global frame, length units.
+        point: Centre of rotation, ``shape=(gdim,)``, global frame, length units.
 
     Attributes:
-        varies: Whether gaps are not linear in the position, so that contacts take them anew at every step.
-        curved: Whether frames differ from place to place.
-        deformable: Whether it is that of a deformable body.
-        axis: First principal friction direction, or None.
+        varies: Whether gaps are a nonlinear function of the position; contacts then compute them again at every step.
+        curved: Whether frames depend on the position.
+        deformable: Whether it is the surface of a deformable body.
+        axis: First principal friction direction, ``shape=(gdim,)``, a unit vector, or None.
     """
 
     _settable: tuple[str, ...] = (
@@ -95,11 +96,11 @@ class Surface(Guarded):
 
     @property
     def driver(self) -> Drive | None:
-        """The ``Drive``; None as long as nobody has asked for free motions or forces."""
+        """The ``Drive``; None until a free motion or a force is set or read."""
         return self._driver
 
     def driven_by_force(self) -> Drive:
-        """The ``Drive``, made if there is none."""
+        """The ``Drive``, created if there is none."""
         if self._driver is None:
             from dolfinx_contact.surfaces.drive import Drive
 
@@ -108,7 +109,7 @@ class Surface(Guarded):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Motions that forces drive, see docs/force.md: names of ``directions`` and of rotations about them; none at first."""
+        """Motions driven by force, see docs/force.md: names of ``directions`` and of rotations about them; empty at first."""
         return () if self._driver is None else self._driver.free
 
     @free.setter
@@ -117,7 +118,7 @@ class Surface(Guarded):
 
     @property
     def motions(self) -> list[Motion]:
-        """The free motions that no contact nodes hold, rotations first."""
+        """The free motions that are not held by contact nodes, rotations first."""
         return [] if self._driver is None else self._driver.motions
 
     @property
@@ -127,7 +128,7 @@ class Surface(Guarded):
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """Names of the directions along which it may be free, the rows of ``drive_axes``."""
+        """Names of the directions along which the surface can be free, in the order of the rows of ``drive_axes``."""
         return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
 
     @property
@@ -136,7 +137,7 @@ class Surface(Guarded):
         return self.guides
 
     def check_pressing(self, motion: Any) -> None:
-        """Raise a ``ValueError`` if the force pulls it off bodies, which that of a plane may say beforehand."""
+        """Raise a ``ValueError`` if the force pulls the surface off the bodies; a plane can tell before the step."""
 
     # -- motion --------------------------------------------------------------------------------
 
@@ -151,7 +152,7 @@ class Surface(Guarded):
 
     @property
     def rotation(self) -> np.ndarray:
-        """Rotation from the first position about ``point``, radians: its vector, ``shape=(3,)``; one angle in 2-D."""
+        """Rotation from the first position about ``point``, radians: a rotation vector, ``shape=(3,)``, or in 2-D an angle, ``shape=(1,)``."""
         return whole("surface.rotation", self._rotation)
 
     @rotation.setter
@@ -161,16 +162,16 @@ class Surface(Guarded):
 
     @property
     def placed(self) -> np.ndarray:
-        """The rotation that was last assigned, in which guides stand: what steps find does not turn them."""
+        """The rotation assigned last, which also orients the guides: rotations found by steps do not turn them."""
         return self._placed
 
     def place(self, rotation: ArrayLike, placed: np.ndarray) -> None:
-        """Take a rotation, and that in which guides stand, as they were before."""
+        """Restore a rotation and the orientation of the guides."""
         self.turn_to(rotation)
         self._placed = placed
 
     def turn_to(self, value: ArrayLike) -> None:
-        """Take a rotation that a step has found, radians: guides stay."""
+        """Take a rotation found by a step, radians; guides do not turn."""
         size = self._rotation.size
         array = np.atleast_1d(finite("surface.rotation", value))
         if array.shape != (size,):
@@ -181,11 +182,11 @@ class Surface(Guarded):
 
     @property
     def spin(self) -> np.ndarray | None:
-        """Rotation that the step at hand has found, radians, a small one; None if there is none, and between steps."""
+        """Small rotation found so far in the current step, radians; None without one and between steps."""
         return self._spin
 
     def spin_by(self, angle: np.ndarray | None) -> None:
-        """Turn within a step, for which frames stay those of its start."""
+        """Set the rotation within the current step; frames stay those of its start."""
         self._spin = angle
 
     @property
@@ -194,85 +195,92 @@ class Surface(Guarded):
         return self._displacement, self._rotation, self._spin
 
     def end_step(self) -> None:
-        """Add what a step has turned to ``rotation``."""
+        """Add the rotation of the step, ``spin``, to ``rotation``."""
         if self._spin is not None:
             self.turn_to(composed(self._spin, self._rotation))
 
     def motion(self, x: np.ndarray) -> np.ndarray:
-        """Displacement of its material points that were at ``x``: ``shape=(gdim,)`` if it does not rotate."""
+        """Displacement of the surface's material points at ``x``, ``shape=(n, gdim)``; ``(gdim,)`` if it has not rotated.  Global frame."""
         if self._turn is None:
             return self._displacement
         return self._displacement + (x - self.point) @ self._turn.T
 
     def relative(self, x: np.ndarray) -> np.ndarray:
-        """Positions relative to the surface of points at ``x``, ``shape=(n, gdim)``, global frame."""
+        """Coordinates of the points ``x``, ``shape=(n, gdim)``, in axes that move with the surface."""
         if self._turn is None:
             return x - self._displacement
         arm = x - self.point - self._displacement
         return self.point + arm + arm @ self._turn
 
     def distances(self, x: np.ndarray) -> np.ndarray:
-        """Of positions, ``shape=(..., gdim)``, where the surface stands; infinite where it has none."""
+        """Distances of points ``x``, ``shape=(..., gdim)``, global frame, from the surface; infinite where it cannot be evaluated."""
         try:
             return self.distance(self.relative(x.reshape(-1, x.shape[-1]))).reshape(x.shape[:-1])
-        except ValueError:  # a function that is made for the nodes alone
+        except ValueError:  # a function that accepts only the nodes
             return np.full(x.shape[:-1], np.inf)
 
     def moved_past(self, x: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """``relative(x + moved) - x`` with all digits of small motions."""
+        """``relative(x + moved) - x``, without cancellation for small motions."""
         past = moved - self._displacement
         return past if self._turn is None else past + (x - self.point + past) @ self._turn
 
     def turned(self, frames: np.ndarray) -> np.ndarray:
-        """Frames in the surface's axes, in global components."""
+        """Frames given in the surface's axes, in global components."""
         return frames if self._turn is None else frames + frames @ self._turn.T
 
     def as_placed(self, frames: np.ndarray) -> np.ndarray:
-        """The same as guides stand."""
+        """Frames given in the guides' axes, in global components."""
         turn = _turn_of(self._placed)
         return frames if turn is None else frames + frames @ turn.T
 
     def own_axes(self, vector: np.ndarray) -> np.ndarray:
-        """Components of a vector in its axes; a rotation of two dimensions stays."""
+        """Components of a global vector in the surface's axes; a rotation in two dimensions, one number, is unchanged."""
         return vector if self._turn is None or vector.size == 1 else vector + vector @ self._turn
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Distance to the surface, ``shape=(n,)``, length units, positive on the side where the body may be; ``y``, ``shape=(n, gdim)``.
+        """Signed distance to the surface, positive on the side where the body may be.
 
-        What counts is its value on the surface, zero, and its slope there, one along the normal.
+        Only its zero and its slope there matter: on the surface, the derivative along the normal must be one.
+
+        Args:
+            y: Positions, ``shape=(n, gdim)``, in axes that move with the surface.
+
+        Returns:
+            ``shape=(n,)``, length units.
         """
         raise NotImplementedError
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """Rows (t1, t2, n), in two dimensions (t, n), orthonormal: ``shape=(n, gdim, gdim)``, or one for all."""
+        """Orthonormal rows (t1, t2, n), in two dimensions (t, n), at positions ``y``: ``shape=(n, gdim, gdim)``, or ``(gdim, gdim)`` for all."""
         raise NotImplementedError
 
     def check_at(self, y: np.ndarray) -> None:
-        """Raise a ``ValueError`` if what the user says of the surface contradicts itself at positions of nodes."""
+        """Raise a ``ValueError`` if the user's input contradicts itself at the nodes' positions ``y``."""
 
     def described(self) -> np.ndarray:
-        """Numbers that say which surface it is, for checkpoints: point and axis, and whatever else a class has."""
+        """Numbers that identify the surface in checkpoints: point, axis, and the parameters of the class."""
         return np.append(self.point, np.zeros(self.point.size) if self.axis is None else self.axis)
 
     def __repr__(self) -> str:
-        """Which surface it is, in words: the same on all ranks."""
+        """The surface in words, the same on all ranks."""
         return f"{type(self).__name__}({', '.join(map(str, self.described().tolist()))})"
 
 
 def frames_along(
     normals: np.ndarray, axis: np.ndarray | None, at: np.ndarray, surface: Surface
 ) -> np.ndarray:
-    """Rows (t1, t2, n), in two dimensions (t, n), of unit normals, ``shape=(n, gdim, gdim)``; t1 is an axis, made orthogonal.
+    """Local frames with these unit normals: rows (t1, t2, n), in two dimensions (t, n), ``shape=(n, gdim, gdim)``.
 
-    Without an axis it is the coordinate direction that is most tangential.
+    t1 is the axis, projected on the tangent plane.  Without an axis, t1 is the projection of the coordinate direction that is most tangential.
 
     Args:
-        normals: ``shape=(n, gdim)``, in the frame of the axis.
+        normals: ``shape=(n, gdim)``, in the same axes as ``axis``.
         axis: ``shape=(gdim,)``, or None.
-        at: Positions, ``shape=(n, gdim)``, and the surface, for the message.
+        at: Positions, ``shape=(n, gdim)``, for the error message.
+        surface: For the error message.
 
     Raises:
-        ValueError: an axis along a normal.
+        ValueError: the axis is along a normal.
     """
     if normals.shape[1] == 2:
         return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
@@ -291,32 +299,32 @@ def frames_along(
 
 
 class CurvedSurface(Surface):
-    """A surface with a normal at every position."""
+    """A surface whose normal depends on the position."""
 
     curved = varies = True
 
     def normals(self, y: np.ndarray) -> np.ndarray:
-        """Unit normals towards the side where the body may be, ``shape=(n, gdim)``."""
+        """Unit normals at positions ``y``, towards the side where the body may be, ``shape=(n, gdim)``."""
         raise NotImplementedError
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """Tangents and normal at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
+        """Local frame at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
 
         Raises:
-            ValueError: an axis along the normal of a position.
+            ValueError: the axis is along the normal at a position.
         """
         return frames_along(self.normals(y), self.axis, y, self)
 
 
 def _turn_of(angle: np.ndarray) -> np.ndarray | None:
-    """``rotation_less_one``; None where nothing turns."""
+    """``rotation_less_one``, or None for no rotation."""
     return rotation_less_one(angle) if angle.any() else None
 
 
 def rotation_less_one(angle: np.ndarray) -> np.ndarray:
-    """Matrix of a rotation minus the identity, with all digits of small ones.
+    """Rotation matrix minus the identity, ``shape=(gdim, gdim)``, without cancellation for small angles.
 
-    ``sin(a) N + 2 sin(a/2)^2 N^2`` with the cross product matrix ``N`` of the axis [O. Rodrigues 1840].
+    Rodrigues' formula, ``sin(a) N + 2 sin(a/2)^2 N^2``, with the cross-product matrix ``N`` of the axis.
     """
     a = np.linalg.norm(angle)
     if angle.size == 1:
@@ -328,7 +336,7 @@ def rotation_less_one(angle: np.ndarray) -> np.ndarray:
 
 
 def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Rotation vector, in two dimensions angle, of one rotation after another."""
+    """Rotation vector, or in two dimensions angle, of the rotation ``before`` followed by ``after``."""
     if after.size == 1:
         return after + before
     if not before.any():
@@ -340,7 +348,7 @@ def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Rotation vector, in two dimensions angle, from one rotation to another; of any size about one axis."""
+    """Rotation vector, or in two dimensions angle, from one rotation to another; may exceed a turn if both have one axis."""
     if after.size == 1:
         return after - before
     size = np.linalg.norm(before) * np.linalg.norm(after)
@@ -350,7 +358,7 @@ def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Velocities of points with these arms, ``shape=(n, gdim)``, in a rotation about a vector, in 2-D by one number."""
+    """``angle x arms``, ``shape=(n, gdim)``: velocities of points with these lever arms; in 2-D, ``angle`` is one number."""
     if angle.size == 1:
         return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
     return np.cross(angle, arms)

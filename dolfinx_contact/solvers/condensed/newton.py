@@ -34,28 +34,29 @@ if TYPE_CHECKING:
 
 UNLIMITED = 200_000  # iterations; methods have limits of their own
 
-# Iterations by default for arrays, which need not have a solution: WORK over the unknowns squared, between both others.  Random problems of
-# up to 12 contacts, with strong friction and crossed slip rules, need up to some 6,500, of 156 piles of up to 300 contacts one more than 600.
+# Default iteration limit for arrays, which need not have a solution: WORK over the unknowns squared, at least FEWEST, at most MOST.  Random
+# problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; one of 156 piles of up to 300 contacts needs more than 600.
 WORK, FEWEST, MOST = 9e6, 600, 7000
 
-# Iterations before it is asked whether there is a solution at all, and contacts up to which that takes less than a second.
+# Iterations after which infeasibility is tested, and the number of contacts up to which that takes less than a second.
 FIRST, PROVED = 100, 500
 
-# Where a smaller error is asked for: its steps below tol; how much of the next Newton step it must leave, rounding that forbids it, the
-# unknowns up to which all methods search again.
+# If a smaller error is needed: tolerances relative to tol; the largest part of the next Newton step that may remain; the multiple of rounding
+# below which it is not tried; the unknowns up to which all methods search again.
 NEARER, GAIN, NEAR_ROUNDING, SMALL = (1e-2, 1e-4), 0.1, 10, 100
 
 
 @dataclass(frozen=True, kw_only=True)
 class CondensedNewton:
-    """Options of the globalised semismooth Newton method and its fallbacks.
+    """Semismooth Newton method with a line search on the condensed problem ``w = q + W r``, and its fallbacks; see docs/solvers.md.
 
     Args:
         slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
-        max_iterations: Iteration limit of all methods together; by default that of ``solve_condensed``, and 200,000 for a body.
+        max_iterations: Iteration limit of all methods together; by default 200,000 for a body, and for ``solve_condensed`` between
+            7,000 (up to 12 contacts) and 600 (41 or more).
         newton_iterations: Iteration limit of one attempt of Newton's method.
-        max_seconds: Wall time after which the search ends, seconds.
-        fallbacks: Try other methods if Newton's method fails.
+        max_seconds: Wall time after which the search ends, seconds; infinite by default.
+        fallbacks: Whether to try other methods if Newton's method fails.
 
     Raises:
         ValueError: an option is not a positive number.
@@ -174,9 +175,9 @@ def solve_condensed(
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
     Needs neither a body nor DOLFINx.  ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without reactions.
-    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` slip.
+    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` the slip.
 
-    The law, as in [dSFMH07, Section 1], and both errors are those of ``ContactProblem``:
+    The law [dSFMH07, Section 1] and both errors are those of ``ContactProblem``:
 
     - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |r|`` with
       ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
@@ -190,11 +191,11 @@ def solve_condensed(
     Args:
         W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
             rank-deficient and slightly unsymmetric.
-        q: Free displacement, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions.
-        friction: A ``Friction``, with coefficients for all contacts or ``shape=(n, 2)`` for each; or isotropic coefficients, a
-            number for all contacts or an array of one per contact, ``shape=(n,)``, also for two contacts.
-        solver: ``CondensedNewton(...)``; None is one with default options.
-        tol: Largest error and, unless the solver says otherwise, slip error.
+        q: Displacement without reactions, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions; length units.
+        friction: A ``Friction``, with coefficients common to all contacts or ``shape=(n, 2)``, a pair for each; a number; or an array of
+            isotropic coefficients, one per contact, ``shape=(n,)``.
+        solver: ``CondensedNewton(...)``; None takes the default options.
+        tol: Largest error, and largest slip error unless the solver has a ``slip_tol``.
         r0: Initial reactions, of the shape of ``q``.
         max_seconds: Wall time after which the search ends, seconds.
 
@@ -202,7 +203,7 @@ def solve_condensed(
         A ``CondensedResult``: reactions, displacements, status, errors and the methods used.
 
     Raises:
-        ValueError: input that makes no sense.
+        ValueError: an array of the wrong shape, or not real and finite; a negative diagonal entry of ``W``; or ``friction`` for other contacts.
         CondensedNotConverged: no method reached ``tol``, or none can, ``failure.infeasible``; ``failure.best`` is the best state.
 
     Example:

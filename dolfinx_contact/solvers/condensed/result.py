@@ -32,14 +32,14 @@ class CondensedResult:
         error: ``|r - proj(r - kappa w)|`` relative to the acting forces, see ``solve_condensed``.
         slip_error: Defect of the slip rule, as a force, relative to the same.
         local_error: The largest error of any single contact, relative to the force that acts there, ``max(|r|, kappa |w|)``; zero
-            if rounding may explain it.  ``error`` and ``slip_error`` hardly see contacts that are much softer, or carry much
-            less, than others.
+            if rounding may explain it.  ``error`` and ``slip_error`` hardly detect errors at contacts that are much softer, or
+            carry much less, than others.
         rounding: Rounding error of both in double precision; an error above ``tol`` is below it.
         change: Size of the next Newton step of the reactions, relative to the same forces: an estimate of the distance to the
             nearest solution.  If W is ill conditioned, it is much larger than the error.  It says nothing about other solutions.
         iterations: Of all methods tried.
         seconds: Wall time of all methods tried.
-        branch: The method that gave the answer; of a state that is no solution "", or "infeasible" if there is none.
+        branch: The method that found the solution; if none was found "", or "infeasible" if it is proved that none exists.
         tried: All methods tried, in order.
         tied: Forces of the bilateral constraints of a kernel operator, if it has any.
 

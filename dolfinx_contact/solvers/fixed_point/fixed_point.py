@@ -25,20 +25,19 @@ if TYPE_CHECKING:
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
 PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
-# The contact is linearised every EVERY iterations: by the first time most nodes have found their status,
-# and easy steps are nearly over. Where that does not converge it is tried SOONER: the second number. If the error
-# then grows by more than GROWTH, it was too early; if it is still more than USELESS of what it was when the next one is due,
-# the iterations until then do without.
-# Near a start whose error is less than NEAR, as of a step that is repeated, most nodes have theirs.
+# The contact is linearised every EVERY iterations: after so many, most nodes have found their status, and easy steps are nearly
+# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH, it was too early; if a
+# tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
+# If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
 EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, 100.0, 0.9, 0.1
 
-# Of a loose body, which may slide away, the error has to halve within so many iterations.
+# A body held by contact alone may slide away; its error must halve within this many iterations.
 PATIENCE = 60
 
-# Iterations of a step in all, over ``max_iterations``, where one is a multigrid cycle: ten times those of a hard step.
+# Limit of all iterations of a step over ``max_iterations`` if one is a multigrid cycle: ten times the iterations of a hard step.
 BUDGET = 2.5
 
-# Corrections that grow by this mislead.
+# If corrections grow by this factor, Anderson's differences mislead.
 ASTRAY = 1e3
 
 
@@ -46,14 +45,15 @@ ASTRAY = 1e3
 class FixedPoint:
     """Predictor and corrector in every iteration, without a condensed operator.
 
-    An iteration takes the reactions required for equilibrium, ``K u - f`` at the contact nodes, applies predictor and projection
-    on the friction cone [dSFMH07, Section 2], puts the new reactions into the residual, and corrects the displacement by one
-    back-solve with the stiffness plus springs at the contact nodes.  The solution does not depend on the augmentation parameter
-    rho.  Anderson's method accelerates the iteration.  Every twenty iterations, the contact is linearised; with this tangent, the
-    near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
+    An iteration takes the reactions required for equilibrium, ``K u - f`` at the contact nodes, and applies predictor and projection
+    on the friction cone [dSFMH07, Section 2].  The new reactions enter the residual, and one back-solve with the stiffness plus springs
+    at the contact nodes corrects the displacement.  Anderson's method accelerates the iteration.  Every twenty iterations, the
+    contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
+    unless the last tangent did not help.
 
     If the error stalls, Newton's method is applied to the same residual, see ``search_by_newton``: an iteration is then one of
-    GMRES, preconditioned by the same correction.  If that fails, too, the fixed point continues with another rho.
+    GMRES, preconditioned by the same correction.  If that also fails, the fixed point continues with another rho.  The solution does
+    not depend on rho.
 
     Attributes:
         map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
@@ -63,12 +63,12 @@ class FixedPoint:
             converges, at the cost of a factorisation each.
         depth: Number of previous corrections that Anderson's method combines.
         newton: Whether Newton's method may be tried, with the first rho.
-        max_iterations: Iterations with one rho, not counting those of Newton's method; where they are multigrid cycles a step
+        max_iterations: Iteration limit with each rho, not counting Newton's method.  If iterations are multigrid cycles, a step
             ends after 2.5 times as many in all.
-        max_seconds: Wall time after which the search ends, seconds.
+        max_seconds: Wall time after which the search ends, seconds; infinite by default.
 
     Raises:
-        ValueError: an unknown map, or a rho, depth or number of iterations that is not positive.
+        ValueError: ``map`` is unknown, or ``rho``, ``depth`` or a limit is not positive.
 
     Example:
         >>> solver = dc.FixedPoint(max_iterations=2000)  # for ContactProblem(..., solver=solver)
@@ -205,7 +205,7 @@ class BoundFixedPoint:
             if search.left <= due or search.error < near:
                 due, near = search.left - every, 0.0
                 useless = search.error > USELESS * tangent
-                # not where the end is as near as the last tangent is behind
+                # not if less reduction of the error is left than the last tangent has brought
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
                     self.preconditioner.forget_tangent()
                     if not useless:

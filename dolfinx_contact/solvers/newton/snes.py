@@ -39,10 +39,10 @@ class SNES:
     the problem's ``petsc_options_prefix``.  Linear systems are factorised; the prefix of their options ends in ``tangent_``.
 
     Attributes:
-        petsc_options: Options of SNES, without prefix.  PETSC_OPTIONS and the command line override them.
+        petsc_options: Options of SNES, a dictionary, without prefix.  PETSC_OPTIONS and the command line override them.
 
     Raises:
-        ValueError: options that are not a dictionary.
+        ValueError: ``petsc_options`` is not a dictionary.
 
     Example:
         >>> solver = dc.SNES({"snes_linesearch_type": "l2"})  # for ContactProblem(..., solver=solver)

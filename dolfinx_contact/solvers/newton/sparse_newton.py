@@ -39,17 +39,17 @@ BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
 
 @dataclass(frozen=True)
 class SparseNewton:
-    """Newton's method on the residual of body and contact together, see ``ContactTangent``.
+    """Newton's method on body and contact together: ``-F(u) + r(F(u), u) = 0``, with the nodal map r of the law, see docs/nonlinear.md.
 
     An iteration assembles the tangent of the body, replaces its rows at contact nodes with the derivatives of predictor and
     corrector, and factorises it (MUMPS).  Bodies that are linear in ``u`` are not assembled again.
 
     Attributes:
-        max_iterations: Largest number of iterations.
-        max_seconds: Wall time after which the search ends, seconds.
+        max_iterations: Iteration limit.
+        max_seconds: Wall time after which the search ends, seconds; infinite by default.
 
     Raises:
-        ValueError: a number that is not positive.
+        ValueError: a limit is not positive.
 
     Example:
         >>> solver = dc.SparseNewton()  # for ContactProblem(..., solver=solver)
