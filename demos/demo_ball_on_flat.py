@@ -2,12 +2,12 @@
 # # A rigid ball on an elastic flat
 #
 # The other half of `demo_hertz.py`: there the body is round and the counterface flat, here a rigid sphere is pressed on
-# a block in three dimensions. `dc.RigidSphere` takes the place of `dc.RigidPlane`.
+# a block in three dimensions. `dc.RigidSphere` replaces `dc.RigidPlane`.
 #
 # ## Notation
 #
 # $(x, y, z)$, $z$ up, the block is below $z = 0$; $u$ displacement, $E$, $\nu$ elastic constants, $E^* = E / (1 - \nu^2)$;
-# $c$, $R$ centre and radius of the sphere, $\delta$ its way down; $a$ contact radius, $p$ pressure, $F$ force, $r = \sqrt{x^2 +
+# $c$, $R$ centre and radius of the sphere, $\delta$ its displacement downwards; $a$ contact radius, $p$ pressure, $F$ force, $r = \sqrt{x^2 +
 # y^2}$. Units: mm, N, MPa.
 #
 # ## Strong form
@@ -22,7 +22,7 @@
 #    p(r) = p_0 \sqrt{1 - r^2/a^2}, \quad p_0 = \frac{2 E^* a}{\pi R}. $$
 #
 # It replaces the sphere by a paraboloid, which neglects $(a/R)^2$, here $10^{-4}$. The block ends at $L = 8 a$. There it is given the
-# displacement of a half space under a point force $F$ [J. Boussinesq 1885], as `demo_hertz.py` explains; what is left is of
+# displacement of a half space under a point force $F$ [J. Boussinesq 1885], as `demo_hertz.py` explains; the remaining error is of
 # the order $(a/L)^3$.
 #
 # ## Weak form
@@ -87,9 +87,9 @@ def press(cells: int):
 # %% [markdown]
 # ## Result
 #
-# 1. The force is that of Hertz to 1 %; a quarter of it acts on the quarter of the block.
+# 1. The force on the quarter of the block is a quarter of Hertz's force, to 1 %.
 # 2. The radius, from the second moment of the reactions, which is $\frac{2}{5} a^2$ in closed form, is right to 1 %.
-# 3. The largest pressure is right to 1 %; the root mean square error of that of the nodes in contact is below 5 % of it,
+# 3. The largest pressure is right to 1 %. The root mean square error of the pressure at nodes in contact is below 5 % of it,
 #    most of it in the cells at the edge.
 # 4. The reaction of every node is along the normal of the sphere there: the force along $x$ on the quarter is
 #    $\sum r_n x / R$, to $(a/R)^2$.

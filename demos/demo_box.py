@@ -18,7 +18,7 @@
 # $$ w_n \ge 0,\; r_n \ge 0,\; w_n r_n = 0, \qquad |r_t| \le \mu r_n, \quad
 #    r_t = -\mu r_n \frac{\Delta w_t}{|\Delta w_t|} \text{ where } \Delta w_t \ne 0. $$
 #
-# The **closed form** without friction: stresses are even, $\sigma = -\operatorname{diag}(q_1, q_2, q_3)$, and every wall has the pressure
+# The **closed form** without friction: stresses are uniform, $\sigma = -\operatorname{diag}(q_1, q_2, q_3)$, and every wall has the pressure
 # of the face opposite to it. With friction there is an exact **balance**,
 #
 # $$ R_1 + R_2 + R_3 = (q_1 A_1, q_2 A_2, q_3 A_3). $$

@@ -29,8 +29,8 @@
 #
 # ## Code
 #
-# Half of both bodies: a rectangle of angles and radii without its middle row of cells, whose halves become pin and plate. Angles of the plate's nodes are
-# others than those of the pin's.
+# Half of both bodies: a rectangle of angles and radii without its middle row of cells, whose halves become pin and plate. Nodes of the plate are
+# at other angles than those of the pin.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -92,7 +92,7 @@ def closed_load(angle):
 # %% [markdown]
 # ## Result
 #
-# The last node that carries is the one that the closed form says, to two elements, at loads a hundred times apart.
+# The contact ends at the angle of the closed form, to within two elements, at loads that differ by a factor of a hundred.
 
 
 # %%

@@ -19,7 +19,7 @@
 # wears opens the gap of the next, and the volume is $k D$. The load is kept: after every step the approach of the far
 # boundary is corrected by the missing part of $P$ over the stiffness of the contact.
 #
-# ## What must come out
+# ## What must hold
 #
 # No closed form, but balances. Worn volume is $k D$. Over a cycle that repeats itself elastic energy does not change,
 # so the plane's work $\oint Q \,\mathrm{d}s$, a quantity of the whole body, is the dissipation, a sum over slipping
@@ -85,7 +85,7 @@ def profile(contact: dc.Contact) -> dict[str, np.ndarray]:
 # %% [markdown]
 # ## Result
 #
-# Without wear the second and the third cycle are alike: that is shakedown into a steady loop. There,
+# Without wear the second and the third cycle are the same: this is shakedown into a steady loop. There,
 # $\oint Q \,\mathrm{d}s = D$ as steps become small. $Q$ is known only at the ends of steps, and reverses within one:
 # the trapezoidal rule for $\oint Q \,\mathrm{d}s$ is 5.6 % too small with two steps a quarter, 1.5 % with four. $D$, the
 # sum of $\frac12 (P_0 + P_1) \mu |\Delta u_t|$ over nodes and steps, changes by less than 0.1 % between the two.

@@ -7,7 +7,7 @@
 # ## Notation
 #
 # $(x, y, z)$, $z$ up, the block is below $z = 0$; $E^* = E / (1 - \nu^2)$; $R_1 > R_2$ radii of curvature along $x$ and $y$; $F$ weight,
-# $\delta$ way down; $a > b$ semi-axes of the contact, $e = \sqrt{1 - b^2/a^2}$, $p_0$ largest pressure; $K(e)$, $E(e)$ complete
+# $\delta$ displacement downwards; $a > b$ semi-axes of the contact, $e = \sqrt{1 - b^2/a^2}$, $p_0$ largest pressure; $K(e)$, $E(e)$ complete
 # elliptic integrals; $d$ unit vector along the slip of the block, $M$, $P$ diagonal matrices of the coefficients of friction and of
 # the slip rule. Units: mm, N, MPa.
 #
@@ -23,7 +23,7 @@
 #    \frac{1}{2 R_2} = \frac{p_0}{E^*} \frac{b}{e^2 a^2} \left[\frac{a^2}{b^2} E - K\right], \quad
 #    F = \tfrac{2}{3} \pi a b p_0, \quad \delta = \frac{p_0}{E^*} b K . $$
 #
-# Dragged in one direction, all nodes slip alike. Whatever the pressure, the slip rule [dSFMH07, Section 1] gives the friction
+# Dragged in one direction, all nodes slip in that direction. For any distribution of pressure, the slip rule [dSFMH07, Section 1] gives the friction
 #
 # $$ T = -F \frac{P^2 d}{|M^{-1} P^2 d|} , $$
 #

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A flat punch on a plastic half-plane
 #
-# A rigid flat punch without friction is pressed into von Mises' material, deeper and deeper, until the material flows beside it;
-# then it is lifted off and leaves an imprint. The material is written in UFL alone, which also finds its derivative.
+# A rigid flat punch without friction is pressed into a von Mises material, deeper and deeper, until the material flows beside it.
+# Then the punch is lifted off and leaves an imprint. The material is written in UFL, which also finds its derivative.
 #
 # ## Notation
 #

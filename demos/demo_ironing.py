@@ -2,13 +2,13 @@
 # # Ironing: a rounded stamp slides over a soft block
 #
 # A stamp with a cylindrical face is pressed into a block of rubber and drawn over it, by one facet of the block a step.
-# Both bodies are deformable, three-dimensional and of finite strain, and their meshes do not match. A run with steps ten times finer
-# says what long steps cost.
+# Both bodies are deformable and three-dimensional, strains are finite, and the meshes do not match. A run with ten times as many steps
+# shows the error of long steps.
 #
 # ## Notation
 #
 # $u$ displacement, $G = 1 + \nabla u$, $J = \det G$, $C = G^T G$; $\mu_i$, $\lambda_i$ moduli of stamp and block; $f$ friction; $N$ and $T$ the
-# forces of the block on the stamp, up and along the way; $s$ the way of the stamp's top; $D$ frictional work, $W$ elastic energy. Units: mm, N, MPa.
+# forces of the block on the stamp, up and along the path; $s$ the displacement of the stamp's top; $D$ frictional work, $W$ elastic energy. Units: mm, N, MPa.
 #
 # ## Strong form and balance
 #
@@ -87,7 +87,7 @@ def energy_of(u):
 #
 # ## Result
 #
-# 1. Forces of steps by one facet differ from those of steps ten times finer by less than 1 %.
+# 1. Forces with steps of one facet differ from those with ten times as many steps by less than 1 %.
 # 2. The balance of work holds to 2 %, the error of this mesh.
 
 

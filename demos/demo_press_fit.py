@@ -15,12 +15,12 @@
 #
 # $$ -\operatorname{div} \sigma(u) = 0 \ \text{in both}, \qquad x_n \ge 0, \quad p \ge 0, \quad x_n\, p = 0, \quad |q| \le \mu p . $$
 #
-# Without friction the ends are free of stress, and the pressure is even [G. Lamé 1852]:
+# Without friction the ends are free of stress, and the pressure is uniform [G. Lamé 1852]:
 #
 # $$ p = \frac{\delta}{R} \left[ \frac{1}{E_2} \left( \frac{R_2^2 + R^2}{R_2^2 - R^2} + \nu_2 \right) + \frac{1 - \nu_1}{E_1} \right]^{-1},
 #    \qquad F = 2 \pi R L\, \mu\, p , $$
 #
-# $F$ what slides the shaft, if friction changes $p$ little.
+# with the force $F$ at which the shaft slides, if friction changes $p$ little.
 #
 # ## Weak form
 #
@@ -29,8 +29,8 @@
 #
 # ## Code
 #
-# The measure of the forms is that of the contact, too: `weight`. The two bodies overlap as they are meshed, by the interference; the first
-# step takes it away.
+# The contact has the surface measure of the forms: `weight`. As meshed, the two bodies overlap by the interference; the first
+# step removes the overlap.
 
 # %%
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
@@ -107,7 +107,7 @@ def fitted(cells: int, friction: float):
 
 
 # %% [markdown]
-# The hub stands on its lower end, the shaft is pushed at its upper end, but at the edge: a node that a boundary condition holds along the
+# The hub stands on its lower end. The shaft is pushed at its upper end, except at the edge: a node that a boundary condition holds along the
 # other body has no friction there.
 #
 # ## Result

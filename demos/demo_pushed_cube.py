@@ -7,7 +7,7 @@
 # ## Notation
 #
 # $\Omega$ the cube with edge $L$, $z$ up, the table is $z = 0$; $u$ displacement, $\sigma$ stress, $W$ weight, $Q$ side force,
-# both spread evenly over the volume; $\mu$ coefficient of friction, $r$ reactions of the contact nodes, $x$ their places.
+# both spread uniformly over the volume; $\mu$ coefficient of friction, $r$ reactions of the contact nodes, $x$ their positions.
 # Units: mm, N, MPa.
 #
 # ## Strong form
@@ -70,7 +70,7 @@ def reactions(problem):
 #
 # 1. Sums of forces and moments of the reactions are those of statics, to $10^{-7}$ of the weight.
 # 2. Up to $0.999\, \mu W$ the cube rests; the part of its foot that slips grows.
-# 3. $1.001\, \mu W$ is refused. The message names the motion, a translation along the force; the last state is kept.
+# 3. $1.001\, \mu W$ is refused. The message names the motion, a translation along the force; the problem keeps its last converged state.
 
 
 # %%

@@ -18,7 +18,7 @@
 #
 # $R_\theta$ the rotation and $\Delta w_t$ the slip of a step, tangential. The top of the pin is held, and the plate is free along its normal: it presses with $N$.
 #
-# The **closed form**: once every node slides friction is along the motion of the plate, $\mu n_i$ at a lever $r_i$. With an even
+# The **closed form**: once every node slides, friction is along the motion of the plate, $\mu n_i$ at a lever $r_i$. With a uniform
 # pressure on the foot $S$
 #
 # $$ T = \mu N \bar r, \qquad \bar r = \frac{1}{|S|} \int_S r \,\mathrm{d}S, $$

@@ -8,7 +8,7 @@
 #
 # $R$ radius, $W$ weight and $T$ torque per length, $y$ up; $\alpha$ slope of both planes, $n_1 = (\sin\alpha, \cos\alpha)$ and
 # $n_2 = (-\sin\alpha, \cos\alpha)$ their normals, $t_i$ the normals turned to the left, $N_i$ normal force and $F_i$ friction
-# along $t_i$ on the cylinder, $\mu$ coefficient of friction; $r$ reactions of the contact nodes, $x$ their places. Units: mm, N, MPa.
+# along $t_i$ on the cylinder, $\mu$ coefficient of friction; $r$ reactions of the contact nodes, $x$ their positions. Units: mm, N, MPa.
 #
 # ## Strong form
 #
@@ -108,7 +108,7 @@ def moment(contact) -> float:
 #
 # 1. Forces and moments of the reactions balance weight and torque, to $10^{-7}$ of the weight.
 # 2. Close to the largest torque, at $0.999\, T_{\max}$, both normal forces are those of the closed form to 1 %.
-# 3. $2\, T_{\max}$ is refused. The message names the motion, a rotation; the last state is kept.
+# 3. $2\, T_{\max}$ is refused. The message names the motion, a rotation; the problem keeps its last converged state.
 #
 # A little above $T_{\max}$ there still are static states: geometry is linear, so a rotation of some degrees moves the contact along
 # the faces, where normal forces have a lever. Twice the torque exceeds what any nodes of the faces can carry.

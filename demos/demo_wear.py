@@ -1,12 +1,12 @@
 # %% [markdown]
 # # A million cycles of wear
 #
-# A pad under a dead weight is rubbed to and fro on a plane. It wears until its pressure is even on average over a cycle, then evenly.
+# A pad under a dead weight is rubbed to and fro on a plane. It wears until its pressure, averaged over a cycle, is uniform; from then on it wears uniformly.
 # `dc.cycle_jump` simulates only a few of the cycles.
 #
 # ## Notation
 #
-# $N$ weight, $b$ width of the pad, $\mu$ coefficient of friction, $k$ wear coefficient (volume per work), $s$ way of a cycle, $w$ worn depth,
+# $N$ weight, $b$ width of the pad, $\mu$ coefficient of friction, $k$ wear coefficient (volume per work), $s$ sliding distance per cycle, $w$ worn depth,
 # $n$ cycles. Units: mm, N, MPa, per millimetre of the pad.
 #
 # ## Strong form
@@ -83,8 +83,8 @@ def rub(problem):
 # %% [markdown]
 # ## Result
 #
-# 1. The worn volume is $k \mu N s\, n$ to 2 %, the accuracy asked for. (The pad follows the plane at each turn, which is less than 1 % of the way.)
-# 2. Depth is that of an even pressure to 2 % everywhere: pressure is even on average over a cycle. At the end of a stroke the moment of
+# 1. The worn volume is $k \mu N s\, n$ to 2 %, the requested accuracy. (The pad follows the plane at each turn, which is less than 1 % of the sliding distance.)
+# 2. Depth is that of a uniform pressure to 2 % everywhere, as the pressure averaged over a cycle is uniform. At the end of a stroke the moment of
 #    friction tilts it.
 # 3. At most one cycle of 5,000 is simulated.
 
