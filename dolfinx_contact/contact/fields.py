@@ -28,7 +28,7 @@ ZERO = 1e-10
 # By which Cauchy's inequality may miss equality.
 SQUARE = 1e-10
 
-# What an even pressure may make at a node that is left out, over the largest at others, before a user is told.
+# Largest force of a uniform pressure at a node that is left out, relative to the largest nodal force, without a warning.
 UNEVEN = 0.01
 
 
@@ -89,7 +89,7 @@ def areas(
 def facing_areas(contact: ContactLike, weight: Any, turn: np.ndarray) -> np.ndarray:
     r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
 
-    On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that an even pressure p makes the
+    On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that a uniform pressure p makes the
     reactions ``p A_i``.  On a curved surface, whose normals will be others when the body has moved, facets count by their own area
     where they face it, :math:`n_f \cdot n < 0`; on a deformable one they are whole.
 
@@ -157,9 +157,9 @@ def grows_with_radius(V: fem.FunctionSpace, weight: Any) -> bool:
 def contact_nodes(
     V: fem.FunctionSpace, facets: np.ndarray, weight: Any = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Owned nodes of facets that carry a part of an even pressure, and the others.  Collective.
+    """Owned nodes of facets that carry a part of a uniform pressure, and the others.  Collective.
 
-    An even pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
+    A uniform pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
     and with second order on quadrilaterals and on edges, all are positive. Those of the vertices of triangles of second
     order are zero, and the middles of their edges are the points of a rule that integrates quadratic functions exactly: the
     vertices are left out. It is the element that decides, on the reference facet, so that a curved one cannot change it; and a weight
@@ -180,7 +180,7 @@ def contact_nodes(
             node = int(np.argmin(weights))
             raise ValueError(
                 f"V has degree {compat.lagrange_degree(V)}, and the integral of the shape function of the node at "
-                f"{place(V.tabulate_dof_coordinates(), nodes[node])} over the facets is negative: under an even pressure "
+                f"{place(V.tabulate_dof_coordinates(), nodes[node])} over the facets is negative: under a uniform pressure "
                 "it would have to pull, which contact cannot. Take degree 1 or 2."
             )
     kept = weights > zero
@@ -191,7 +191,7 @@ def contact_nodes(
 def _warn_of_curved_edges(
     V: fem.FunctionSpace, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray, weight: Any
 ) -> None:
-    """Tell that an even pressure acts on nodes that are left out.  Collective."""
+    """Tell that a uniform pressure acts on nodes that are left out.  Collective."""
     comm, dim = V.mesh.comm, V.mesh.geometry.dim
     if comm.allreduce(left_out.size) == 0:
         return
@@ -200,7 +200,7 @@ def _warn_of_curved_edges(
     missed, largest = (comm.allreduce(float(of), op=MPI.MAX) for of in most)
     if missed > UNEVEN * largest:
         warnings.warn(
-            f"edges of contact facets are curved: an even pressure would make forces of up to {missed / largest:.1%} of "
+            f"edges of contact facets are curved: a uniform pressure would make forces of up to {missed / largest:.1%} of "
             "the largest at vertices of second-order tetrahedra, which are no contact nodes. Results are off by about that "
             "there. Take smaller cells there, or bricks.",
             stacklevel=4,

@@ -1,29 +1,28 @@
 r"""The errors of a step, dimensionless numbers; see docs/errors.md.
 
-What a node has wrong is the kernel's to say, ``law.bipotential_map`` and ``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``): the
-condensed solver's judge calls the same predictor and slip rule.
+The kernel computes the defects of a node, ``law.bipotential_map`` and ``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``); the
+condensed solver's checks use the same predictor and slip rule.
 
-For a displacement ``u`` with nodal reactions ``r`` in the friction cone all errors are forces that are not as they
-should be, over the forces that act in that same state,
+For a displacement ``u`` with nodal reactions ``r`` in the friction cone, all errors are residual forces relative to the
+acting forces of the same state,
 
 .. math:: S = \max(|r|, |f|, |R|),
 
-Euclidean over nodes: reactions, external forces, and what the supports carry.
+Euclidean norms over nodes of reactions, external forces and support forces.
 
 - ``error``: the largest of three. Equilibrium, ``|f - F(u) + r| / S`` on free degrees of freedom, F assembled by
-  DOLFINx, equations of pressures as forces (``bodies/unknowns.py``), and of planes that force drives, along their free
-  directions; where supports are not at their boundary
-  values, what is missing times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
+  DOLFINx, with equations of pressures converted to forces (``bodies/unknowns.py``), equilibrium of planes driven by force along their free
+  directions, and the error of boundary values times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
   paper's projection equation [dSFMH07, Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration,
   ``|kappa max(-x_n, 0)| / S``. The metric ``kappa`` is the normal diagonal entry of the stiffness at the node, never the rho of a solver.
 - ``slip_error``: ``|K_t (Delta u_t + |Delta u_t| d)| / S`` over slipping nodes, ``d`` the unit vector along
   ``P^-2 r_t``, and ``|K_t Delta u_t|`` over sticking ones; none where mu = 0. ``K_t`` is the tangential block of the
-  stiffness at the node. The projection equation weights slip by ``Q^2`` and does not see it where p is small.
-- ``rounding``: what double precision leaves of the above, estimated from the size of the terms that cancel in
-  ``f - K u + r``, in the gaps and in the slips. No smaller error can be asked for.
+  stiffness at the node. The projection equation weights slip by ``Q^2`` and is insensitive to it where p is small.
+- ``rounding``: the rounding error of both in double precision, estimated from the size of the terms that cancel in
+  ``f - K u + r``, in the gaps and in the slips. No smaller error can be reached.
 
-Where nothing acts, ``S`` is no larger than rounding, an estimate, may make of nothing. The state is then right if what is left is below rounding, and
-the numbers are relative to the terms that cancel instead.
+If ``S`` itself is at the rounding level, no force acts. The state is then accepted if the residuals are below rounding, and
+all numbers are relative to the terms that cancel.
 """
 
 from __future__ import annotations
@@ -40,10 +39,10 @@ if TYPE_CHECKING:
 
 EPSILON = np.finfo(float).eps / 2  # of one operation
 
-# Rounding is an estimate: errors up to this many times as large may be no more than that.
+# Rounding is an estimate: up to this factor, errors may be rounding alone.
 ROUNDED = 2.0
 
-# Part of the forces that act above which rounding may hide that loads are not balanced.
+# If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
 BLIND = 1e-3
 
 
