@@ -56,8 +56,10 @@ ROUGH = 1e-3
 # Over the largest sum of a row, an entry's difference from the one across the diagonal that is none.
 _ROUNDING = 1e-14
 
-# Unknowns beyond which a multigrid cycle is cheaper than a back-solve with a factorisation.
-LARGE = 50_000
+# Unknowns beyond which multigrid is the default, by the block size of the matrix, which is the dimension; of two, factors of
+# 500,000 unknowns have some 120 entries a row, and no grading of the mesh slows them down
+# (notes/2026-11-27-multigrid.md).
+LARGE = {2: 500_000, 3: 50_000}
 
 
 @contextmanager
@@ -78,10 +80,10 @@ def preconditioner(A: PETSc.Mat, options: dict[str, Any] | None, prefix: str) ->
 
 
 def _options(A: PETSc.Mat, options: dict[str, Any] | None) -> dict:
-    """The options, or the default for a matrix of that size."""
+    """The options, or the default for a matrix of that size and dimension."""
     if options is not None:
         return options
-    return DIRECT if A.getSize()[0] <= LARGE else MULTIGRID
+    return DIRECT if A.getSize()[0] <= LARGE.get(A.getBlockSize(), LARGE[3]) else MULTIGRID
 
 
 def _to_factorise(A: PETSc.Mat):

@@ -158,10 +158,10 @@ class LoadStep:
 
     def _hard(self) -> str:
         """What may help where a state should exist, in words.  Collective."""
-        from dolfinx_contact.step.stalled import tall
+        from dolfinx_contact.step.stalled import slow, tall
 
-        said = "Smaller load steps help most often", tall(self.body, self.contacts)
-        return "; ".join(filter(None, said))
+        said = tall(self.body, self.contacts), slow(self.body, self.b)
+        return "; ".join(filter(None, ("Smaller load steps help most often", *said)))
 
     def _no_state(self) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""

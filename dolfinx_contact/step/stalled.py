@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dolfinx_contact import compat
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolverError
 from dolfinx_contact.support.checks import place
 
 if TYPE_CHECKING:
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 # Height over width of elements at the surface from which on they are called tall.
 TALL = 2.0
+
+# Iterations of an elastic solve from which on its preconditioner is called a bad one; even meshes need 25 to 40.
+MANY = 60
 
 
 def changing(
@@ -53,6 +57,23 @@ def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> str:
     return (
         f"elements at the surface are {total / count:.1f} times as high as wide, which makes steps harder where nodes slip: "
         "make them flatter there"
+    )
+
+
+def slow(body: BodyLike, forces: np.ndarray) -> str:
+    """That the body alone is hard for its preconditioner, and what to do; empty if it is not, or if solves are exact.  Collective."""
+    if body.exact:
+        return ""
+    try:
+        body.solve(forces)
+    except LinearSolverError:
+        pass  # it has counted, too
+    count = body.ksp.getIterationNumber()
+    if count <= MANY:
+        return ""
+    return (
+        f"without contact, the body takes {count} iterations of its linear solver, {MANY} at most are usual; elements of very "
+        f"different sizes or shapes are hard for multigrid: if its factors fit into memory, petsc_options={DIRECT}"
     )
 
 

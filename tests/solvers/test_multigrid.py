@@ -183,3 +183,17 @@ def test_a_step_that_stalls_is_refused_with_its_reason():
     assert refused.match(
         "has 100 iterations, .*max_iterations=80.* elements at the surface are 4.8 times as high as wide"
     )
+    assert "without contact, the body" not in str(refused.value)  # multigrid is good there
+
+
+def test_a_body_that_is_hard_for_its_preconditioner_is_named():
+    """Iterations preconditioned by Jacobi, as bad as multigrid on a graded mesh: the refusal counts those of the body alone, and advises factors."""
+    options = dict(ksp_type="cg", pc_type="jacobi", ksp_rtol=1e-10)
+    solver = dc.FixedPoint(max_iterations=40)
+    scene = scenes.block(cells=(12, 12, 6), solver=solver, petsc_options=options)
+    scene.move_top(0.001, 0.0005, -0.01)
+    with pytest.raises(
+        dc.NotConverged, match=r"the body takes \d\d+ iterations .*'mumps'"
+    ) as refused:
+        scene.problem.solve()
+    assert refused.value.step.iterations <= 120
