@@ -456,7 +456,8 @@ class MortarPoints(ContactPoints):
         B = values[:, None] * frames.reshape(-1, self.dim)[rows]
         starts = np.append(0, ends)
         self._B = self._petsc(self.dim * starts, columns.ravel(), B)
-        self._sums = values, columns[np.arange(rows.size), rows % self.dim], starts
+        own = columns[np.arange(rows.size), rows % self.dim]
+        self._sums = sparse.csr_matrix((values, own, starts), (dofs.size, self._whole))
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
@@ -544,10 +545,9 @@ class MortarPoints(ContactPoints):
         own = np.linalg.norm(directions * free[self.dofs][:, None, :], axis=2)
         # Held: then what opposite nodes do is carried.
         directions[(own < FREE) | self.closed[:, None]] = 0.0
-        values, columns, starts = self._sums
         held = np.concatenate(self._comm.allgather(self.first + np.flatnonzero(~free)))
-        values = np.where(np.isin(columns, held), 0.0, values)
-        sums = sparse.csr_matrix((values, columns, starts), (self.dofs.size, self._whole))
+        sums = self._sums.copy()
+        sums.data[np.isin(sums.indices, held)] = 0.0
         return block_diagonal(directions), sums
 
     @property

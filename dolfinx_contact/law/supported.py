@@ -17,7 +17,7 @@ This is the law of [dSFMH07, Section 1] for all components together.  Needs NumP
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -114,8 +114,7 @@ class SupportedLaw:
         normal: np.ndarray,
         tangential: np.ndarray,
     ):
-        found = self.law.return_map(reaction, gap, slip - self.known, normal, tangential)
-        return self._replaced(found, reaction, gap, slip, normal, tangential)
+        return self._replaced(self.law.return_map, reaction, gap, slip, normal, tangential)
 
     def return_jacobian(
         self,
@@ -125,36 +124,33 @@ class SupportedLaw:
         normal: np.ndarray,
         tangential: np.ndarray,
     ):
-        found = self.law.return_jacobian(reaction, gap, slip - self.known, normal, tangential)
-        return self._replaced(found, reaction, gap, slip, normal, tangential)
+        return self._replaced(self.law.return_jacobian, reaction, gap, slip, normal, tangential)
 
     def bipotential_map(
         self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray
     ):
-        found = self.law.bipotential_map(reaction, gap, slip - self.known, rho)
-        return self._replaced(found, reaction, gap, slip, rho, rho)
+        return self._replaced(self.law.bipotential_map, reaction, gap, slip, rho)
 
     def bipotential_jacobian(
         self, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray
     ):
-        found = self.law.bipotential_jacobian(reaction, gap, slip - self.known, rho)
-        return self._replaced(found, reaction, gap, slip, rho, rho)
+        return self._replaced(self.law.bipotential_jacobian, reaction, gap, slip, rho)
 
     def _replaced(
         self,
-        found: tuple,
+        kernels: Callable,
         reaction: np.ndarray,
         gap: np.ndarray,
         slip: np.ndarray,
-        normal: np.ndarray,
-        tangential: np.ndarray,
+        *rho: np.ndarray,
     ) -> tuple:
-        """The compiled map's results, replaced at the ``k`` nodes."""
+        """The compiled map's results, replaced at the ``k`` nodes; ``rho`` is one of all directions, or normal and tangential."""
+        made, status, *derivatives = kernels(reaction, gap, slip - self.known, *rho)
+        normal, tangential = rho[0], rho[-1]
         nodes, f = self.nodes, self.along
         R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
         tau = _dot(reaction[nodes, :-1] - tangential[nodes, None] * slip[nodes], f)
         answer = _Answer(self, tangential[nodes], R, tau)
-        made, status, *derivatives = found
         made, status = made.copy(), status.copy()
         made[nodes] = np.column_stack((answer.friction, R))
         status[nodes] = np.where(R > 0.0, np.where(answer.slips, SLIP, STICK), OPEN)

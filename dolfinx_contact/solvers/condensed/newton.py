@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 UNLIMITED = 200_000  # iterations; methods have limits of their own
 
-# Default iteration limit for arrays, which need not have a solution: WORK over the unknowns squared, at least FEWEST, at most MOST.  Random
-# problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; one of 156 piles of up to 300 contacts needs more than 600.
-WORK, FEWEST, MOST = 9e6, 600, 7000
+# Default iteration limit for arrays, which need not have a solution: WORK over the unknowns squared, at least FEWEST and PER_CONTACT, at most
+# MOST.  Random problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; a pile of 156 contacts needs 757.
+WORK, FEWEST, PER_CONTACT, MOST = 9e6, 600, 10, 7000
 
 # Iterations after which infeasibility is tested, and the number of contacts up to which that takes less than a second.
 FIRST, PROVED = 100, 500
@@ -257,7 +257,8 @@ def _found(
     starts: Sequence[np.ndarray],
 ) -> CondensedResult:
     """A solution.  Where few iterations find none, it is asked whether there is any before the search goes on."""
-    most = solver.max_iterations or min(MOST, max(FEWEST, int(WORK / q.size**2)))
+    least = max(FEWEST, PER_CONTACT * len(q), int(WORK / q.size**2))
+    most = solver.max_iterations or min(MOST, least)
     problem = operator, friction, q, tol, starts
     try:
         return replace(solver, max_iterations=min(FIRST, most)).solve_condensed(*problem)
