@@ -391,17 +391,17 @@ class ContactProblem(Guarded):
         sliding = [c for c in self.contacts if c.surface.deformable and c.changes and c.has_history]
         if not sliding or body.nonlinear or body.loose is not None:
             return last
-        x = last.copy()
+        given = np.zeros_like(last)
+        given[body.fixed] = (b - last)[body.fixed]
+        x = 2 * last - self._states.before  # friction and what deforms go on, too
         x[body.fixed] = b[body.fixed]
-        given = x - last
         forces = b - body.multiply(x)
         for contact in self.contacts:
             contact.assemble_reaction(forces)
         forces[body.fixed] = 0.0
-        x += body.solve(forces)
-        ahead = 2 * last - self._states.before
-        if body.farthest(ahead - x) <= STEADY * body.farthest(given):
-            x = ahead  # friction and what deforms go on, too
+        off = body.solve(forces, rough=True)
+        if body.farthest(off) > STEADY * body.farthest(given):
+            x += off if body.exact else body.solve(forces, start=off)
         slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
         if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
             return last

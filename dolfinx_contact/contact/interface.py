@@ -226,28 +226,15 @@ def block_diagonal(blocks: np.ndarray) -> sparse.csr_matrix:
 
 
 def nodal_blocks(K: PETSc.Mat, dofs: np.ndarray) -> np.ndarray:
-    """Blocks of an assembled PETSc matrix at nodes, ``shape=(n, gdim, gdim)``.  Collective.
+    """Blocks of an assembled PETSc matrix at nodes, ``shape=(n, gdim, gdim)``.
 
     Args:
         K: The matrix.
         dofs: Owned degrees of freedom of each node, ``shape=(n, gdim)``.
     """
-    dim, first = dofs.shape[1], K.getOwnershipRange()[0]
-    order = np.argsort(dofs, axis=None)  # PETSc wants them sorted
-    sorted_dofs = (dofs.ravel()[order] + first).astype(PETSc.IntType)
-    rows = PETSc.IS().createGeneral(sorted_dofs, comm=K.comm)
-    block = K.createSubMatrix(rows, rows)
-    start, columns, values = block.getValuesCSR()
-    row = np.repeat(np.arange(dofs.size), np.diff(start))
-    column = columns - block.getOwnershipRange()[0]
-    mine = (column >= 0) & (column < dofs.size)
-    row, column, values = order[row[mine]], order[column[mine]], values[mine]
-    here = row // dim == column // dim
-    blocks = np.zeros((len(dofs), dim, dim))
-    blocks[row[here] // dim, row[here] % dim, column[here] % dim] = values[here]
-    rows.destroy()
-    block.destroy()
-    return blocks
+    rows = (dofs + K.getOwnershipRange()[0]).astype(PETSc.IntType)
+    blocks = [K.getValues(of, of) for of in rows]
+    return np.reshape(blocks, (*dofs.shape, dofs.shape[1]))
 
 
 def responses(K: PETSc.Mat, points: Sequence[ContactPoints], derivatives: Sequence[tuple]) -> tuple:

@@ -230,10 +230,11 @@ def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
 
 def undivided(missed: float, tol: float, repeated: int) -> str:
     """What to say of a step whose geometry stays different, in words."""
+    other = "; if that does not help, let the other body carry the unknowns" * (repeated == RENEWED)
     return (
         f"distances, normals or arms at the end of the step differ by {missed:.1e} of the reactions from those with which it was "
         f"solved, after {repeated} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "
-        "it, or let dc.advance do so"
+        f"it, or let dc.advance do so{other}"
     )
 
 

@@ -239,6 +239,15 @@ def test_multigrid():
     assert largest(found[0] - found[1]) <= 1e-6 * largest(found[0])
 
 
+def test_geometry_that_does_not_settle_is_refused_with_two_remedies():
+    """No rows agree below rounding: steps are to be divided, and the other side may be the slave."""
+    scene = blocks("quadrilateral", 1, ((2, 1), (3, 1)), sliding="large", mu=0.3)
+    scene.way.value[:] = (0.05, -0.1)
+    scene.problem.geometry_tol = 1e-300
+    with pytest.raises(dc.NotConverged, match="Divide it, .*let the other body carry"):
+        scene.problem.solve()
+
+
 def test_a_body_that_lies_on_the_other():
     """Held by contact alone it carries its load while it may stick; a load that slides it off is refused, and the body named."""
     scene = blocks("quadrilateral", 1, ((4, 2), (9, 2)), size=(1.0, 2.0), sliding="large", mu=0.3, gap=0.01, held=False, tol=1e-8)  # fmt: skip
