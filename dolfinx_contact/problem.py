@@ -54,7 +54,7 @@ from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
 from dolfinx_contact.step.nonlinear import NonlinearStep
-from dolfinx_contact.step.trial import floating, unmoved, without_reactions
+from dolfinx_contact.step.trial import NO_SOLUTION, floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
@@ -316,9 +316,10 @@ class ContactProblem(Guarded):
         done = record(self.body, self.contacts, step.errors, found, perf_counter() - start, missed)
         if said or not converged(step.errors, done, self.tol):
             if not said:
-                said = (
-                    f"not converged: {done}, tol {self.tol:.1e}, by {named(done)}. {step.refusal()}"
-                )
+                tried = f"{done}, tol {self.tol:.1e}, by {named(done)}"
+                if done.reason == NO_SOLUTION:  # nothing was tried: errors are of the last state
+                    tried = NO_SOLUTION
+                said = f"not converged: {tried}. {step.refusal()}"
             raise NotConverged(
                 f"{said}.",
                 done,

@@ -303,10 +303,10 @@ def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
     which = sorted((k, factor) for k, factor in found if k is not None)
     if not which:
         return
-    if not all(contact.weighted for contact in contacts):
+    if not all(contact.weighted and not _turns_alone(contact) for contact in contacts):
         name = ("first", "second", "third")[which[0][0]]
         warnings.warn(
-            f"F is multiplied by the {name} coordinate, as with axial symmetry, and a contact has no weight: its pressures, worn depths "
+            f"F is multiplied by the {name} coordinate, as with axial symmetry, and a contact has no weight, or 2 pi alone: its pressures, worn depths "
             "and friction that follows the pressure are those of a body of unit thickness. Give dc.Contact(..., weight=2 * ufl.pi * r), "
             "or whatever F has; the radius must be the first coordinate.",
             stacklevel=3,
@@ -325,6 +325,12 @@ def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
                 "wrong by this factor. Give dc.Contact(..., weight=...) the factor that F has.",
                 stacklevel=3,
             )
+
+
+def _turns_alone(contact: ContactLike) -> bool:
+    """Whether the weight of a contact is 2 pi, without the radius.  Collective."""
+    alone = not contact.axial and np.allclose(contact.density, 2 * np.pi, rtol=1e-9)
+    return all(contact.comm.allgather(bool(alone)))
 
 
 def _terms(integrand: Any) -> list[Any]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from dolfinx_contact.contact.laws import rows
 from dolfinx_contact.results.record import NotConverged
-from dolfinx_contact.support.checks import positive
+from dolfinx_contact.support.checks import a_problem, positive
 from dolfinx_contact.support.collective import agree, by_first_rank, raised_together
 from dolfinx_contact.support.progress import progress_bar
 
@@ -129,7 +129,7 @@ def cycle_jump(
         >>> dc.cycle_jump(problem, cycle, 4).table[-1]["cycle"]
         4
     """
-    comm = problem.body.comm
+    comm = a_problem(problem).body.comm
     with raised_together(comm):
         cycles, max_cycles = (int(positive(name, of, whole=True)) for name, of in (("cycles", cycles), ("max_cycles", max_cycles)))  # fmt: skip
         accuracy, longest = positive("accuracy", accuracy, finite=True), positive("longest", longest)  # fmt: skip

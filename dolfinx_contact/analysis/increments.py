@@ -12,7 +12,7 @@ import numpy as np
 
 from dolfinx_contact.results.history import History
 from dolfinx_contact.results.record import NotConverged, Step
-from dolfinx_contact.support.checks import finite, number, positive
+from dolfinx_contact.support.checks import a_problem, finite, number, positive
 from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.support.progress import progress_bar
 
@@ -63,7 +63,7 @@ def advance(
         >>> def load_history(t): held.value = (0, 0, -0.01 * t)
         >>> table = dc.advance(problem, load_history, points=[0.5, 1.0])
     """
-    comm = problem.body.comm
+    comm = a_problem(problem).body.comm
     ends, start, smallest = _checked(comm, load_history, points, start, smallest, monitor)
     history = History(problem) if history is None else history
     now = start

@@ -14,7 +14,7 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.support.checks import finite, place
+from dolfinx_contact.support.checks import finite, number, place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def weight_on(V: fem.FunctionSpace, weight: Any):
     if weight is None or isinstance(weight, ufl.core.expr.Expr):
         return weight
     if not callable(weight):
-        return ufl.as_ufl(float(finite("weight", weight)))
+        return ufl.as_ufl(number("weight", weight))
     scalars = V.sub(0).collapse()[0]
     values = fem.Function(scalars)
     x = scalars.tabulate_dof_coordinates()

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact import _kernel
 from dolfinx_contact.support.attributes import Guarded, frozen, whole
-from dolfinx_contact.support.checks import finite, number
+from dolfinx_contact.support.checks import finite, number, valued
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not import
 
@@ -105,8 +105,8 @@ class Friction(Guarded):
     docs/howto/fields.md.
 
     Raises:
-        ValueError: A coefficient is negative, NaN, not real or of the wrong shape; exactly one of a pair ``mu`` is zero or
-            infinite; ``p`` is not positive and finite; ``p`` and ``k`` are both given; ``of`` does not fit ``axes``.
+        ValueError: A coefficient is negative, NaN, not real, an expression of UFL or of the wrong shape; exactly one of a
+            pair ``mu`` is zero or infinite; ``p`` is not positive and finite; ``p`` and ``k`` are both given; ``of`` does not fit ``axes``.
 
     Attributes:
         mu: ``shape=(2,)`` or ``(n, 2)``.
@@ -146,7 +146,8 @@ class Friction(Guarded):
                 f"positions: got of={of!r} with axes={axes!r}"
             )
         self.of = of
-        self._given, self.exponent = {"mu": mu, "p": p, "axes": axes}, k
+        given = {"mu": mu, "p": p, "axes": axes}
+        self._given, self.exponent = {key: valued(key, value) for key, value in given.items()}, k
         self._laws: dict[int, Any] = {}
         self._soft: dict[int, np.ndarray] = {}
         self.field = any(map(is_field, self._given.values()))

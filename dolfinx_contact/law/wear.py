@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Field, is_field
 from dolfinx_contact.support.attributes import Guarded, frozen
-from dolfinx_contact.support.checks import finite, number
+from dolfinx_contact.support.checks import finite, number, valued
 
 
 class Wear(Guarded):
@@ -51,7 +51,7 @@ class Wear(Guarded):
         self.explicit, self.threshold = bool(explicit), number("wear threshold", threshold)
         if self.threshold < 0.0:
             raise ValueError(f"wear threshold must be a number >= 0, got {threshold!r}.")
-        self.field = is_field(coefficient)
+        self.field = is_field(valued("wear coefficient", coefficient))
         self.coefficient = coefficient if self.field else _checked(coefficient)
         self.opposite = _checked(opposite)
         self._made = True

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.results.record import Step
+from dolfinx_contact.support.checks import a_problem
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class History:
         contact: int = 0,
         resume: int = 0,
     ) -> None:
-        self.problem, self.comm = problem, problem.body.comm
+        self.problem, self.comm = problem, a_problem(problem).body.comm
         with raised_together(self.comm):
             self.path = None if path is None else Path(path)
             if contact not in range(len(problem.contacts)):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.results.meshes import BodyMesh, Mesh, SurfaceMesh
-from dolfinx_contact.support.checks import finite
+from dolfinx_contact.support.checks import a_field, a_problem, finite
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -56,12 +56,12 @@ def plot(
     Example:
         >>> dc.plot(problem, "block.png", factor=20)  # doctest: +SKIP
     """
-    comm, contacts, u = problem.body.comm, problem.contacts, problem.u
+    comm, contacts, u = a_problem(problem).body.comm, problem.contacts, problem.u
     with raised_together(comm):
         finite("factor", factor)
         if Path(path).suffix != ".png":
             raise ValueError(f"path must end in .png, got {str(path)!r}.")
-        if getattr(colour, "ufl_shape", ()) != ():
+        if colour is not None and a_field("colour", colour).ufl_shape != ():
             raise ValueError(f"colour must be a scalar, got one of shape {colour.ufl_shape}.")
         if comm.rank == 0 and find_spec("pyvista") is None:
             raise ModuleNotFoundError("dc.plot needs PyVista: pip install pyvista.")

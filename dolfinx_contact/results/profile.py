@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.results.meshes import Mesh, SurfaceMesh
-from dolfinx_contact.support.checks import finite, place
+from dolfinx_contact.support.checks import a_problem, finite, place
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def profile(
         >>> dc.profile(problem, line)["pressure"].shape
         (50,)
     """
-    comm = problem.body.comm
+    comm = a_problem(problem).body.comm
     with raised_together(comm):
         if contact not in range(len(problem.contacts)):
             raise ValueError(f"contact {contact!r}: the problem has {len(problem.contacts)}.")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.results.meshes import BodyMesh, Mesh, SurfaceMesh
+from dolfinx_contact.support.checks import a_field, a_problem
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ class Writer:
         fields: Mapping[str, Any] | None = None,
         resume: int = 0,
     ) -> None:
-        self._problem, self._comm = problem, problem.body.comm
+        self._problem, self._comm = problem, a_problem(problem).body.comm
         self._fields = dict(fields or {})
         with raised_together(self._comm):
             self._path = Path(path)
@@ -138,6 +139,8 @@ class Writer:
                 raise ValueError(f"path must end in .pvd, got {str(path)!r}.")
             if "displacement" in self._fields:
                 raise ValueError("fields: displacement is written anyway, take another name.")
+            for name, field in self._fields.items():
+                a_field(f"fields[{name!r}]", field)
             if not isinstance(resume, (int, np.integer)) or resume < 0:
                 raise ValueError(f"resume must be a number of steps, 0 or more, got {resume!r}.")
         self.times: list[float] = []

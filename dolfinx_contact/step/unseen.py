@@ -105,6 +105,7 @@ class Unseen:
         self._wavy = [c for c in self._between if getattr(c.surface, "height", None) is not None]
         self._leaps = self._apart = True  # to be looked at
         self._approach = True  # whether the log has yet to say that no node touches
+        self._far = contacts if len(contacts) > 1 else []  # not yet touched while others are
         self._near = [contact for contact in contacts if contact.surface.deformable]
         self._sided = self._near  # which side carries the unknowns is to be looked at
         self._held = self._near  # whether supports take friction from nodes
@@ -146,6 +147,8 @@ class Unseen:
             self._approach = (
                 self._apart and self._approach and not _tell_gap(body, contacts, smallest)
             )
+        if not self._apart and not large:
+            self._far = [contact for contact in self._far if not _tell_far(body, contact)]
 
     def _check_facets(self, u: np.ndarray, stiffness: dict[ContactLike, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
@@ -337,8 +340,8 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: floa
     if len(flat) < len(contacts) or max(facing) > STEEP:
         return False
     warnings.warn(
-        f"no node touches, and no facet of the contact faces {flat[0].surface!r}: of all the normals are across the plane's or "
-        "along it. Check the normal, which shows from the plane into the body, and the facets.",
+        f"no node touches, and no facet of the contact faces {flat[0].surface!r}: the normals of all of them are across the "
+        "plane's or along it. Check the normal, which shows from the plane into the body, and the facets.",
         stacklevel=4,
     )
     return True
@@ -346,6 +349,12 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: floa
 
 def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) -> bool:
     """Log by how much the nearest node misses its surface: on the way there no mistake, and no warning; whether it does.  Collective."""
+    if body.total(sum(contact.covered.sum() for contact in contacts)) == 0.0:
+        if contacts[0].comm.rank == 0:
+            LOG.warning(
+                "no node touches yet, and none is opposite the other body: check the facets of both, if it is not on its way"
+            )
+        return True
     if smallest <= CLEAR * body.extent:
         return False
     if contacts[0].comm.rank == 0:
@@ -355,6 +364,20 @@ def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) 
             body.extent,
         )
     return True
+
+
+def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
+    """Log that one surface of several is nowhere near; whether that is said, or it is touched.  Collective."""
+    pushed, gap = body.largest(contact.reaction[:, -1]), -body.highest(-contact.gap)
+    far = pushed == 0.0 and gap > FAR * body.extent
+    if far and contact.comm.rank == 0:
+        LOG.warning(
+            "no node touches %r yet: the smallest gap is %.3g, in a body of size %.3g",
+            contact.surface,
+            gap,
+            body.extent,
+        )
+    return far or pushed > 0.0
 
 
 def _between(

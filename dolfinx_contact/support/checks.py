@@ -26,9 +26,33 @@ class RoundingWarning(UserWarning):
     """
 
 
+def valued(name: str, value: Any) -> Any:
+    """The value itself; a ``ValueError`` of an expression of UFL, which NumPy would read without end."""
+    if hasattr(value, "ufl_shape") and not hasattr(value, "function_space"):
+        raise ValueError(
+            f"{name} is an expression of UFL, {str(value):.60}, and has no values at nodes: interpolate it into a Function before each "
+            "step, give a callable of x, or of a Constant its value."
+        )
+    return value
+
+
+def a_problem(given: Any) -> Any:
+    """What was given as ``problem``, if it has contacts; a ``ValueError`` of what has none, such as a contact."""
+    if not hasattr(given, "contacts"):
+        raise ValueError(f"problem must be a ContactProblem, got {given!r}.")
+    return given
+
+
+def a_field(name: str, given: Any) -> Any:
+    """What was given as a field, if UFL knows it, or a ``ValueError``."""
+    if not hasattr(given, "ufl_shape"):
+        raise ValueError(f"{name} must be a Function or another UFL expression, got {given!r}.")
+    return given
+
+
 def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
     """A float64 array of finite numbers, a new one if ``copy``, or a ``ValueError``."""
-    if np.ma.is_masked(value):
+    if np.ma.is_masked(valued(name, value)):
         raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...).")
     try:
         array = np.asarray(value)

@@ -151,7 +151,7 @@ def test_areas_without_a_weight_are_warned_of():
 
 
 def test_a_weight_without_the_2_pi_of_the_form_is_told():
-    """The weight r beside a form times 2 pi r, in a sum or not, and the other way round; silent with a modulus or a thickness before both."""
+    """The weight r beside a form times 2 pi r, in a sum or not, and the other way round, and 2 pi without r; silent with a modulus or a thickness before both."""
     body = mesh.create_rectangle(COMM, [[1, 0], [2, 1]], [2, 2], mesh.CellType.quadrilateral)
     V = functionspace(body, ("Lagrange", 1, (2,)))
     u, v, r = fem.Function(V), ufl.TestFunction(V), ufl.SpatialCoordinate(body)[0]
@@ -166,12 +166,17 @@ def test_a_weight_without_the_2_pi_of_the_form_is_told():
         (energy * r, turn * r, True),
         (210e3 * energy * r, turn * r, False),
         (energy * turn * r, turn * r, False),
+        (energy * turn * r, turn, "or 2 pi alone"),
+        (energy * turn * r, lambda x: turn + 0 * x[0], "or 2 pi alone"),
+        (energy * r, 3.0, False),  # a thickness beside a modulus
     ):
         contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), 0.3, weight=weight)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             dc.ContactProblem(integrand * ufl.dx, u, [contact], bcs=[bc])
-        assert len([w for w in said if "only one of them by 2 pi" in str(w.message)]) == told
+        message = told if isinstance(told, str) else "only one of them by 2 pi"
+        said = [str(w.message) for w in said if w.category is UserWarning]
+        assert [message in one for one in said] == [True] * bool(told)
 
 
 @pytest.mark.parametrize("wrong", ["turned", "free to turn", "driven along r"])
@@ -232,9 +237,11 @@ def test_the_axis_carries_nothing_in_second_order():
     assert COMM.allreduce(contact.area.sum()) == pytest.approx(np.pi, rel=1e-12)
 
 
-@pytest.mark.parametrize("wrong", [-1.0, lambda x: x[0] - 0.5, lambda x: np.nan * x[0]])
+@pytest.mark.parametrize(
+    "wrong", [-1.0, np.ones(3), "2 pi r", lambda x: x[0] - 0.5, lambda x: np.nan * x[0]]
+)
 def test_weights_that_are_not_positive_are_refused(wrong):
-    """A measure below zero, or none at all."""
+    """A measure below zero, or none at all, or what is no measure."""
     body = mesh.create_unit_square(COMM, 4, 4, mesh.CellType.quadrilateral)
     V = functionspace(body, ("Lagrange", 1, (2,)))
     foot = boundary(body, lambda x: np.isclose(x[1], 0))

@@ -138,7 +138,14 @@ def discontinuous(scene):
     return dc.Friction(mu=fem.Function(functionspace(scene.mesh, ("Discontinuous Lagrange", 0))))
 
 
+def of_ufl(scene):
+    return dc.Friction(0.3 / (1 + fem.Function(scene.V)[0]))
+
+
 MISTAKES = {
+    "an expression of UFL": (of_ufl, "mu is an expression of UFL.*interpolate it"),
+    "a Constant": (lambda scene: dc.Friction(fem.Constant(scene.mesh, 0.3)), "of a Constant its value"),
+    "axes of UFL": (lambda scene: dc.Friction((0.3, 0.1), axes=scene.u / 2), "axes is an expression"),
     "three values": (lambda scene: dc.Friction(mu=lambda x: x + 1.0), "mu must give one value"),
     "words": (lambda scene: dc.Friction(mu=lambda x: "rough"), "real numbers"),
     "negative": (lambda scene: dc.Friction(mu=lambda x: x[0] - 10), "must not be negative"),

@@ -70,16 +70,20 @@ def test_the_surface_is_drawn_where_it_stands(slid):
 
 def test_mistakes_are_refused(slid, folder):
     """Another ending, a vector as colour, a factor that is not finite, points off the surface or of another shape, a contact that
-    is not there: a ValueError on all ranks that says so."""
+    is not there, one in the place of the problem: a ValueError on all ranks that says so."""
     for options, said in (
         ({"path": "a.pdf"}, "must end in .png"),
         ({"colour": slid.u}, "must be a scalar"),
+        ({"colour": "mises"}, "colour must be a Function or another UFL expression, got 'mises'"),
         ({"factor": np.nan}, "factor must be finite"),
     ):
         with pytest.raises(ValueError, match=said):
             dc.plot(slid.problem, **{"path": folder / "a.png"} | options)
     with pytest.raises(ValueError, match=r"\(2, 0, 0\) is 1.5 away .* nearest is \(0.5, 0, 0\)"):
         dc.profile(slid.problem, [[0, 0, 0], [2, 0, 0]])
+    for call in (dc.History, lambda of: dc.plot(of, "a.png"), lambda of: dc.profile(of, [[0, 0, 0]]), lambda of: dc.advance(of, print, [1.0]), lambda of: dc.cycle_jump(of, print, 10)):  # fmt: skip
+        with pytest.raises(ValueError, match="problem must be a ContactProblem, got <Contact of"):
+            call(slid.contact)
     with pytest.raises(ValueError, match=r"shape \(k, 3\)"):
         dc.profile(slid.problem, [0, 0, 0])
     with pytest.raises(ValueError, match="contact 1"):

@@ -169,11 +169,13 @@ def test_mistakes_are_refused(folder):
     for options, said in (
         ({"path": folder / "run.vtk"}, "must end in .pvd"),
         ({"fields": {"displacement": scene.u}}, "displacement is written anyway"),
+        ({"fields": {"mises": 3.0}}, r"fields\['mises'\] must be a Function or .* got 3.0"),
+        ({"problem": scene.contact}, "problem must be a ContactProblem, got <Contact of"),
         ({"resume": -1}, "resume must be"),
         ({"resume": 1}, "no series"),
     ):
         with pytest.raises(ValueError, match=said):
-            dc.Writer(scene.problem, **{"path": path} | options)
+            dc.Writer(**{"problem": scene.problem, "path": path} | options)
     writer = dc.Writer(scene.problem, path)
     with pytest.raises(ValueError, match="time must be finite, got nan"):
         writer.write(np.nan)

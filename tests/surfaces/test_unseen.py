@@ -6,6 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scenes
+import two_bodies
 import ufl
 from dolfinx import fem, mesh
 from ring_scenes import INNER, bend, clamp
@@ -250,6 +252,37 @@ def test_a_surface_that_is_missed_is_a_line_of_the_log_once(d, caplog):
             scene.step(*np.zeros(d - 1), way)
         told = [line for line in caplog.messages if "no node touches" in line]
         assert told == lines * (COMM.rank == 0) * ["no node touches yet: the smallest gap is 0.1, in a body of size 1"]  # fmt: skip
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_second_surface_that_is_nowhere_near_is_a_line_of_the_log_once(d, caplog):
+    """One of two surfaces far beyond the body, while the other is touched: its gap, once; a near one is not spoken of."""
+    across = np.eye(d)[0]
+    for away, lines in ((7.0, 1), (0.2, 0)):
+        scene = scenes.block(cells=[2] * d, mu=0.3, p=None)
+        side = mesh.locate_entities_boundary(scene.mesh, d - 1, lambda x: np.isclose(x[0], 0.5))
+        wall = dc.Contact(scene.V, side, dc.RigidPlane((0.5 + away) * across, -across), 0.3)
+        with pytest.warns(UserWarning, match="are left out"):  # the held edge of the side
+            problem = dc.ContactProblem(scene.F, scene.u, [scene.contact, wall], bcs=scene.bcs)
+        caplog.clear()
+        for way in (-0.01, -0.02):
+            scene.move_top(*np.zeros(d - 1), way)
+            problem.solve()
+        told = [line for line in caplog.messages if "no node touches RigidPlane" in line]
+        assert len(told) == lines * (COMM.rank == 0)
+        assert all("the smallest gap is 7, in a body of size 1" in line for line in told)
+
+
+def test_facets_that_look_away_from_each_other_are_a_line_of_the_log_once(caplog):
+    """The foot of a body and that of the one below: no node is opposite the other side, in whatever place."""
+    scene = two_bodies.blocks("quadrilateral", cells=((2, 2), (3, 2)), gap=0.1)
+    away = dc.DeformableSurface(scene.V, scene.ends[1], sliding="small")
+    contact = dc.Contact(scene.V, scene.contact.facets, away, 0.3)
+    problem = dc.ContactProblem(scene.F, scene.u, [contact], bcs=scene.bcs)
+    for _ in range(2):
+        problem.solve()
+    told = [line for line in caplog.messages if "none is opposite the other body" in line]
+    assert len(told) == (COMM.rank == 0)
 
 
 @pytest.mark.parametrize("d", [2, 3])
