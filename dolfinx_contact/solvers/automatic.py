@@ -131,7 +131,9 @@ class BoundAutomatic:
             errors = step.measure(found.x)
             ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
-            done = errors.within(step.tol if near else 0.0)
+            # An open state that Newton's method has not converged to may be one that it strayed to, away from a pressed one.
+            strayed = brief and not errors.acts and not np.isfinite(found.forward_error)
+            done = errors.within(step.tol if near else 0.0) and not strayed
             # Without acting forces, relative errors cannot be compared.
             size = errors.largest if errors.acts else np.inf
             if best is None or done or size < smallest:

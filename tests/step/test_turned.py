@@ -50,6 +50,19 @@ def test_a_ring_that_goes_along_with_its_shaft_loses_pressure_and_says_so(fit, t
     scene.problem.solve()  # told once
 
 
+@pytest.mark.parametrize("angle", [0.01, 0.011, 0.012])
+def test_a_ring_does_not_stray_from_its_shaft(angle):
+    """Turned farther than the shaft it would be wide enough to lose contact: a state without forces, not the one that the turn leads to."""
+    fit, grown = 3e-4, angle**2 / 2
+    shaft = dc.RigidSphere((0, 0), 0.3 * (1 + fit))
+    scene = ring([0.3, 0.4, 0.5], shaft, 1.0)
+    scene.problem.solve()
+    before, shaft.rotation = mean_pressure(scene.contact), angle
+    with pytest.warns(UserWarning, match="the body has turned by"):
+        scene.problem.solve()
+    assert 1 - mean_pressure(scene.contact) / before == pytest.approx(grown / fit, rel=0.001)
+
+
 def loose(d, planes, mu):
     """A block of edge 1 that contacts alone hold, on planes at its ends; its problem, contacts and force per volume."""
     create, kind = ((mesh.create_rectangle, mesh.CellType.quadrilateral), (mesh.create_box, mesh.CellType.hexahedron))[d - 2]  # fmt: skip

@@ -107,10 +107,9 @@ class Operator {
         return true;
     }
     template <class Derived> static bool equals_transpose(const Eigen::MatrixBase<Derived> &W) {
-        return in_tiles(W.rows(), [&](Index i, Index j, Index rows, Index columns) {
-            return i > j || (W.block(i, j, rows, columns).array() ==
-                             W.block(j, i, columns, rows).transpose().array())
-                                .all();
+        return in_tiles(W.rows(), [&](Index i, Index j, Index m, Index n) {
+            return i > j ||
+                   (W.block(i, j, m, n).array() == W.block(j, i, n, m).transpose().array()).all();
         });
     }
     Square square(const double *values, Part triangle) const {
