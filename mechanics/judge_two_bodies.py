@@ -5,7 +5,8 @@
 Forces on nodes are what the form leaves, ``K u``: equilibrium and supports are judged without any coefficient between the meshes.  They have
 to balance between both faces, also about a point, and on the slave's nodes they obey the law (judge_law.py).  Gaps and slips are differences of the
 moved faces at points of the slave's facets.  Where meshes do not match they are zero in a mean over a node's facets, not at each point: allowed is
-what their range over these facets explains.  Of the package's objects it reads ``nodes``, ``frame`` and ``reaction`` of the contact, and ``u``.
+what their range over these facets explains.  Work of the supports is elastic energy and the dissipation that is reported, up to what the way
+from one state to the next leaves open.  Of the package's objects it reads ``nodes``, ``frame``, ``reaction`` and ``dissipation`` of the contact, and ``u``.
 """
 
 from __future__ import annotations
@@ -77,10 +78,15 @@ class TwoBodiesJudge:
         self.faces = Face(scene, scene.slave), Face(scene, scene.master)
         self.fixed = np.unique(np.concatenate([bc.dof_indices()[0] for bc in scene.bcs]))
         self.before = fem.Function(scene.V)
+        self.left, self.dissipated = (
+            0.0 * self.before.x.array,
+            0.0,
+        )  # forces on nodes, work of friction
         self.pressed = np.zeros(self.faces[0].nodes.size, dtype=bool)
         mu = np.broadcast_to(np.asarray(scene.mu, float), self.d - 1)
         self.mu, self.p = mu, mu if scene.p is None else np.broadcast_to(scene.p, self.d - 1)
         self.stiff = min(scene.moduli) * (scene.length / 4) ** (self.d - 2)
+        self.gaps = self._geometry()[0]
 
     def verdict(self, down: float, tol: float, admitted: float = 0.0) -> Verdict:
         """Of the step that was just solved.
@@ -110,7 +116,7 @@ class TwoBodiesJudge:
         defects = dict(
             equilibrium=norm(left[free]), supports=moved, balance=norm(on_slave.sum(axis=0) + on_master.sum(axis=0)),
             moment=self._moment(on_slave, on_master, gaps, sag + admitted * scene.length), reported=norm(reported - on_slave),
-            **self._law(on_slave, gaps, slips, normals, spread),
+            **self._law(on_slave, gaps, slips, normals, spread), energy=self._energy(left, gaps, slips, sag + admitted * scene.length),
         )  # fmt: skip
         found = Verdict(scale, acting[0], defects, dict.fromkeys(defects, terms))
         defects["reactions"] = found.allowances["reactions"] = 0.0
@@ -218,6 +224,37 @@ class TwoBodiesJudge:
             gap = gap + np.abs(self.x[slave.nodes, -1]) if scene.gap or scene.radius else 0.0 * gap
         allowed = (np.linalg.norm(on_slave, axis=1) * (np.ravel(gap) + off)).sum()
         return max(norm(left) - allowed, 0.0) / scene.length
+
+    def _energy(self, left, gaps, slips, off) -> float:
+        """What reported dissipation misses of the supports' work less elastic energy, over the largest motion of the step.
+
+        Forces go straight from one state to the next.  Friction that changes on another way works by up to half of its change times the
+        slip more or less, forces on the other face, where they move on, by half of theirs times its deformation; pressure works where gaps change.
+        """
+        scene, d = self.scene, self.d
+        u, before, was = scene.u.x.array, self.before.x.array, self.left
+        way, done = u - before, scene.contact.dissipation.sum()
+        work = (was + left)[self.fixed] @ way[self.fixed] / 2 - (u @ left - before @ was) / 2
+        missed = abs(work - (done - self.dissipated))
+        force, old, way = (of.reshape(-1, d) @ scene.turn for of in (left, was, way))
+        slave, master = (face.nodes for face in self.faces)
+        beyond = way[slave].mean(axis=0) - way[master].mean(
+            axis=0
+        )  # of what has left the other face
+
+        opens = self._largest(gaps - self.gaps, beyond[-1]) + off
+        changes = np.linalg.norm(force - old, axis=1) / 2
+        bends = np.linalg.norm(way[master] - way[master].mean(axis=0), axis=1)
+        presses = np.linalg.norm(force[slave], axis=1) + np.linalg.norm(old[slave], axis=1)
+        allowed = changes[slave] @ self._largest(slips, beyond[:-1]) + changes[master] @ bends
+        allowed += presses @ opens / 2
+        self.left, self.dissipated, self.gaps = left, done, gaps
+        return max(missed - allowed, 0.0) / max(np.abs(way).max(), np.finfo(float).tiny)
+
+    def _largest(self, values, beyond):
+        """Largest norm at the points of each slave node's facets; where nothing is opposite that of ``beyond``."""
+        known = np.where(np.isnan(values), beyond, values)
+        return self.faces[0].of_nodes(known, lambda g: np.linalg.norm(g, axis=1).max())
 
     def _bar(self, found, pushed: float, down: float, tol: float) -> None:
         """Two bars in series that do not widen: force by closed form."""

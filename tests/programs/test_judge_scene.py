@@ -98,6 +98,22 @@ def test_friction_of_two_bodies_beyond_the_cone_is_rejected(factor):
     assert found.accepts(TOL) == (factor == 1.0)
 
 
+@pytest.mark.parametrize("off", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("sliding, part", [("small", 1e-3), ("large", 0.1)])
+def test_work_of_friction_that_is_not_done_is_rejected(sliding, part, off):
+    """Of bodies that slide on, work that is told to be so much more or less; where the other body's forces move on, the judge sees less."""
+    built = build_two(sliding=sliding, size=(1.0, 2.0))
+    of, problem = TwoBodiesJudge(built), problem_of(built, tol=TOL, geometry_tol=1e-6)
+    for aside in (0.0, 0.05, 0.06, 0.07):
+        built.move_top((aside, -0.01))
+        problem.solve()
+        if aside == 0.07:
+            of.dissipated += off * part * (built.contact.dissipation.sum() - of.dissipated)
+        found = of.verdict(0.01, TOL, 1e-6)
+    assert found.accepts(TOL) == (off == 0.0)
+    assert off == 0.0 or found.excess("energy") > 1e-5
+
+
 def outcome(excess, step_error):
     """Outcome of a step with this error, judged off by this much."""
     zero = dict.fromkeys(("equilibrium", "supports", "normal", "cone", "slip", "reactions"), 0.0)
