@@ -51,6 +51,14 @@ def test_piles_of_hundreds(kind, n, motion, spread, uneven):
         check(scene.W, scene.q, Friction(mu), mu, max_seconds=100)
 
 
+@pytest.mark.slow
+def test_large_piles_have_more_iterations():
+    """Default iterations grow with the contacts: 156 capsules that take more than 600 are solved."""
+    scene = problem("capsules", 32, 2, motion=1.0, spread=2.0)
+    found = check(scene.W, scene.q, Friction(scene.mu), scene.mu, max_seconds=100)
+    assert 600 < found.iterations <= 10 * len(scene.q)
+
+
 @pytest.mark.parametrize("kind", ["wall", "rocks", "capsules"])
 def test_the_interior_point_method_is_a_start(kind):
     """Moving piles of some fifty contacts and rank-deficient W, none of which one attempt of Newton's
