@@ -52,8 +52,8 @@ class CondensedNewton:
 
     Args:
         slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
-        max_iterations: Iteration limit of all methods together; by default 200,000 for a body, and for ``solve_condensed`` between
-            7,000 (up to 12 contacts) and 600 (41 or more).
+        max_iterations: Iteration limit of all methods together; by default 200,000 for a body, and for ``solve_condensed`` from
+            7,000 (up to 12 contacts) to 600 (41 to 60), and ten a contact beyond, at most 7,000.
         newton_iterations: Iteration limit of one attempt of Newton's method.
         max_seconds: Wall time after which the search ends, seconds; infinite by default.
         fallbacks: Whether to try other methods if Newton's method fails.
