@@ -78,10 +78,8 @@ class TwoBodiesJudge:
         self.faces = Face(scene, scene.slave), Face(scene, scene.master)
         self.fixed = np.unique(np.concatenate([bc.dof_indices()[0] for bc in scene.bcs]))
         self.before = fem.Function(scene.V)
-        self.left, self.dissipated = (
-            0.0 * self.before.x.array,
-            0.0,
-        )  # forces on nodes, work of friction
+        self.left = np.zeros_like(self.before.x.array)  # forces on nodes
+        self.dissipated = 0.0  # work of friction
         self.pressed = np.zeros(self.faces[0].nodes.size, dtype=bool)
         mu = np.broadcast_to(np.asarray(scene.mu, float), self.d - 1)
         self.mu, self.p = mu, mu if scene.p is None else np.broadcast_to(scene.p, self.d - 1)
@@ -238,10 +236,8 @@ class TwoBodiesJudge:
         missed = abs(work - (done - self.dissipated))
         force, old, way = (of.reshape(-1, d) @ scene.turn for of in (left, was, way))
         slave, master = (face.nodes for face in self.faces)
-        beyond = way[slave].mean(axis=0) - way[master].mean(
-            axis=0
-        )  # of what has left the other face
-
+        # of what has left the other face
+        beyond = way[slave].mean(axis=0) - way[master].mean(axis=0)
         opens = self._largest(gaps - self.gaps, beyond[-1]) + off
         changes = np.linalg.norm(force - old, axis=1) / 2
         bends = np.linalg.norm(way[master] - way[master].mean(axis=0), axis=1)

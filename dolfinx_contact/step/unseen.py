@@ -368,8 +368,10 @@ def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) 
 
 def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
     """Log that one surface of several is nowhere near; whether that is said, or it is touched.  Collective."""
-    pushed, gap = body.largest(contact.reaction[:, -1]), -body.highest(-contact.gap)
-    far = pushed == 0.0 and gap > FAR * body.extent
+    if body.largest(contact.reaction[:, -1]) > 0.0:
+        return True
+    gap = -body.highest(-contact.gap)
+    far = gap > FAR * body.extent
     if far and contact.comm.rank == 0:
         LOG.warning(
             "no node touches %r yet: the smallest gap is %.3g, in a body of size %.3g",
@@ -377,7 +379,7 @@ def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
             gap,
             body.extent,
         )
-    return far or pushed > 0.0
+    return far
 
 
 def _between(
