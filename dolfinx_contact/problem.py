@@ -392,17 +392,17 @@ class ContactProblem(Guarded):
         sliding = [c for c in self.contacts if c.surface.deformable and c.changes and c.has_history]
         if not sliding or body.nonlinear or body.loose is not None:
             return last
+        known = self._states.snapshot().known  # without contact, under the last loads
+        if known is None or body.displacements.mixed:  # of which checkpoints do not have it
+            return last
         given = np.zeros_like(last)
         given[body.fixed] = (b - last)[body.fixed]
         x = 2 * last - self._states.before  # friction and what deforms go on, too
         x[body.fixed] = b[body.fixed]
-        forces = b - body.multiply(x)
-        for contact in self.contacts:
-            contact.assemble_reaction(forces)
-        forces[body.fixed] = 0.0
-        off = body.solve(forces, rough=True)
-        if body.farthest(off) > STEADY * body.farthest(given):
-            x += off if body.exact else body.solve(forces, start=off)
+        load, exact = b - known.load, body.exact
+        more = body.free_state(b) - known.displacement if exact else body.solve(load, rough=True)
+        if body.farthest(last + more - x) > STEADY * body.farthest(given):
+            x = last + (more if exact else body.solve(load, start=more))
         slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
         if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
             return last

@@ -90,7 +90,7 @@ class MortarPlacement(Placement):
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
         flat[~rows.covered] = self._apart  # opposite nothing: closed
-        points = MortarPoints(self._dofs, frames, self._owned, rows, self._master.dofs, self._comm)
+        points = MortarPoints(self._dofs, frames, self._owned, rows, self._master, self._comm)
         points.met, points.turns = self._supported, turns
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
@@ -384,12 +384,26 @@ class Skin:
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
         self.mine = np.searchsorted(self.numbers, given[comm.rank])
         self.dofs = self.everywhere(of.owned[1] + self.own)
+        self._compliance: tuple = (None, None, None)  # of which matrix in which state
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
         """Rows of this rank's nodes and of all others'.  Collective."""
         found = np.zeros((self.numbers.size, rows.shape[1]), dtype=rows.dtype)
         found[self._at] = np.concatenate(self._comm.allgather(rows))
         return found
+
+    def compliance(self, K: PETSc.Mat) -> np.ndarray:
+        """Inverse nodal blocks of all nodes, ``shape=(m, gdim, gdim)``; zero along fixed directions.  Collective where ``K`` is new."""
+        matrix, state, C = self._compliance
+        if matrix is not K or state != K.stateGet():
+            blocks = nodal_blocks(K, self.own)
+            alone = np.abs(blocks - blocks * np.eye(self.own.shape[1])).sum(axis=2) == 0.0
+            fixed = alone & (np.einsum("nii->ni", blocks) == 1.0)  # rows of boundary conditions
+            C = np.linalg.inv(blocks)
+            C[fixed] = 0.0
+            C = self.everywhere(C.reshape(len(C), -1)).reshape(-1, *C.shape[1:])
+            self._compliance = K, K.stateGet(), C
+        return C
 
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
         """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
@@ -410,7 +424,7 @@ class MortarPoints(ContactPoints):
     Args:
         dofs, frames, owned: As ``ContactPoints`` has them.
         rows: Coefficients of the opposite nodes.
-        opposite: Degrees of freedom of all opposite nodes in global numbers, ``shape=(m, gdim)``.
+        opposite: The ``Skin`` of the other side.
         comm: MPI communicator.  Everything that asks for motion or forces is collective.
 
     Attributes:
@@ -433,7 +447,7 @@ class MortarPoints(ContactPoints):
         frames: np.ndarray,
         owned: tuple[int, int, int],
         rows: Rows,
-        opposite: np.ndarray,
+        opposite: Skin,
         comm: MPI.Comm,
     ):
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
@@ -452,12 +466,12 @@ class MortarPoints(ContactPoints):
         counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
         ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
         at = np.arange(rows.size) - np.repeat(ends - counts - np.repeat(starts[:-1], self.dim), counts)  # fmt: skip
-        values, columns = values[at], np.concatenate((self.first + dofs, opposite))[nodes[at]]
+        values, columns = values[at], np.concatenate((self.first + dofs, opposite.dofs))[nodes[at]]
         B = values[:, None] * frames.reshape(-1, self.dim)[rows]
         starts = np.append(0, ends)
         self._B = self._petsc(self.dim * starts, columns.ravel(), B)
         own = columns[np.arange(rows.size), rows % self.dim]
-        self._sums = sparse.csr_matrix((values, own, starts), (dofs.size, self._whole))
+        self._sums = values, own, starts
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
         self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
 
@@ -546,19 +560,20 @@ class MortarPoints(ContactPoints):
         # Held: then what opposite nodes do is carried.
         directions[(own < FREE) | self.closed[:, None]] = 0.0
         held = np.concatenate(self._comm.allgather(self.first + np.flatnonzero(~free)))
-        sums = self._sums.copy()
-        sums.data[np.isin(sums.indices, held)] = 0.0
+        values, columns, starts = self._sums
+        values = np.where(np.isin(columns, held), 0.0, values)
+        sums = sparse.csr_matrix((values, columns, starts), (self.dofs.size, self._whole))
         return block_diagonal(directions), sums
 
     @property
     def reach(self) -> np.ndarray:
         """See ``ContactPoints``."""
-        return np.append(super().reach, self._opposite)
+        return np.append(super().reach, self._opposite.dofs)
 
     def stiffness(self, K: PETSc.Mat) -> NodalStiffness:
         """See ``ContactPoints``: of springs in series, ``1/k = 1/k_a + sum_b m_ab^2 / k_b``, as matrices along slip.  Collective."""
         alone = super().stiffness(K)
-        C = self._opposite_compliance(K)
+        C = self._opposite.compliance(K)
         squares = self.m.multiply(self.m).tocsr()
         flat = (squares @ C.reshape(len(C), -1)).reshape(-1, self.dim, self.dim)
         local = self.frames @ flat @ self.frames.transpose(0, 2, 1)
@@ -568,20 +583,6 @@ class MortarPoints(ContactPoints):
         eye = np.eye(self.dim - 1)
         tangential = np.linalg.solve(eye + alone.tangential @ along, alone.tangential)
         return NodalStiffness(normal, tangential)
-
-    def _opposite_compliance(self, K: PETSc.Mat) -> np.ndarray:
-        """Inverse nodal blocks of the opposite nodes, ``shape=(m, gdim, gdim)``; zero along fixed directions."""
-        mine = ((self._opposite >= self.first) & (self._opposite < self.first + self.size)).all(axis=1)  # fmt: skip
-        own = np.flatnonzero(mine)
-        blocks = nodal_blocks(K, self._opposite[own] - self.first)
-        alone = np.abs(blocks - blocks * np.eye(self.dim)).sum(axis=2) == 0.0
-        fixed = alone & (np.einsum("nii->ni", blocks) == 1.0)  # rows of boundary conditions
-        C = np.linalg.inv(blocks)
-        C[fixed] = 0.0
-        found = np.zeros((len(self._opposite), self.dim, self.dim))
-        for rows, part in self._comm.allgather((own, C)):
-            found[rows] = part
-        return found
 
 
 def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
