@@ -60,8 +60,9 @@ def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
             raise ValueError
     except ValueError:
         raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, but contains NaN or infinity: {value!r}.")
+    for at in np.argwhere(~np.isfinite(array)):
+        entry = f"{name}[{', '.join(map(str, at))}]" if array.ndim else "it"
+        raise ValueError(f"{name} must be finite, but {entry} is {array[tuple(at)]}.")
     return array.astype(np.float64, copy=copy)
 
 

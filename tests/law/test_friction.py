@@ -112,7 +112,8 @@ def test_immutable_and_unchanged_by_a_pickle():
     "arguments, named",
     [
         (dict(mu=-0.1), ("mu", "-0.1")),
-        (dict(mu=(0.3, np.nan)), ("mu", "nan")),
+        (dict(mu=(0.3, np.nan)), ("mu", "mu[1] is nan")),
+        (dict(mu=[(0.3, 0.2)] * 99 + [(0.3, np.nan)]), ("mu[99, 1] is nan",)),
         (dict(mu=-np.inf), ("mu", "inf")),
         (dict(mu=0.3 + 0.1j), ("mu", "0.1j")),
         (dict(mu=True), ("mu", "True")),
