@@ -10,7 +10,7 @@ acting forces of the same state,
 
 Euclidean norms over nodes of reactions, external forces and support forces.
 
-- ``error``: the largest of three. Equilibrium, ``|f - F(u) + r| / S`` on free degrees of freedom, F assembled by
+- ``error``: the largest of three. Equilibrium, ``|r - F(u)| / S`` on free degrees of freedom, F assembled by
   DOLFINx, with equations of pressures converted to forces (``bodies/unknowns.py``), equilibrium of planes driven by force along their free
   directions, and the error of boundary values times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
   paper's projection equation [dSFMH07, Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration,
