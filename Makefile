@@ -4,7 +4,7 @@
 # make test     a test of every feature: each Python test that is not marked slow with its first parameters, a few on
 #               2 MPI ranks, too, and the kernel without Python
 # make test-all everything, before a release: hours
-# make stress   every solver on some 840 scenes, each answer judged from the mechanics in NumPy; resumable
+# make stress   every solver on some 1,030 scenes, each answer judged from the mechanics in NumPy; resumable
 # make docs     the site: tutorial, how-to, gallery, theory, reference; results/site/index.html
 # make report   error against run time: every solver, and the peers beside it;
 #               results/report/report.html, resumable; QUICK=1 in minutes, results/report-quick/report.html
