@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 # The shortest jump: the cycles of its fine run are simulated one by one.
 SHORTEST = 2
 
-# Jumps aim at this part of the accuracy and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
-SAFETY, ACCEPTED, GROW, SHRINK = 0.75, 1.5, 6.0, 0.1
+# Jumps aim at a difference of so many accuracies and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
+AIM, ACCEPTED, GROW, SHRINK = 1.5, 1.5, 6.0, 0.1
 
 # Part of the largest mu, or p, by which friction that evolves is to change in a jump.
 CHANGE = 0.25
@@ -37,8 +37,6 @@ CHANGE = 0.25
 SHARE = 0.05
 
 RECORD = "record.json"
-
-ERRORS = ("volume_error", "depth_error", "profile_error")
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class CycleJump:
         profile_error: Integral of the nodes' estimated errors over the surface, relative to the volume.
         reached: Whether all three errors are at most the requested accuracy.
         table: A dictionary for each accepted jump: ``cycle``, the cycle at its end; ``jump``, its length; and ``volume``,
-            ``depth``, the errors and ``simulated`` as above.
+            ``depth`` and ``simulated`` as above.
 
     Example:
         >>> def cycle(done):
@@ -98,10 +96,13 @@ def cycle_jump(
     twice from the same state: a coarse run of one simulated cycle, and a fine run of two, each for half of the jump.  First-order errors of the
     coarse run are twice those of the fine one, and Richardson extrapolation removes them.  The jump ends with a step without motion or wear.
 
-    The estimated error is what extrapolation leaves: the difference between the two runs, compared with that of the last jump scaled by the
-    square of the ratio of their lengths.  The length of a jump is chosen such that its error is ``accuracy`` times its wear, or a twentieth of
-    that times all wear so far, and that evolving friction changes by at most about a quarter.  If the error is larger, or if a step does not
-    converge, the jump is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, have two cycles.
+    The length of a jump follows from the difference of its runs beyond that of the last jump, scaled by the square of the ratio of lengths.  Half
+    of it is to be ``accuracy`` times the wear of the jump, or a twentieth of that times all wear so far, and evolving friction is to change by
+    at most about a quarter.  If it is larger, or if a step does not converge, the jump is repeated with fewer cycles.  The first jumps, until
+    stick and slip zones have settled, have two cycles.
+
+    One of the last jumps is also computed in three parts, which measures its error.  Those of the others follow: relative to its wear, the error
+    of a jump is proportional to the square of its length, and it decreases with the wear rate.
 
     Args:
         problem: The ContactProblem, in the state before the first cycle.
@@ -165,9 +166,7 @@ def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor:
 
 def _check(problem: Any, cycle: object, monitor: object) -> None:
     if not any(contact.wear is not None for contact in problem.contacts):
-        raise ValueError(
-            "no contact of the problem has a law of wear: contact.wear = dc.Wear(...)."
-        )
+        raise ValueError("no contact of the problem has a law of wear: contact.wear = dc.Wear(...).")  # fmt: skip
     if not callable(cycle):
         raise ValueError(f"cycle must be a function of the number of cycles done, got {cycle!r}.")
     if not (monitor is None or callable(monitor)):
@@ -190,7 +189,7 @@ class _Run:
         end: The ``_State`` after the last jump.
         coarse: That of its coarse run, which tells the error of first order.
         record: What a checkpoint has beside them: cycles ``done`` and ``simulated``, jumps ``rejected``, length of the
-            ``next`` one, and the ``table``.
+            ``next`` one, the ``table``, and ``measured``: row of a jump, and errors of volume, depth and profile that it made.
     """
 
     def __init__(self, problem: ContactProblem, cycle: Callable, accuracy: float, longest: float):
@@ -199,7 +198,7 @@ class _Run:
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
         self._area = np.concatenate([area for c in self._worn for area in (c.whole_area, c.opposite_area)])  # fmt: skip
         self.end = self.coarse = self.present()
-        self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST), "table": []}  # fmt: skip
+        self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST), "table": [], "measured": [0] + 3 * [np.inf]}  # fmt: skip
 
     def present(self) -> _State:
         """The present state."""
@@ -214,22 +213,15 @@ class _Run:
         self.problem.restore(self.end.snapshot)
 
     def found(self) -> CycleJump:
-        table, record = self.table, self.record
-        last = table[-1]
-        errors = [last[name] for name in ERRORS]
-        reached = max(errors) <= self._accuracy
-        worn = last["volume"], last["depth"]
-        return CycleJump(record["done"], record["simulated"], len(table), record["rejected"], *worn, *errors, reached, table)  # fmt: skip
+        table, record, errors = self.table, self.record, self._errors()
+        worn = table[-1]["volume"], table[-1]["depth"]
+        return CycleJump(record["done"], record["simulated"], len(table), record["rejected"], *worn, *errors, max(errors) <= self._accuracy, table)  # fmt: skip
 
     def told(self, cycles: int, kept: bool) -> str:
         """Why it ends before so many cycles."""
         done, last = self.record["done"], self.table[-1]
         on = "the same call goes on from there" if kept else f"another call goes on from there, with cycles={cycles - done}; path= keeps the state in a folder"  # fmt: skip
-        return (
-            f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}; estimated errors {last['volume_error']:.1e} of "
-            f"the volume, {last['depth_error']:.1e} of the depth. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer "
-            "mesh often does."
-        )
+        return f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer mesh often does."  # fmt: skip
 
     @property
     def table(self) -> list[dict[str, Any]]:
@@ -239,38 +231,36 @@ class _Run:
         """Make the next jump towards so many cycles; returns its row of the table.  Collective."""
         while True:
             length = int(max(min(self.record["next"], self._longest), SHORTEST))
-            length = min(length, cycles - self.record["done"])
-            row = self._tried(length)
+            left = cycles - self.record["done"]
+            length = -(-left // -(-left // length))  # the last ones have one length
+            row = self._tried(length, 2 * length >= left)
             if row is not None:
-                self.record["done"] += length
-                self.table.append(row)
                 self.show()
                 return row
             self.record["rejected"] += 1
 
-    def _tried(self, length: int) -> dict[str, Any] | None:
-        """The row of a jump of so many cycles, None where it is rejected; says how long the next one may be.  Collective."""
+    def _tried(self, length: int, late: bool) -> dict[str, Any] | None:
+        """The row of a jump of so many cycles, None where it is rejected; says how long the next one may be, and measures a late one.  Collective."""
         plain = length <= SHORTEST  # the fine run simulates all
         coarse = self._through([length])
         fine = end = coarse
         if length > 1 and (plain or coarse):
-            fine = end = self._through([length - length // 2, length // 2], must=plain)
+            fine = end = self._through(_parts(length, 2), must=plain)
         if coarse and fine and not plain:
-            end = self._extrapolated(coarse, fine)
-        worn, errors, local = self._compared(coarse, fine, end, length)
-        over = max(local / (SAFETY * self._accuracy), self._changed(end) ** 2)
+            end = self._extrapolated(coarse, fine, length)
+        volume, depth, local = self._compared(coarse, fine, end, length)
+        over = max(local / (AIM * self._accuracy), self._changed(end) ** 2)
         accepted = end is not None and (plain or over <= ACCEPTED)
         factor = min(max(over**-0.5, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
         self.record["next"] = max(factor * length, float(SHORTEST))
         if not accepted:
             return None
+        if late and not plain and length > self.table[self.record["measured"][0]]["jump"]:
+            self._measure(fine, end, length)
         self.end, self.coarse = end, coarse or end
-        return {
-            "cycle": self.record["done"] + length,
-            "jump": length,
-            **dict(zip(("volume", "depth", *ERRORS), (*worn, *errors))),
-            "simulated": self.record["simulated"],
-        }
+        self.record["done"] += length
+        self.table.append({"cycle": self.record["done"], "jump": length, "volume": volume, "depth": depth, "simulated": self.record["simulated"]})  # fmt: skip
+        return self.table[-1]
 
     def _through(self, parts: list[int], must: bool = False) -> _State | None:
         """The state after a cycle for each of ``parts`` that counts so many times; None where it does not converge, unless it must."""
@@ -283,9 +273,7 @@ class _Run:
                 with raised_together(problem.body.comm):
                     self._cycle(done)
                     if problem.snapshot() is before:
-                        raise ValueError(
-                            "cycle has made no step of this problem: it takes the problem through one cycle by problem.solve()."
-                        )
+                        raise ValueError("cycle has made no step of this problem: it takes the problem through one cycle by problem.solve().")  # fmt: skip
                 self.record["simulated"] += 1
                 done += part
         except NotConverged:
@@ -294,11 +282,12 @@ class _Run:
             return None
         return self.present()
 
-    def _extrapolated(self, coarse: _State, fine: _State) -> _State | None:
+    def _extrapolated(self, coarse: _State, fine: _State, length: int) -> _State | None:
         """The state with the fine run's sums less their error of first order, in equilibrium; None where that does not converge."""
+        more = _extrapolation(length, 1, 2)
         for contact, *sums in zip(self.problem.contacts, self.end.sums, coarse.sums, fine.sums):
             start, one, two = sums
-            contact.take_sums({name: np.maximum(2.0 * two[name] - one[name], start.get(name, 0.0)) for name in two})  # fmt: skip
+            contact.take_sums({name: np.maximum(two[name] + more * (two[name] - one[name]), start.get(name, 0.0)) for name in two})  # fmt: skip
         self._count(0)
         try:
             self.problem.solve()
@@ -310,55 +299,70 @@ class _Run:
         for contact in self.problem.contacts:
             contact.repeats = times
 
-    def _compared(self, coarse: Any, fine: Any, end: Any, length: int) -> tuple[tuple, list[float], float]:  # fmt: skip
-        """Volume and largest depth at the end of a jump, the estimated errors, and that of this jump, over what it wears.
+    def _compared(self, coarse: Any, fine: Any, end: Any, length: int) -> tuple[float, ...]:
+        """Volume and largest depth at the end of a jump, and by how much runs differ in another way than in the last jump, over what it wears.
 
-        All reduced over the ranks.  The last is infinite where a run did not converge.
-
-        Half the difference of coarse and fine run, of a jump of n cycles, is ``n^2 a + n^3 b``; extrapolated is ``a`` alone.  With the
-        ``a`` of the last jump, ``rho`` times shorter, what is left of it is compared with the change of ``a``, too: for depths
-        that approach a limit exponentially it has ``1 / (3 - 1.5 / rho)`` of the difference, in the limit of short jumps.
+        All reduced over the ranks.  Coarse and fine run of n cycles differ by ``n^2 a + n^3 b``, of which the last jump's tells ``a``; what is
+        left is about twice the error of the extrapolated end; infinite where a run did not converge, and for the first jump.
         """
         if end is None:
-            return (), [], np.inf
+            return 0.0, 0.0, np.inf
         body, area, last = self.problem.body, self._area, self.table[-1] if self.table else None
-        made = np.zeros_like(area)
+        worn, off = end.depth - self.end.depth, np.zeros_like(area)
         if last and fine is not coarse and coarse:
-            rho = length / last["jump"]
-            off = fine.depth - coarse.depth - rho**2 * self._off(last["jump"])
-            made = off / (3.0 - 1.5 / max(rho, 1.0))
-        worn = end.depth - self.end.depth
-        integrals = [area @ of for of in (end.depth, worn, made, np.abs(made))]
-        volume, more, *new = map(float, body.total(integrals))
-        depth, deeper, most = (body.largest(np.abs(of)) for of in (end.depth, worn, made))
-        known = bool(last and coarse)  # the first jump has none to compare with
-        local = max(_part(new[1], more + SHARE * volume), _part(most, deeper + SHARE * depth))
-        if length <= SHORTEST:
-            new, most = [0.0, 0.0], 0.0
-        whole = (volume, depth, volume)
-        before = [0.0] * len(ERRORS)
-        if last:  # errors that are there go on as the rate does: both obey the equation linearised
-            earlier = self.table[-2]["volume"] if len(self.table) > 1 else 0.0
-            rate = (last["volume"] - earlier) / last["jump"]
-            fall = min(1.0, _part(more / length, rate))
-            before = [fall * last[name] * of for name, of in zip(ERRORS, (last["volume"], last["depth"], last["volume"]))]  # fmt: skip
-        errors = [_part(a + b, of) for a, b, of in zip(before, (abs(new[0]), most, new[1]), whole)]
-        return (volume, depth), errors, local if known else np.inf
+            before = (self.end.depth - self.coarse.depth) / (1.0 + _extrapolation(last["jump"], 1, 2))  # fmt: skip
+            off = fine.depth - coarse.depth - (length / last["jump"]) ** 2 * before
+        volume, more, new = map(float, body.total([area @ of for of in (end.depth, worn, np.abs(off))]))  # fmt: skip
+        depth, deeper, most = (body.largest(np.abs(of)) for of in (end.depth, worn, off))
+        local = max(_part(new, more + SHARE * volume), _part(most, deeper + SHARE * depth))
+        return volume, depth, local if last and coarse else np.inf
+
+    def _measure(self, fine: _State, end: _State, length: int) -> None:
+        """Errors of a jump by a run in three parts, which, extrapolated, has a third of them.  Collective."""
+        third = self._through(_parts(length, 3))
+        if third is None:
+            return
+        better = third.depth + _extrapolation(length, 2, 3) * (third.depth - fine.depth)
+        off = 1.5 * (end.depth - np.maximum(better, self.end.depth))
+        volume, profile = map(float, self.problem.body.total([self._area @ off, self._area @ np.abs(off)]))  # fmt: skip
+        if profile > 0.0:
+            self.record["measured"] = [len(self.table), abs(volume), self.problem.body.largest(np.abs(off)), profile]  # fmt: skip
+
+    def _errors(self) -> list[float]:
+        """Estimated errors of volume, depth and profile, relative, from those of the measured jump.
+
+        Over what it wears, a jump is off by the square of its length.  Errors of the volume add up, and fall as the rate of wear does, since both
+        obey the equation linearised; what is off in the shape beside that wears off in a jump.
+        """
+        lengths, volumes = (np.array([row[of] for row in self.table], float) for of in ("jump", "volume"))  # fmt: skip
+        rates, cubes = np.diff(volumes, prepend=0.0) / lengths, lengths * (lengths - 1.0) * (lengths - 2.0)  # fmt: skip
+        row, *made = self.record["measured"]
+        volume, depth, profile = (_part(a, self.table[-1][of]) for a, of in zip(made, ("volume", "depth", "volume")))  # fmt: skip
+        fall = min(1.0, _part(float(rates[-1]), float(rates[row])))
+        total = _part(float(np.minimum(rates, rates[-1]) @ cubes), float(rates[row] * cubes[row]))
+        added = (total - fall) * volume
+        return [total * volume, added + fall * depth, added + fall * profile] if total > 0.0 else [0.0] * 3  # fmt: skip
 
     def _changed(self, end: _State | None) -> float:
         """By how much mu or p have changed in a jump, over CHANGE of the largest."""
         if end is None:
             return 0.0
-        sides, largest = (self.end.friction, end.friction), self.problem.body.largest
-        parts = []
+        largest, parts = self.problem.body.largest, []
         for of in (slice(0, 2), slice(2, 4)):
-            before, now = (side[:, of].ravel() for side in sides)
+            before, now = (side.friction[:, of].ravel() for side in (self.end, end))
             parts.append(_part(largest(np.abs(now - before)), largest(np.maximum(before, now))))
         return max(parts) / CHANGE
 
-    def _off(self, length: int) -> np.ndarray:
-        """Fine less coarse depth at the end of the last jump, of so many cycles; half of it went into an extrapolated end."""
-        return (self.end.depth - self.coarse.depth) * (1.0 if length <= SHORTEST else 0.5)
+
+def _parts(length: int, number: int) -> list[int]:
+    """A jump's length in so many parts, as equal as can be."""
+    return np.diff(np.arange(number + 1) * length // number).tolist()
+
+
+def _extrapolation(length: int, fewer: int, more: int) -> float:
+    """Error of first order of a run in more parts, over its difference to one in fewer: it is as ``n (n - 1)``, none of single cycles."""
+    one, two = (sum(n * (n - 1) for n in _parts(length, number)) for number in (fewer, more))
+    return two / (one - two) if one > two else 0.0
 
 
 def _part(of: float, whole: float) -> float:
@@ -399,19 +403,14 @@ class _Folder:
         try:
             record = json.loads(file.read_text())
             done = record["done"]
-            complete = (
-                done == record["table"][-1]["cycle"]
-                and {"simulated", "rejected", "next"} <= record.keys()
-            )
+            complete = done == record["table"][-1]["cycle"] and {"simulated", "rejected", "next", "measured"} <= record.keys()  # fmt: skip
         except FileNotFoundError:
             self._path.mkdir(parents=True, exist_ok=True)
             return None
         except (ValueError, TypeError, KeyError, IndexError):
             complete = False
         if not complete:
-            raise ValueError(
-                f"{file} is no record of cycle_jump: take another folder, or delete this one."
-            )
+            raise ValueError(f"{file} is no record of cycle_jump: take another folder, or delete this one.")  # fmt: skip
         if done > cycles:
             raise ValueError(
                 f"{self._path} has a run that has done {done} cycles, more than cycles = {cycles}."
