@@ -255,7 +255,7 @@ def test_a_killed_programme_goes_on(tmp_path):
         assert resumed == straight
         assert np.array_equal(again.contact.reaction, scene.contact.reaction)
     further = dc.cycle_jump(again.problem, cycle, 102, path=path)  # its error is that before
-    assert further.profile_error == pytest.approx(resumed.profile_error, rel=0.1) > 0.0
+    assert 0.0 < further.profile_error == pytest.approx(resumed.profile_error, rel=0.1)
     with pytest.raises(ValueError, match="has done 102 cycles, more than cycles = 10"):
         dc.cycle_jump(again.problem, cycle, 10, path=path)
     COMM.barrier()
