@@ -96,13 +96,10 @@ def cycle_jump(
     twice from the same state: a coarse run of one simulated cycle, and a fine run of two, each for half of the jump.  First-order errors of the
     coarse run are twice those of the fine one, and Richardson extrapolation removes them.  The jump ends with a step without motion or wear.
 
-    The length of a jump follows from the difference of its runs beyond that of the last jump, scaled by the square of the ratio of lengths.  Half
-    of it is to be ``accuracy`` times the wear of the jump, or a twentieth of that times all wear so far, and evolving friction is to change by
-    at most about a quarter.  If it is larger, or if a step does not converge, the jump is repeated with fewer cycles.  The first jumps, until
-    stick and slip zones have settled, have two cycles.
-
-    One of the last jumps is also computed in three parts, which measures its error.  Those of the others follow: relative to its wear, the error
-    of a jump is proportional to the square of its length, and it decreases with the wear rate.
+    Half the change of the runs' difference since the last jump, beyond the square of lengths, is to be ``accuracy`` times the wear of the jump, or
+    a twentieth of that times all wear so far, and evolving friction is to change by at most about a quarter.  Else, or if a step does not converge,
+    the jump is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, have two.  One of the last jumps is
+    also computed in three parts, which measures its error.  Those of others follow: over the wear it is as the square of the length.
 
     Args:
         problem: The ContactProblem, in the state before the first cycle.
