@@ -363,10 +363,13 @@ class ContactProblem(Guarded):
             here = self._predicted(b)
         turned = follow(self.contacts, body, here, self._states.last, self._points)
         if turned or assembled != self._assembled:
+            again = at is not None and assembled == self._assembled  # rows nearly as before
             self._assembled = assembled
-            if turned or not body.nonlinear:  # else its stiffness is new in every iteration
-                self._unbind()
             self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
+            renew = getattr(self._bound, "renew_rows", None) if again else None
+            # of a nonlinear body the stiffness is new in every iteration
+            if (turned or not body.nonlinear) and not (renew and renew(self._stiffness)):
+                self._unbind()
         self._renew_laws(begin=True)  # in the frames of this step
         last, before = self._states.last, self._states.before
         starts = [body.taken(self.u.x.array), 2 * last - before] if at is None else [at]
@@ -402,7 +405,9 @@ class ContactProblem(Guarded):
         load, exact = b - known.load, body.exact
         more = body.free_state(b) - known.displacement if exact else body.solve(load, rough=True)
         if body.farthest(last + more - x) > STEADY * body.farthest(given):
-            x = last + (more if exact else body.solve(load, start=more))
+            x = last + more
+            if not exact:  # six digits
+                x += body.solve(load - body.multiply(more), rough=True)
         slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
         if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
             return last
@@ -430,7 +435,7 @@ class ContactProblem(Guarded):
 
     def _search(self) -> tuple[LoadStep, SolverResult]:
         """The step that has judged what the solver takes for the solution, and that; once more with planes that held nodes let slide."""
-        step, found = self._worn(self.load_step())
+        step, found = self._worn(self._roughly(self.load_step()))
         if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
             for contact in self.contacts:
                 contact.restore()
@@ -448,23 +453,32 @@ class ContactProblem(Guarded):
         from dolfinx_contact.step.touching import landing
 
         said, missed, known = "", 0.0, self._keep_one_start(None)
-        ends = Ends(self.body, self.contacts)
-        for repeated in range(ends.most + 1):
-            if not step.errors.within(step.tol):
-                break
+        ends, repeated = Ends(self.body, self.contacts), 0
+        while step.errors.within(step.tol):
             missed, said = self._geometry(step, found, repeated)
             if said:
                 break
             late = landing(self.body, self.contacts, step, found.x, self.geometry_tol)
-            if max(missed, late) <= self.geometry_tol:
+            settled = max(missed, late) <= self.geometry_tol
+            if settled and step.tol <= self.tol:
                 break
-            if repeated == ends.most:
+            if settled:  # with all digits
+                step, again = self._worn(step.finer(self.tol, found.x))
+            elif repeated == ends.most:
                 said = undivided(max(missed, late), self.geometry_tol, repeated)
                 break
-            step, again = self._repeated(step, ends, found.x)
+            else:
+                step, again = self._repeated(step, ends, found.x)
+                repeated += 1
             known = self._keep_one_start(known)
             found = again._replace(iterations=found.iterations + again.iterations)
         return step, found, missed, said
+
+    def _roughly(self, step: LoadStep) -> LoadStep:
+        """The step to as many digits as its geometry needs, where all digits would take cycles of multigrid."""
+        renewed = any(c.surface.deformable and c.changes for c in self.contacts)
+        rough = renewed and not (self.body.exact or self.body.nonlinear)
+        return step.within(max(self.tol, PART * self.geometry_tol)) if rough else step
 
     def _geometry(self, step: LoadStep, found: SolverResult, repeated: int) -> tuple[float, str]:
         """The error of the geometry, and whether the way of the step is too long, in words.  Collective."""
@@ -485,7 +499,7 @@ class ContactProblem(Guarded):
         placed = [contact.placement.now for contact in self.contacts]
         for contact in self.contacts:
             contact.restore()
-        step = self.load_step(step.holding, ends.after(x))
+        step = self._roughly(self.load_step(step.holding, ends.after(x)))
         for contact, before in zip(self.contacts, placed):
             contact.placement.count_as(before)
         return self._worn(step)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,11 +107,21 @@ class BoundAutomatic:
         for bound in self._bound.values():
             bound.destroy()
 
+    def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool:
+        """See ``BoundSolver``."""
+        self._arguments = (*self._arguments[:2], stiffness, self._arguments[3])
+        self._keep(lambda bound: hasattr(bound, "renew_rows") and bound.renew_rows(stiffness))
+        return bool(self._bound)
+
+    def _keep(self, valid: Callable) -> None:
+        """Of what is set up that which is still valid.  Collective."""
+        for solver in list(self._bound):
+            if not valid(self._bound[solver]):
+                self._bound.pop(solver).destroy()
+
     def renew_law(self) -> bool:
         """See ``BoundSolver``."""
-        for solver in list(self._bound):
-            if not self._bound[solver].renew_law():
-                self._bound.pop(solver).destroy()
+        self._keep(lambda bound: bound.renew_law())
         if self._components is None:  # nonlinear: the choice does not depend on friction
             return True
         return components(self._arguments[1]) == self._components

@@ -72,6 +72,9 @@ class BoundSolver(Protocol):
     # Optional; without it, the solver is bound again when friction changes:
     # def renew_law(self) -> bool
     #     Take the present friction of the contacts; return whether the set-up is still valid.  Collective.
+    # and when rows are renewed within a step, with the geometry of where it has ended:
+    # def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool
+    #     The same for the present contact points.  Collective.
 
 
 class Solver(Protocol):

@@ -287,6 +287,7 @@ class StepLike(Protocol):
     b: np.ndarray
     external: np.ndarray
     tol: float
+    continues: bool
     unit: float
     surfaces: DrivenSurfaces | None
     holding: HeldSurfaces | None

@@ -88,8 +88,10 @@ class LoadStep:
         holding: ``HeldSurfaces``, None where held nodes hold none of them.
         statics: ``Statics`` of a body that contact alone holds, else None; see ``held_by``.
         errors: Of the state judged last.
+        continues: Whether it starts from what was found for the same step, so that tangents there are still good.
     """
 
+    continues = False
     surfaces: DrivenSurfaces | None
     statics: Statics | None
     errors: Errors
@@ -133,6 +135,10 @@ class LoadStep:
         """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet.  Collective."""
         shared = _shared_nodes(self.contacts, self.stiffness, self.body.fixed)
         return self._but(_starts=[x], _judged=None, _shared=shared)
+
+    def finer(self, tol: float, x: np.ndarray) -> LoadStep:
+        """The step with a smaller tolerance, from what was found with another one."""
+        return self._but(tol=tol, _starts=[x], continues=True)
 
     def _but(self, **parts: Any) -> LoadStep:
         other = copy(self)

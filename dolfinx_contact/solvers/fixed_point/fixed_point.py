@@ -130,6 +130,11 @@ class BoundFixedPoint:
             self.destroy()
         return True
 
+    def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool:
+        """See ``BoundSolver``: springs of nearly the same rows do as well, but not those of motions that follow."""
+        self._stiffness = stiffness
+        return self.preconditioner is not None and not self.preconditioner.followed
+
     def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 
@@ -175,11 +180,14 @@ class BoundFixedPoint:
         search.begin(self._options.max_iterations, patience)
         near = NEAR if self._contacts else 0.0
         while search.goes_on:
-            self._accelerate(search, self._set(factor), search.best, every, near)
+            known = search.step.continues and search.iterations == 0
+            maps = self._set(factor, known)
+            near = 0.0 if known and self.preconditioner.linearised else near
+            self._accelerate(search, maps, search.best, every, near)
             near = 0.0
 
-    def _set(self, factor: float) -> list:
-        """The maps with a rho, and a preconditioner that belongs to them."""
+    def _set(self, factor: float, known: bool) -> list:
+        """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
         bipotential = self._options.map == "bipotential"
         parameters = [factor * of.normal for of in self._stiffness]
         maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]
@@ -187,7 +195,8 @@ class BoundFixedPoint:
             self.destroy()  # one factorisation at a time: memory counts more than time
             self.preconditioner = ContactPreconditioner(self._body, self._contacts, maps)
             self._factor = factor
-        self.preconditioner.forget_tangent()
+        if not known:
+            self.preconditioner.forget_tangent()
         return maps
 
     def _accelerate(

@@ -32,20 +32,24 @@ class ContactPreconditioner:
     Attributes:
         rigid: ``RigidBalance`` of the motions that the springs stiffen too much.
         stiffened: What applies the preconditioner of the stiffness with springs.
+        linearised: Whether corrections know a tangent.
+        followed: Whether motions of surfaces or anchors follow the body.
     """
 
     def __init__(self, body: BodyLike, contacts: Sequence[ContactLike], maps: Sequence[MapLike]):
         self._body, self._contacts, self._maps = body, contacts, maps
         self._spring_rates = self._rates()
-        self._layer, self._linearised = None, False
+        self._layer, self.linearised = None, False
         with stage("contact: set-up of springs"):
             S, how = self._springs(), structure([contact.points for contact in contacts])
             A, self.stiffened = body.stiffened(S, how)
             self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
             self._softened = False
         self._A = A
-        followed = body.loose is not None or any(contact.surface.motions for contact in contacts)
-        self._border = followed and Border(body, contacts, A, self.stiffened, self._spring_rates)
+        self.followed = body.loose is not None or any(c.surface.motions for c in contacts)
+        self._border = self.followed and Border(
+            body, contacts, A, self.stiffened, self._spring_rates
+        )
         S.destroy()
 
     def soften(self) -> bool:
@@ -97,11 +101,11 @@ class ContactPreconditioner:
             self._layer = SurfaceLayer(self._body, self._contacts, prefix)
         with stage("contact: surface layer"):
             self._layer.linearise(derivatives)
-        self._linearised = True
+        self.linearised = True
 
     def forget_tangent(self) -> None:
         """Corrections by springs alone again."""
-        self._linearised = False
+        self.linearised = False
 
     def tangent(self, x: np.ndarray) -> np.ndarray:
         """Minus the derivative of the forces out of balance along ``x``, where they were linearised."""
@@ -114,7 +118,7 @@ class ContactPreconditioner:
         """
         residual, near = residual.copy(), 0.0
         residual[self._body.fixed] = 0.0
-        if self._linearised:
+        if self.linearised:
             near, residual = self._layer.correct(residual)
         correction = near + self.stiffened.apply(residual)
         if self._border:

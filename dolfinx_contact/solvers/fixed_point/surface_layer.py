@@ -50,7 +50,6 @@ class SurfaceLayer:
         self._columns = body.K.createSubMatrix(rows, layer)
         self._near, self._forces = self._columns.createVecs()
         self._layer, self._block = layer, body.K.createSubMatrix(layer, layer)
-        self._points = [contact.points for contact in contacts]
         self._solver = None
         self._surfaces = driven_surfaces(body, contacts)
         self._pushing = None if self._surfaces is None else self._surfaces.columns()
@@ -69,6 +68,7 @@ class SurfaceLayer:
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
         self._derivatives = derivatives
+        self._points = [contact.points for contact in self._contacts]
         if self._surfaces is not None:
             none = np.zeros(self._body.size)
             pushed = [response(self._points, derivatives, none, way) for way in self._pushing.T]
