@@ -27,7 +27,7 @@ stress: .venv/ready
 	.venv/bin/python -m benchmarks.stress --output results/stress $(ARGS)
 
 report: .venv/ready
-	.venv/bin/python -m benchmarks.report --size $(if $(QUICK),quick,full) $(ARGS)
+	PYTHONPATH=demos .venv/bin/python -m benchmarks.report --size $(if $(QUICK),quick,full) $(ARGS)
 
 study: .venv/ready
 	.venv/bin/python -m studies.punch --output results/study $(if $(EXPLORE),--explore) $(ARGS)

@@ -23,11 +23,10 @@ FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (
 STIFF = 50.0  # penalty over Young's modulus, 1/mm: pressure per overclosure and, the same, friction per slip
 
 
-def write(file: Path, given: dict, kind: str) -> None:
+def lines_of(given: dict, kind: str) -> list[str]:
     """An input file with a step of CalculiX for each load step; it divides a step when it does not converge.
 
     Args:
-        file: The input file.
         given: ``x``, ``cells``, ``contact``, ``held``, ``young``, ``poisson``, ``mu``, ``programme``; may have ``stiff``, the penalty
             over Young's modulus, and ``element``, the name of the bricks.
         kind: "node to surface", "surface to surface" or "mortar".
@@ -50,7 +49,7 @@ def write(file: Path, given: dict, kind: str) -> None:
             "*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY", f"NTOP, 3, 3, {-displacement:.12e}",
             "*NODE PRINT, NSET=NBODY, FREQUENCY=1000", "U", "*END STEP",
         ]  # fmt: skip
-    file.write_text("\n".join(lines) + "\n")
+    return lines
 
 
 def _mesh(x, cells, contact, top, element) -> list[str]:
@@ -113,20 +112,31 @@ def own_errors(said: str) -> list[float]:
 
 
 def solve(given: dict, kind: str, cap: int) -> dict:
+    """The punch by CalculiX, see ``run``."""
+    return run(lines_of(given, kind), len(given["x"]), len(given["programme"]), cap)
+
+
+def run(lines: list[str], nodes: int, steps: int, cap: int) -> dict:
     """Run CalculiX for at most ``cap`` processor seconds.
+
+    Args:
+        lines: Of the input file.
+        nodes: How many it prints.
+        steps: How many it is asked for.
+        cap: Processor seconds.
 
     Returns:
         Displacements ``u``, its ``own`` errors, what it ``said`` if it stopped early, and processor ``seconds``.
     """
     with tempfile.TemporaryDirectory() as name:
         directory, before, said = Path(name), ended(), ""
-        write(directory / "punch.inp", given, kind)
-        done = run_alone(["ccx", "punch"], directory,
+        (directory / "given.inp").write_text("\n".join(lines) + "\n")
+        done = run_alone(["ccx", "given"], directory,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cap, cap)))  # fmt: skip
-        seconds, u = ended() - before, read(directory / "punch.dat", len(given["x"]))
+        seconds, u = ended() - before, read(directory / "given.dat", nodes)
     if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):
         said = f"stopped after {cap} s"
-    elif len(u) < len(given["programme"]):
+    elif len(u) < steps:
         errors = [line for line in (done.stdout + done.stderr).splitlines() if "*ERROR" in line]
         said = " ".join(errors[-2:]) or f"ended with {done.returncode}"
     return dict(u=u, own=own_errors(done.stdout), said=said, seconds=seconds)

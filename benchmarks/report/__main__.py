@@ -23,13 +23,14 @@ from tqdm import tqdm
 
 from benchmarks.measurement import ROOT, compute, current, machine, now, stored
 from benchmarks.peers import compare as peers
+from benchmarks.peers import two_cylinders
 from benchmarks.report import algebraic, ladder, stability, total, wear
 from benchmarks.scaling import growth
 from studies import page
 
 # Each has TITLE, plan(size), evaluate(results), figure(data) with its CAPTION, and tables(data).
 SECTIONS = dict(
-    total=total, algebraic=algebraic, peers=peers, growth=growth, ladder=ladder, stability=stability, wear=wear
+    total=total, algebraic=algebraic, peers=peers, cylinders=two_cylinders, growth=growth, ladder=ladder, stability=stability, wear=wear
 )  # fmt: skip
 DRAWING = {"font.size": 12, "svg.hashsalt": "report", "axes.grid": True, "grid.alpha": 0.3}
 INTRODUCTION = (
