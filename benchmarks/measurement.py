@@ -112,6 +112,7 @@ def run_alone(command: list, cwd: Path = ROOT, **options) -> subprocess.Complete
     launchers = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_", "MPICH_")
     env = {k: v for k, v in os.environ.items() if not k.startswith(launchers)}
     env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    env["PYTHONPATH"] = os.pathsep.join([str(ROOT / "demos"), env.get("PYTHONPATH", "")])
     return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, **options)
 
 
