@@ -22,7 +22,7 @@ from studies.punch.limits import LIMITS, build, graded
 from studies.punch.model import programme
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="arrays and whole programs")
-RECORD = Path(__file__).resolve().parents[2] / "notes" / "records" / "report-2026-11-23.json"
+RECORD = Path(__file__).resolve().parents[2] / "notes" / "records" / "report-2026-11-28.json"
 
 
 @pytest.fixture(scope="module")
