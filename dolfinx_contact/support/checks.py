@@ -62,7 +62,9 @@ def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
         raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
     for at in np.argwhere(~np.isfinite(array)):
         entry = f"{name}[{', '.join(map(str, at))}]" if array.ndim else "it"
-        raise ValueError(f"{name} must be finite, but {entry} is {array[tuple(at)]}.")
+        raise ValueError(
+            f"{name} must be finite, but contains NaN or infinity: {entry} is {array[tuple(at)]}."
+        )
     return array.astype(np.float64, copy=copy)
 
 
