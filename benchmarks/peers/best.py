@@ -8,14 +8,12 @@ their own quadrature, along the slip of each step.
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import ufl
 from dolfinx import fem
 
 from benchmarks.peers import by_calculix, by_getfem
-from benchmarks.peers.compare import by_system, missing, told
+from benchmarks.peers.compare import absent, by_system, told
 from dolfinx_contact.compat import assemble_into
 from dolfinx_contact.law.dissipation import work_of_friction
 from mechanics.material import elasticity
@@ -35,8 +33,8 @@ SURFACE = "surface to surface"  # node to surface and mortar do not get through 
 
 def best(peer: str, divisions: int, times: int, cap: int) -> dict:
     """One cycle of case A by a peer, with ``times`` the paper's increments: what its displacements are worth, and its processor seconds, set-up included."""
-    if missing("getfem") if peer.startswith(GETFEM) else shutil.which("ccx") is None:
-        return dict(absent=f"{peer} is not installed (apt install python3-getfem calculix-ccx)")
+    if gone := absent(peer):
+        return gone
     order, element, points = BRICKS[peer]
     punch, _ = build(graded(divisions, order=order))
     start = punch.parameters

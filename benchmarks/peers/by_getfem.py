@@ -77,6 +77,17 @@ def add_contact(getfem, model, first, size, given) -> None:
         "gamma", "before")  # fmt: skip
 
 
+def failed(model) -> str:
+    """Solve a model; why that does not converge, nothing where it does."""
+    try:
+        # Its default line search goes around in circles on graded meshes.
+        options = ["max_res", 1e-9, "max_iter", 100, "lsolver", "mumps", "lsearch", "simplest"]
+        count, ok = model.solve(*options)
+    except RuntimeError as failure:
+        return str(failure)[:200] or "no convergence in 0 iterations"
+    return "" if ok else f"no convergence in {count} iterations"
+
+
 def main(mesh_file, found_file):
     import getfem
 
@@ -88,16 +99,10 @@ def main(mesh_file, found_file):
     for displacement in given["programme"]:
         start = process_time()
         model.set_private_rhs(support, np.where(along == 2, -displacement, 0.0))
-        try:
-            # Its default line search goes around in circles on graded meshes.
-            options = ["max_res", 1e-9, "max_iter", 100, "lsolver", "mumps", "lsearch", "simplest"]
-            count, ok = model.solve(*options)
-        except RuntimeError as failure:
-            count, ok, said = 0, 0, str(failure)[:200]
+        said = failed(model)
         seconds.append(process_time() - start)
         u = np.array(model.variable("u"))
-        if not ok:
-            said = said or f"no convergence in {count} iterations"
+        if said:
             break
         # Its own error: the residual of all its equations over the reactions.
         model.assembly("build_rhs")

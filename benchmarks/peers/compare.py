@@ -62,8 +62,8 @@ def plan(size: str) -> list[Measurement]:
 
 def body(peer: str, refine: int, increments: list, mesh: dict, steps: int) -> dict:
     """The first steps of case A by a peer, judged, and by us."""
-    if missing("getfem") if peer == GETFEM else shutil.which("ccx") is None:
-        return dict(absent=f"{peer} is not installed (apt install python3-getfem calculix-ccx)")
+    if gone := absent(peer):
+        return gone
     punch = case_a(refine, increments, mesh)
     given = told(punch)
     given["programme"] = given["programme"][:steps]
@@ -74,6 +74,12 @@ def body(peer: str, refine: int, increments: list, mesh: dict, steps: int) -> di
     seconds, own = float(np.sum(found["seconds"])), np.array(found["own"]).tolist()
     result = compared(punch, given, found["u"], seconds, refine, increments, mesh)
     return result | dict(peer=peer, setting=SETTINGS[peer], said=str(found["said"]), own=own)
+
+
+def absent(peer: str) -> dict:
+    """The record of GetFEM or CalculiX where that is not installed, else nothing."""
+    gone = missing("getfem") if peer.startswith("GetFEM") else shutil.which("ccx") is None
+    return dict(absent=f"{peer} is not installed (apt install python3-getfem calculix-ccx)") if gone else {}  # fmt: skip
 
 
 def missing(module: str) -> bool:

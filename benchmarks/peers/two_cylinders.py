@@ -8,14 +8,12 @@ by the forces on the nodes of the face that their displacements are worth.
 
 from __future__ import annotations
 
-import shutil
-
 import demo_two_cylinders as demo
 import numpy as np
 
 from benchmarks.measurement import Measurement, timed
 from benchmarks.peers import by_calculix, pair_by_getfem
-from benchmarks.peers.compare import by_system, missing
+from benchmarks.peers.compare import absent, by_system
 from benchmarks.report import drawing
 from benchmarks.tables import chosen
 
@@ -46,13 +44,13 @@ def plan(size: str) -> list[Measurement]:
 
 def measured(peer: str, cells: int) -> dict:
     """Errors of the pressure after the first step, of shear after the last, and the seconds of a peer."""
-    if peer != OURS and (missing("getfem") if peer == GETFEM else shutil.which("ccx") is None):
-        return dict(absent=f"{peer} is not installed (apt install python3-getfem calculix-ccx)")
+    if peer != OURS and (gone := absent(peer)):
+        return gone
     demo.problem_of(4)[0].close()  # its forms are compiled
-    (problem, held), seconds = *(made := timed(demo.problem_of, cells))[1:], made[0]
+    seconds, (problem, held) = timed(demo.problem_of, cells)
     row = dict(peer=peer, cells=cells, unknowns=problem.body.size)
     if peer == OURS:
-        steps = [timed(lambda way=way: pressed(problem, held, way)) for way in PROGRAMME]
+        steps = [timed(pressed, problem, held, way) for way in PROGRAMME]
         found = dict(u=[u for _, u in steps], seconds=[seconds, *(s for s, _ in steps)], said="")
     else:
         given = told(problem)

@@ -163,7 +163,9 @@ def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor:
 
 def _check(problem: Any, cycle: object, monitor: object) -> None:
     if not any(contact.wear is not None for contact in problem.contacts):
-        raise ValueError("no contact of the problem has a law of wear: contact.wear = dc.Wear(...).")  # fmt: skip
+        raise ValueError(
+            "no contact of the problem has a law of wear: contact.wear = dc.Wear(...)."
+        )
     if not callable(cycle):
         raise ValueError(f"cycle must be a function of the number of cycles done, got {cycle!r}.")
     if not (monitor is None or callable(monitor)):
@@ -218,7 +220,7 @@ class _Run:
         """Why it ends before so many cycles."""
         done, last = self.record["done"], self.table[-1]
         on = "the same call goes on from there" if kept else f"another call goes on from there, with cycles={cycles - done}; path= keeps the state in a folder"  # fmt: skip
-        return f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer mesh often does."  # fmt: skip
+        return f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer mesh often does."
 
     @property
     def table(self) -> list[dict[str, Any]]:
@@ -270,7 +272,9 @@ class _Run:
                 with raised_together(problem.body.comm):
                     self._cycle(done)
                     if problem.snapshot() is before:
-                        raise ValueError("cycle has made no step of this problem: it takes the problem through one cycle by problem.solve().")  # fmt: skip
+                        raise ValueError(
+                            "cycle has made no step of this problem: it takes the problem through one cycle by problem.solve()."
+                        )
                 self.record["simulated"] += 1
                 done += part
         except NotConverged:
@@ -400,14 +404,19 @@ class _Folder:
         try:
             record = json.loads(file.read_text())
             done = record["done"]
-            complete = done == record["table"][-1]["cycle"] and {"simulated", "rejected", "next", "measured"} <= record.keys()  # fmt: skip
+            complete = (
+                done == record["table"][-1]["cycle"]
+                and {"simulated", "rejected", "next", "measured"} <= record.keys()
+            )
         except FileNotFoundError:
             self._path.mkdir(parents=True, exist_ok=True)
             return None
         except (ValueError, TypeError, KeyError, IndexError):
             complete = False
         if not complete:
-            raise ValueError(f"{file} is no record of cycle_jump: take another folder, or delete this one.")  # fmt: skip
+            raise ValueError(
+                f"{file} is no record of cycle_jump: take another folder, or delete this one."
+            )
         if done > cycles:
             raise ValueError(
                 f"{self._path} has a run that has done {done} cycles, more than cycles = {cycles}."

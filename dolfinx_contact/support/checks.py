@@ -60,10 +60,11 @@ def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
             raise ValueError
     except ValueError:
         raise ValueError(f"{name} must be an array of real numbers, not {value!r}.") from None
-    for at in np.argwhere(~np.isfinite(array)):
+    if not np.isfinite(array).all():
+        at = tuple(np.argwhere(~np.isfinite(array))[0])
         entry = f"{name}[{', '.join(map(str, at))}]" if array.ndim else "it"
         raise ValueError(
-            f"{name} must be finite, but contains NaN or infinity: {entry} is {array[tuple(at)]}."
+            f"{name} must be finite, but contains NaN or infinity: {entry} is {array[at]}."
         )
     return array.astype(np.float64, copy=copy)
 
