@@ -388,7 +388,7 @@ class Skin:
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
         """Rows of this rank's nodes and of all others'.  Collective."""
-        found = np.zeros((self.numbers.size, rows.shape[1]), dtype=rows.dtype)
+        found = np.zeros((self.numbers.size, *rows.shape[1:]), dtype=rows.dtype)
         found[self._at] = np.concatenate(self._comm.allgather(rows))
         return found
 
@@ -401,7 +401,7 @@ class Skin:
             fixed = alone & (np.einsum("nii->ni", blocks) == 1.0)  # rows of boundary conditions
             C = np.linalg.inv(blocks)
             C[fixed] = 0.0
-            C = self.everywhere(C.reshape(len(C), -1)).reshape(-1, *C.shape[1:])
+            C = self.everywhere(C)
             self._compliance = K, K.stateGet(), C
         return C
 
