@@ -114,8 +114,8 @@ struct LineRule {
     const double *at, *weights;
 };
 
-// Calls `visit(point, weight)` for a rule on the common part of two pieces: of triangles it is the
-// product rule on the unit square, one side of which is shrunk to a point.
+// Calls `visit(point, weight)` for a rule on the common part of two pieces: the product rule on
+// images of the unit square, quadrilaterals and at most one triangle, with a side that is a point.
 template <class Visit>
 void on_common_part(const FacetPiece &one, const FacetPiece &other, const LineRule &rule,
                     Visit visit) {
@@ -128,15 +128,18 @@ void on_common_part(const FacetPiece &one, const FacetPiece &other, const LineRu
         return;
     }
     const auto common = clip(one.projected, other.projected);
-    for (int k = 1; k + 1 < common.count; ++k) {
-        const Point &a = common[0], &b = common[k], &c = common[k + 1];
-        const double area = std::abs(twice_area(a, b, c));
+    for (int k = 1; k + 1 < common.count; k += 2) {
+        const Point &a = common[0], &b = common[k], &c = common[k + 1],
+                    &d = common[std::min(k + 2, common.count - 1)];
         for (int i = 0; i < rule.count; ++i)
             for (int j = 0; j < rule.count; ++j) {
-                const double s = rule.at[i] * (1 - rule.at[j]), t = rule.at[i] * rule.at[j];
-                visit(Point{a.x + s * (b.x - a.x) + t * (c.x - a.x),
-                            a.y + s * (b.y - a.y) + t * (c.y - a.y)},
-                      area * rule.weights[i] * rule.at[i] * rule.weights[j]);
+                const double s = rule.at[i], t = rule.at[j];
+                const Point u{(1 - t) * (b.x - a.x) + t * (c.x - d.x),
+                              (1 - t) * (b.y - a.y) + t * (c.y - d.y)};
+                const Point v{(1 - s) * (d.x - a.x) + s * (c.x - b.x),
+                              (1 - s) * (d.y - a.y) + s * (c.y - b.y)};
+                visit(Point{a.x + s * u.x + t * (d.x - a.x), a.y + s * u.y + t * (d.y - a.y)},
+                      std::abs(u.x * v.y - u.y * v.x) * rule.weights[i] * rule.weights[j]);
             }
     }
 }
