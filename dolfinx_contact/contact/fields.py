@@ -132,7 +132,12 @@ def turn_of_nodes(x: np.ndarray, there: np.ndarray, comm: MPI.Comm) -> np.ndarra
     """
     count = max(comm.allreduce(len(x)), 1)
     means = comm.allreduce(np.stack((x.sum(axis=0), there.sum(axis=0)))) / count
-    left, sizes, right = np.linalg.svd(comm.allreduce((there - means[1]).T @ (x - means[0])))
+    return nearest_rotation(comm.allreduce((there - means[1]).T @ (x - means[0])))
+
+
+def nearest_rotation(products: np.ndarray) -> np.ndarray:
+    """The rotation ``R`` for which ``tr(R^T products)`` is largest, ``shape=(gdim, gdim)``; none where they do not tell."""
+    left, sizes, right = np.linalg.svd(products)
     if not sizes[len(sizes) - 2] > ZERO * sizes[0]:
         return np.eye(len(sizes))
     left[:, -1] *= np.linalg.det(left @ right)

@@ -49,12 +49,13 @@ class Side(NamedTuple):
     """Facets of one shape of one side.
 
     Args:
-        nodes: Numbers, ``shape=(m, k)``.
+        nodes: Numbers, negative is none, ``shape=(m, k)``.
         x: Where they are, ``shape=(m, k, gdim)``.
         outwards: Normals, away from the body, ``shape=(m, gdim)``; of facets that have ``moved`` as long as these are large.
         local: Where the nodes are on the reference facet, ``shape=(k, gdim - 1)``.
         corners: Which of them are corners, in the order of a unit interval, triangle or square, ``shape=(c,)``.
         degree: Of the shape functions.
+        inverse: Their coefficients, a row for each monomial, ``shape=(k, k)``.
         density: Of the surface measure, at the nodes, ``shape=(m, k)``; None is one.
     """
 
@@ -64,6 +65,7 @@ class Side(NamedTuple):
     local: np.ndarray
     corners: np.ndarray
     degree: int
+    inverse: np.ndarray
     density: np.ndarray | None = None
 
     def some(self, which: np.ndarray | slice) -> Side:
@@ -91,11 +93,6 @@ class Side(NamedTuple):
             one, other = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
         return 0.5 * np.cross(one, other)
 
-    @property
-    def inverse(self) -> np.ndarray:
-        """Coefficients of the shape functions, a row for each monomial, ``shape=(k, k)``."""
-        return np.linalg.inv(monomials(self.local, len(self.corners), self.degree))
-
 
 class Rows(NamedTuple):
     """Coefficients of ``n`` slave nodes.
@@ -113,19 +110,17 @@ class Rows(NamedTuple):
     covered: np.ndarray
 
 
-def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: int) -> Rows:
+def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Rows:
     """The coefficients ``D_aa`` and ``m_ab``.
 
     Args:
-        slaves: All facets that have any of the nodes.
+        slaves: All facets that have any of the nodes whose rows are wanted; others have no number.
         masters: Those of the other side.
-        nodes: Numbers of the slave nodes whose rows are wanted, ``shape=(n,)``.
-        count: Numbers of all nodes of the other side are below.
+        own, count: Numbers of all slave nodes, and of all nodes of the other side, are below.
     """
-    own = [_for_kernel(side, _places(side.nodes, nodes)) for side in slaves]
-    other = [_for_kernel(side, side.nodes) for side in masters]
-    area, whole, *csr = _kernel.mortar_rows(own, other, nodes.size, _rules())
-    m = sparse.csr_matrix((nodes.size, count))
+    sides = ([_for_kernel(side) for side in of] for of in (slaves, masters))
+    area, whole, *csr = _kernel.mortar_rows(*sides, own, _rules())
+    m = sparse.csr_matrix((own, count))
     m.data, m.indices, m.indptr = csr  # in order: nothing to check
     least = max((COVERED[side.degree] for side in slaves), default=0.0)
     covered = area > np.maximum(least * whole, NOTHING * whole.max(initial=0.0))
@@ -135,27 +130,16 @@ def rows_of(slaves: list[Side], masters: list[Side], nodes: np.ndarray, count: i
     return Rows(area, whole, m, covered)
 
 
-def at_nodes(side: Side, nodes: np.ndarray) -> sparse.csr_matrix:
-    """Sums at nodes of what the facets that have them carry, ``shape=(n, m)``."""
-    places = _places(side.nodes, nodes)
-    facet = np.broadcast_to(np.arange(len(places))[:, None], places.shape)
-    mine = places >= 0
-    return sparse.csr_matrix((np.ones(mine.sum()), (places[mine], facet[mine])), (nodes.size, len(places)))  # fmt: skip
+def at_nodes(side: Side, count: int) -> sparse.csr_matrix:
+    """Sums at numbered nodes of what the facets that have them carry, ``shape=(count, m)``."""
+    facet, corner = np.nonzero(side.nodes >= 0)
+    return sparse.csr_matrix((np.ones(facet.size), (side.nodes[facet, corner], facet)), (count, len(side.nodes)))  # fmt: skip
 
 
-def _places(numbers: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Where numbers are among nodes, -1 where they are not."""
-    if not nodes.size:
-        return np.full(numbers.shape, -1)
-    order = np.argsort(nodes)
-    at = order[np.searchsorted(nodes, numbers, sorter=order).clip(max=nodes.size - 1)]
-    return np.where(nodes[at] == numbers, at, -1)
-
-
-def _for_kernel(side: Side, numbers: np.ndarray) -> tuple:
-    """Facets as the kernel takes them, with rows or columns of their nodes, ``shape=(m, k)``."""
+def _for_kernel(side: Side) -> tuple:
+    """Facets as the kernel takes them."""
     density = np.zeros(0) if side.density is None else side.density
-    return side.x, side.outwards, side.local, side.inverse, density, numbers, _cuts(side), side.degree  # fmt: skip
+    return side.x, side.outwards, side.local, side.inverse, density, side.nodes, _cuts(side), side.degree  # fmt: skip
 
 
 @lru_cache

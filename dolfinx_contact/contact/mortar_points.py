@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
-from dolfinx_contact.contact.fields import turn_of_nodes
+from dolfinx_contact.contact.fields import nearest_rotation
 from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
 from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
 from dolfinx_contact.contact.placement import CLEAR, Placed, Placement, carried, times, turned_back
@@ -54,7 +54,7 @@ class MortarPlacement(Placement):
         numbers = _numbers(of.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)
         self._slave.keep(self._mine)
-        self._at_nodes = [at_nodes(side, self._mine) for side in self._slave.sides]
+        self._at_nodes = [at_nodes(side, nodes.size) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
         # A displacement with the nodes that have left, and what was placed for it.
         self._projected: tuple = (None, None)
@@ -80,7 +80,7 @@ class MortarPlacement(Placement):
         slaves, moved = self._slave.moved(u)
         masters, there = self._master.moved(u)
         with raised_together(self._comm):
-            rows = rows_of(slaves, masters, self._mine, len(there))
+            rows = rows_of(slaves, masters, len(self.x), len(there))
             rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, self._mean_normals(slaves))
             turns = self._turns(moved, there)
@@ -112,7 +112,7 @@ class MortarPlacement(Placement):
             mirror, foot = np.ones(self.x.shape[1]), np.zeros(self.x.shape[1])
             mirror[k], foot[k] = -1.0, 2.0 * plane
             pairs = [[np.concatenate((x, mirror * x + foot)) for x in pair] for pair in pairs]
-        return [turn_of_nodes(x, there, MPI.COMM_SELF) for x, there in pairs]
+        return [nearest_rotation((y - y.mean(axis=0)).T @ (x - x.mean(axis=0))) for x, y in pairs]
 
     def twist(self, u: np.ndarray) -> float:
         """Radians by which one side has turned against the other since the start of the step.  Collective."""
@@ -348,7 +348,7 @@ class Skin:
         density: Of the surface measure at local nodes, None is one.
 
     Attributes:
-        sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``.
+        sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``, but see ``keep``.
         nodes: Local indices of those that this rank owns.
         mine: Their numbers here.
         own: Their degrees of freedom, ``shape=(k, gdim)``.
@@ -368,6 +368,7 @@ class Skin:
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
+        self._nodes = [side.nodes for side in self.sides]
         self._inside_out = [side.inside_out for side in sides]
         ends = [side.x[:, side.corners] for side in sides]
         edges = [np.linalg.norm(x[:, 1] - x[:, 0], axis=1) for x in ends]
@@ -408,14 +409,18 @@ class Skin:
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
         """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
         there = self.x + self.everywhere(u[self.own])
-        sides = zip(self.sides, self._inside_out)
-        return [side.moved(there[side.nodes], signs) for side, signs in sides], there
+        sides = zip(self.sides, self._nodes, self._inside_out)
+        return [side.moved(there[nodes], signs) for side, nodes, signs in sides], there
 
     def keep(self, nodes: np.ndarray) -> None:
-        """Of the facets keep those that have any of these nodes."""
-        near = [np.isin(side.nodes, nodes).any(axis=1) for side in self.sides]
-        self.sides = [side.some(of) for side, of in zip(self.sides, near)]
-        self._inside_out = [side.inside_out for side in self.sides]
+        """Of the facets keep those that have any of these nodes, which are numbered by their places here, others by -1."""
+        places = np.full(self.numbers.size, -1)
+        places[nodes] = np.arange(nodes.size)
+        near = [(places[at] >= 0).any(axis=1) for at in self._nodes]
+        sides = [side.some(of) for side, of in zip(self.sides, near)]
+        self._nodes = [side.nodes for side in sides]
+        self._inside_out = [side.inside_out for side in sides]
+        self.sides = [side._replace(nodes=places[side.nodes]) for side in sides]
 
 
 class MortarPoints(ContactPoints):
@@ -603,7 +608,7 @@ def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np
     for part in facets_of(of, facets):
         numbers = _numbers(of.V.dofmap.index_map, part.nodes.ravel()).reshape(part.nodes.shape)
         here = None if density is None else density[part.nodes]
-        mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree, here))  # fmt: skip
+        mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree, part.inverse, here))  # fmt: skip
     shapes: dict = {}
     for side in [side for sides in comm.allgather(mine) for side in sides]:
         key = (side.corners.tobytes(), np.round(side.local, 9).tobytes())
