@@ -462,16 +462,16 @@ class MortarPoints(ContactPoints):
         none = np.zeros(self.count)
         part = np.divide(rows.area, rows.whole, out=none, where=rows.whole > 0.0)
         self.share = frozen(np.where(rows.covered, part, 0.0))
-        starts = self.m.indptr + np.arange(self.count + 1)  # of rows with the node itself first
-        values, nodes = np.ones(starts[-1]), np.zeros(starts[-1], dtype=np.int32)
-        away = np.ones(starts[-1], dtype=bool)
-        away[starts[:-1]] = False
-        values[away], nodes[away] = -self.m.data, self.count + self.m.indices
-        nodes[starts[:-1]] = np.arange(self.count)
+        own, starts = np.arange(self.count), self.m.indptr + np.arange(self.count + 1)
+        nodes = np.concatenate((own, self.count + self.m.indices))
+        of = np.concatenate((own, np.repeat(own, np.diff(self.m.indptr))))
+        known = np.concatenate((self.first + dofs, opposite.dofs))[nodes]
+        order = np.argsort(of * self._whole + known[:, 0], kind="stable")  # as PETSc wants columns
+        values = np.concatenate((np.ones(self.count), -self.m.data))[order]
         counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
         ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
         at = np.arange(rows.size) - np.repeat(ends - counts - np.repeat(starts[:-1], self.dim), counts)  # fmt: skip
-        values, columns = values[at], np.concatenate((self.first + dofs, opposite.dofs))[nodes[at]]
+        values, columns = values[at], known[order[at]]
         B = values[:, None] * frames.reshape(-1, self.dim)[rows]
         starts = np.append(0, ends)
         self._B = self._petsc(self.dim * starts, columns.ravel(), B)
@@ -483,7 +483,7 @@ class MortarPoints(ContactPoints):
     def _petsc(self, starts: np.ndarray, columns: np.ndarray, values: np.ndarray) -> PETSc.Mat:
         csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ravel(values))
         size = ((self.dofs.size, None), (self.size, self._whole))
-        return PETSc.Mat().createAIJ(size, csr=csr, comm=self._comm)
+        return PETSc.Mat().createAIJWithArrays(size, csr, comm=self._comm)
 
     @cached_property
     def _S(self) -> PETSc.Mat:
