@@ -175,10 +175,11 @@ def million(*names: str) -> None:
 
 def truth(cycles: str, *names: str) -> None:
     """Simulate so many cycles one by one; the record has cycles, volume and largest depth of each programme."""
-    record = json.loads(TRUTH.read_text()) if TRUTH.exists() else {}
     for name in names or PROGRAMMES:
-        record[name] = one_by_one(name, int(cycles))["rows"]
-        TRUTH.write_text(json.dumps(record) + "\n")
+        rows = one_by_one(name, int(cycles))["rows"]
+        # as it is now: another process may have written
+        record = json.loads(TRUTH.read_text()) if TRUTH.exists() else {}
+        TRUTH.write_text(json.dumps(record | {name: rows}) + "\n")
 
 
 if __name__ == "__main__":
