@@ -141,8 +141,8 @@ class BoundAutomatic:
             errors = step.measure(found.x)
             ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
-            # An open state that Newton's method has not converged to may be one that it strayed to, away from a pressed one.
-            strayed = brief and not errors.acts and not near
+            # An open state may be one that Newton's method strayed to, away from a pressed one: the fixed point decides.
+            strayed = brief and not errors.acts and (len(ended) == 1 or not near)
             done = errors.within(step.tol if near else 0.0) and not strayed
             # Without acting forces, relative errors cannot be compared.
             size = errors.largest if errors.acts else np.inf

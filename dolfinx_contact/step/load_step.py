@@ -188,7 +188,9 @@ class LoadStep:
         """The start with the smallest error, by the return map: the paper's takes extrapolations for worse than they are."""
         guesses = [start.copy() for start in self._starts]
         if self.statics is not None:
-            guesses = [*guesses[: 0 if self.statics.placed else None], self.statics.start.copy()]
+            # a body that was placed begins there, or where this step has ended before
+            away = self.statics.placed and len(guesses) > 1
+            guesses = [*([] if away else guesses), self.statics.start.copy()]
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
