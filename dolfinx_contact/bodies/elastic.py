@@ -18,7 +18,7 @@ from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
-from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid, may_be_blocked
+from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid, in_blocks, may_be_blocked
 from dolfinx_contact.support.collective import OverRanks, raised_together
 
 if TYPE_CHECKING:
@@ -352,8 +352,8 @@ class ElasticBody(OverRanks):
         """
         K = self.anchors.A if self.loose else self.K
         multigrid = preconditioner(K, self.options, self.prefix) == "gamg"
-        in_blocks = multigrid and may_be_blocked(K, how, self.ksp.getPC())
-        A = K.convert("baij", PETSc.Mat()) if in_blocks else K.copy()
+        blocked = multigrid and may_be_blocked(K, how, self.ksp.getPC())
+        A = in_blocks(K) if blocked else K.copy()
         A.axpy(1.0, S, how)
         if not multigrid:
             return A, self.solver(A)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
+from scipy import sparse
 
 # Smoothers that take a matrix in blocks.
 BLOCKED = "sor", "jacobi", "pbjacobi"
@@ -21,6 +22,18 @@ def may_be_blocked(K: PETSc.Mat, how: PETSc.Mat.Structure, levels: PETSc.PC) -> 
     """
     known = levels.getMGSmoother(levels.getMGLevels() - 1).getPC().getType() in BLOCKED
     return K.getBlockSize() > 1 and how == PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN and known
+
+
+def in_blocks(K: PETSc.Mat) -> PETSc.Mat:
+    """The matrix in blocks of a node's unknowns.  Collective.
+
+    PETSc's own conversion takes time as the square of the rows: 28 s for 264,435 of them, where this takes 1.4 (PETSc 3.18).
+    """
+    size = K.getBlockSize()
+    rows, columns, values = K.getValuesCSR()
+    blocks = sparse.csr_matrix((values, columns, rows), (rows.size - 1, K.getSize()[1])).tobsr((size, size))  # fmt: skip
+    csr = blocks.indptr.astype(PETSc.IntType), blocks.indices.astype(PETSc.IntType), blocks.data
+    return PETSc.Mat().createBAIJ(K.getSizes(), size, csr=csr, comm=K.comm)
 
 
 class StiffenedMultigrid:
