@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -112,8 +111,10 @@ def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -
 
 
 def free_memory() -> float:
-    """Bytes of memory that this machine has free; infinite where it does not say."""
+    """Bytes of memory that this machine can give, what its cache of files holds among them; infinite where it does not say."""
     try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
+        with open("/proc/meminfo") as file:
+            said = dict(line.split(":") for line in file)
+        return 1024.0 * int(said["MemAvailable"].split()[0])  # in kB [proc(5)]
+    except (OSError, KeyError, ValueError):
         return np.inf

@@ -3,6 +3,7 @@
 """The condensed operator of a body, and CondensedNewton as solver of a ContactProblem."""
 
 import contextlib
+import io
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -85,6 +86,15 @@ def test_memory_is_estimated_before_it_is_taken(monkeypatch):
         run(solver=dc.CondensedNewton())
     _, steps = run()
     assert steps[0].solver == dc.SolverName.FIXED_POINT and "memory" in steps[0].reason
+
+
+def test_memory_that_the_cache_of_files_holds_is_free(monkeypatch):
+    """A machine whose cache is full, as after long runs, has next to no unused memory and can give nearly all."""
+    said = "MemFree:  100 kB\nMemAvailable: 9000 kB\nCached:  8900 kB\n"
+    monkeypatch.setattr("builtins.open", lambda name: io.StringIO(said))
+    free = compliance.free_memory()
+    monkeypatch.undo()
+    assert free == 9000 * 1024
 
 
 def test_operator_is_the_compliance_of_the_contact_nodes():
