@@ -87,10 +87,11 @@ def told(problem) -> dict:
     cells = np.array([V.dofmap.cell_dofs(k) for k in range(count)])
     above = x[cells, 1].mean(axis=1) > 0
     far = np.flatnonzero(np.isclose(np.abs(x).max(axis=1), demo.L))
+    young = [2 * G * (1 + nu) for G, nu in zip(demo.SHEAR, demo.NU)]
     return dict(
         x=x, cells=cells, above=above, near=np.union1d(contact.nodes, contact.placement.opposite),
         far=far, mu=demo.MU, programme=np.array(PROGRAMME),
-        young=(young := [2 * G * (1 + nu) for G, nu in zip(demo.SHEAR, demo.NU)]), poisson=demo.NU, r=np.mean(young) / demo.A,
+        young=young, poisson=demo.NU, r=np.mean(young) / demo.A,
     )  # fmt: skip
 
 
