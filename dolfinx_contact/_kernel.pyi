@@ -19,6 +19,7 @@ __all__: list[str] = [
     "CondensedSolution",
     "Law2D",
     "Law3D",
+    "SymmetricBlocks",
     "clip",
     "instruction_sets",
     "make_law",
@@ -344,6 +345,42 @@ class CondensedOperator:
     def nodes(self) -> int: ...
     @property
     def tied(self) -> int: ...
+
+class SymmetricBlocks:
+    """
+    A symmetric matrix by its lower half, in blocks of up to 3 rows; those above the diagonal are not used.
+    """
+    def __init__(
+        self,
+        starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        columns: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        blocks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> None:
+        """
+        Rows of blocks: starts of shape (rows + 1,), columns (m,), blocks (m, size, size).
+        """
+    def diagonal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The diagonal, shape (rows * size,).
+        """
+    def multiply(
+        self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A x, shape (rows * size,).
+        """
+    def plus(
+        self, blocks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> SymmetricBlocks:
+        """
+        The matrix with blocks of shape (rows, size, size) added to those of its diagonal; what is below takes no memory twice.
+        """
+    def sweep(
+        self, b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        x of a symmetric Gauss-Seidel sweep for A x = b from zero, shape (rows * size,).
+        """
 
 def clip(
     polygons: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],

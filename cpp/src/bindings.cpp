@@ -8,6 +8,7 @@
 void bind_law(pybind11::module_ &m);       // law/bindings.cpp
 void bind_condensed(pybind11::module_ &m); // condensed/bindings.cpp
 void bind_mortar(pybind11::module_ &m);    // mortar/bindings.cpp
+void bind_sparse(pybind11::module_ &m);    // sparse/bindings.cpp
 
 PYBIND11_MODULE(_kernel, m) {
     m.doc() =
@@ -18,6 +19,7 @@ PYBIND11_MODULE(_kernel, m) {
     bind_law(m);
     bind_condensed(m);
     bind_mortar(m);
+    bind_sparse(m);
     m.def(
         "stubs", [] { return STUBS; }, "SHA-256 of the type stubs that it was compiled with.");
     m.def(

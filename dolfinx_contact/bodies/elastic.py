@@ -17,8 +17,7 @@ from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, options_given, preconditioner
-from dolfinx_contact.petsc.stiffened_multigrid import StiffenedMultigrid, in_blocks, may_be_blocked
+from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, preconditioner
 from dolfinx_contact.support.collective import OverRanks, raised_together
 
 if TYPE_CHECKING:
@@ -273,7 +272,9 @@ class ElasticBody(OverRanks):
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """K x; rows and columns of fixed degrees of freedom are those of the identity."""
         self._right.array_w[:] = x
-        self.K.mult(self._right, self._left)
+        known = None if self.loose is not None else self._elastic
+        half = None if known is None else known.halved
+        (self.K if half is None else half).mult(self._right, self._left)
         return self._left.array_r.copy()
 
     # -- solves --------------------------------------------------------------------------------
@@ -351,16 +352,11 @@ class ElasticBody(OverRanks):
         Collective.
         """
         K = self.anchors.A if self.loose else self.K
-        multigrid = preconditioner(K, self.options, self.prefix) == "gamg"
-        blocked = multigrid and may_be_blocked(K, how, self.ksp.getPC())
-        A = in_blocks(K) if blocked else K.copy()
+        if preconditioner(K, self.options, self.prefix) == "gamg":
+            return self._own_solver().stiffened(S, how)
+        A = K.copy()
         A.axpy(1.0, S, how)
-        if not multigrid:
-            return A, self.solver(A)
-        with options_given(
-            self.prefix, self._own_solver().of_levels()
-        ):  # smoothers read them once more
-            return A, StiffenedMultigrid(self.ksp.getPC(), A, S, how)
+        return A, self.solver(A)
 
     def rigid_modes(self) -> np.ndarray:
         """Orthonormal rigid motions that vanish at fixed degrees of freedom."""

@@ -10,6 +10,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
+from dolfinx_contact.petsc.multigrid import Multigrid
+from dolfinx_contact.petsc.symmetric_matrix import halved, plus
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
@@ -22,12 +24,12 @@ SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 FULL = SYMMETRIC | {"mat_mumps_icntl_7": 0}
 SMALL, DENSE = 100, 0.5
 
-# Of the finest level's smoother among options: PETSc names levels by number, which nobody knows before they are made.
-FINEST = "mg_finest_"
+# Not PETSc's, of a matrix that is symmetric: sweeps over its lower half smooth the finest level, see ``Multigrid``.
+GAUSS_SEIDEL = "mg_finest_gauss_seidel"
 
-# Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest level: a quarter less time
-# than Chebyshev's polynomial with Jacobi, which smooths the others, whose matrices may have rows of zeros
-# (notes/2026-11-27-multigrid.md). Every solve starts from zero, so that a run continued from a checkpoint has the same bits.
+# Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest level, Chebyshev's polynomial
+# with Jacobi the others, whose matrices may have rows of zeros (notes/2026-11-27-multigrid.md). Every solve starts from zero, so
+# that a run continued from a checkpoint has the same bits.
 MULTIGRID = {
     "ksp_type": "cg",
     "ksp_rtol": 1e-12,
@@ -38,10 +40,7 @@ MULTIGRID = {
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 2,
     "mg_levels_pc_type": "jacobi",
-    FINEST + "ksp_type": "richardson",
-    FINEST + "ksp_max_it": 1,
-    FINEST + "pc_type": "sor",
-    FINEST + "pc_sor_local_symmetric": "",
+    GAUSS_SEIDEL: True,
 }
 
 # Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), by itself 20), once that was too little, and what it answers
@@ -123,20 +122,17 @@ def options_given(prefix: str, options: dict):
             del database[key]
 
 
-def without_finest(options: dict) -> dict:
-    """Options for all but the finest level."""
-    return {key: value for key, value in options.items() if not key.startswith(FINEST)}
+def _petscs(options: dict) -> dict:
+    """Those that are PETSc's."""
+    return {key: value for key, value in options.items() if key != GAUSS_SEIDEL}
 
 
-def of_finest(options: dict, prefix: str, levels: int) -> dict:
-    """Options of the finest of so many levels, by the number that PETSc gives it; none where the user says how all levels smooth."""
+def _sweeps(options: dict, prefix: str) -> bool:
+    """Whether Gauss-Seidel smooths the finest level: the options say so, and the user says nothing of smoothers."""
     database = PETSc.Options(prefix)
-    own = {key[len(FINEST) :]: value for key, value in options.items() if key.startswith(FINEST)}
-    of_all = {key: value for key, value in options.items() if key.startswith("mg_levels_")}
-    said = any(MULTIGRID.get(key) != value for key, value in of_all.items())
-    if levels == 1 or said or any(database.hasName(f"mg_levels_{key}") for key in own):
-        return {}
-    return {f"mg_levels_{levels - 1}_{key}": value for key, value in own.items()}
+    of_levels = {key for key in options if key.startswith("mg_levels_")}
+    said = any(MULTIGRID.get(key) != options[key] or database.hasName(key) for key in of_levels)
+    return bool(options.get(GAUSS_SEIDEL)) and not said
 
 
 def _heed_signals(*_: object) -> None:
@@ -202,6 +198,8 @@ class LinearSolver:
 
     Attributes:
         unread: Names of options that PETSc did not ask for.
+        levels: PETSc's preconditioner; ``ksp`` has a ``Multigrid`` on its levels instead where Gauss-Seidel smooths the finest.
+        halved: The matrix there, by its lower half; else None.
     """
 
     def __init__(
@@ -229,6 +227,13 @@ class LinearSolver:
                 break
             self.ksp.reset()  # what MUMPS has analysed cannot be factorised after a failure
             self._set_up(A, prefix, options | {"mat_mumps_icntl_14": workspace})
+        self.levels, self.halved, self._multigrid = self.ksp.getPC(), None, None
+        gamg = self.levels.getType() == "gamg" and self.levels.getMGLevels() > 1
+        if gamg and _sweeps(options, prefix):
+            self.halved = halved(A)
+        if self.halved is not None:
+            self._multigrid = Multigrid(self.levels, self.halved)
+            self.ksp.setPC(self._multigrid.pc)
         if not self.exact:
             self.ksp.setMonitor(_heed_signals)
         self._right, self._left = A.createVecs()
@@ -236,27 +241,37 @@ class LinearSolver:
     def _set_up(self, A: PETSc.Mat, prefix: str, options: dict) -> list[str]:
         """Factorise, or set up the levels; the options that PETSc did not ask for."""
         self.ksp.setOperators(A)
-        with options_given(prefix, without_finest(options)) as unread:
+        with options_given(prefix, _petscs(options)) as unread:
             self.ksp.setFromOptions()
             self.ksp.setUp()  # reads the options of the levels, which must still be there
-        pc = self.ksp.getPC()
-        finest = of_finest(options, prefix, pc.getMGLevels()) if pc.getType() == "gamg" else {}
-        if not finest:
-            return unread
-        with options_given(prefix, finest) as of_smoother:
-            smoother = pc.getMGSmoother(pc.getMGLevels() - 1)
-            smoother.setFromOptions()
-            smoother.setUp()
-        return unread + of_smoother
+        return unread
 
-    def of_levels(self) -> dict:
-        """Options by which smoothers like these are made, the finest level's by its number."""
-        prefix, levels = self.ksp.getOptionsPrefix(), self.ksp.getPC().getMGLevels()
-        return without_finest(self._options) | of_finest(self._options, prefix, levels)
+    def stiffened(self, S: PETSc.Mat, how: PETSc.Mat.Structure) -> tuple[PETSc.Mat, Multigrid]:
+        """The matrix plus springs, and multigrid for it on the levels of this solver, whose preconditioner is GAMG.
+
+        Args:
+            S: The springs alone.
+            how: How their entries lie to those of the matrix.  Collective.
+        """
+        A = None if self.halved is None else plus(self.halved, S)
+        if A is None:
+            A = self.levels.getOperators()[1].copy()
+            A.axpy(1.0, S, how)
+            half = None if self.halved is None else halved(A)
+            if half is not None:
+                A.destroy()
+                A = half
+        prefix = self.ksp.getOptionsPrefix()
+        with options_given(prefix, _petscs(self._options)):  # smoothers read them once more
+            return A, Multigrid(self.levels, A, S, how)
 
     def destroy(self) -> None:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
         self.ksp.destroy()
+        if self._multigrid is not None:
+            self._multigrid.destroy()
+            self.halved.destroy()
+            self.levels.destroy()
 
     @property
     def exact(self) -> bool:

@@ -10,7 +10,6 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import partitioner
 from dolfinx_contact.petsc import linear_solver
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
-from dolfinx_contact.petsc.stiffened_multigrid import in_blocks
 
 pytestmark = pytest.mark.ranks
 PRESS = [(0, 0, -0.005), (0.001, 0.0005, -0.01), (0.002, -0.001, -0.006)]
@@ -63,18 +62,6 @@ def pressed(*displacement, **options):
     scene.move_top(*displacement)
     scene.problem.solve()
     return scene
-
-
-@pytest.mark.parametrize("share", SHARES)
-def test_a_matrix_in_blocks_is_the_same(share):
-    """Entry for entry, whoever owns what."""
-    cells, owners = SHARES[share]
-    body = scenes.block(MPI.COMM_WORLD, cells, partitioner=owners).problem.body
-    body.refresh()
-    blocks = in_blocks(body.K)
-    assert blocks.getType().endswith("baij") and blocks.getSizes() == body.K.getSizes()
-    blocks.axpy(-1.0, body.K.convert("baij", PETSc.Mat()))
-    assert blocks.norm() == 0.0 < body.K.norm()
 
 
 def test_three_digits_of_the_free_state_are_enough_where_it_presses(monkeypatch):

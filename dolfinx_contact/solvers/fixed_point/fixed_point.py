@@ -29,7 +29,7 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH, it was too early; if a
 # tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
 # If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
-EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, 100.0, 0.9, 0.1
+EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, 10.0, 0.9, 0.1
 
 # A body held by contact alone may slide away; its error must halve within this many iterations.
 PATIENCE = 60
@@ -76,7 +76,7 @@ class FixedPoint:
 
     map: str = "return"
     rho: float | None = None
-    depth: int = 12
+    depth: int = 20
     newton: bool = True
     max_iterations: int = 400
     max_seconds: float = math.inf

@@ -1,42 +1,16 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Multigrid for a matrix plus springs at a few nodes, on the levels of the matrix alone."""
+"""Multigrid on the levels of a matrix, for that matrix or for it plus springs at a few nodes."""
 
 from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
-from scipy import sparse
 
-# Smoothers that take a matrix in blocks.
-BLOCKED = "sor", "jacobi", "pbjacobi"
+from dolfinx_contact.petsc.symmetric_matrix import GaussSeidel
 
 
-def may_be_blocked(K: PETSc.Mat, how: PETSc.Mat.Structure, levels: PETSc.PC) -> bool:
-    """Whether a matrix plus springs may be kept in blocks of a node's unknowns: a quarter less memory, and a faster cycle.
-
-    Args:
-        K: The matrix.
-        how: How the entries of the springs lie to its own.
-        levels: The preconditioner of K, of type GAMG.
-    """
-    known = levels.getMGSmoother(levels.getMGLevels() - 1).getPC().getType() in BLOCKED
-    return K.getBlockSize() > 1 and how == PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN and known
-
-
-def in_blocks(K: PETSc.Mat) -> PETSc.Mat:
-    """The matrix in blocks of a node's unknowns.  Collective.
-
-    PETSc's own conversion takes time as the square of the rows: 28 s for 264,435 of them, where this takes 1.4 (PETSc 3.18).
-    """
-    size = K.getBlockSize()
-    rows, columns, values = K.getValuesCSR()
-    blocks = sparse.csr_matrix((values, columns, rows), (rows.size - 1, K.getSize()[1])).tobsr((size, size))  # fmt: skip
-    csr = blocks.indptr.astype(PETSc.IntType), blocks.indices.astype(PETSc.IntType), blocks.data
-    return PETSc.Mat().createBAIJ(K.getSizes(), size, csr=csr, comm=K.comm)
-
-
-class StiffenedMultigrid:
+class Multigrid:
     """PETSc's multigrid for ``A = K + S``, with the interpolations and smoothers of GAMG for ``K``.
 
     On every level the matrix is that of ``K`` plus ``P^T S P``, whose cost is that of the few nodes with springs:
@@ -44,15 +18,21 @@ class StiffenedMultigrid:
 
     Args:
         levels: The set-up preconditioner of ``K``, a PETSc PC of type GAMG.
-        A: The matrix plus springs.
-        S: The springs alone.
+        A: The matrix plus springs.  If it is a ``halved`` one, Gauss-Seidel sweeps smooth the finest level.
+        S: The springs alone; None without springs.
         how: How their entries lie to those of ``K``, a PETSc ``Mat.Structure``.  Collective.
 
     Attributes:
         pc: The PETSc PC.
     """
 
-    def __init__(self, levels: PETSc.PC, A: PETSc.Mat, S: PETSc.Mat, how: PETSc.Mat.Structure):
+    def __init__(
+        self,
+        levels: PETSc.PC,
+        A: PETSc.Mat,
+        S: PETSc.Mat | None = None,
+        how: PETSc.Mat.Structure | None = None,
+    ):
         finest, own = levels.getMGLevels() - 1, []
         self.pc = pc = PETSc.PC().create(A.comm)
         pc.setOptionsPrefix(levels.getOptionsPrefix())
@@ -61,14 +41,18 @@ class StiffenedMultigrid:
         pc.setMGLevels(finest + 1)
         pc.getMGSmoother(finest).setOperators(A, A)
         for level in range(finest, 0, -1):
-            _as(levels.getMGSmoother(level), pc.getMGSmoother(level))
+            if A.getType() == "python":
+                _sweeps(pc.getMGSmoother(level))
+            else:
+                _as(levels.getMGSmoother(level), pc.getMGSmoother(level))
             P = levels.getMGInterpolation(level)
             pc.setMGInterpolation(level, P)
-            S = S.PtAP(P)
-            A = levels.getMGSmoother(level - 1).getOperators()[1].copy()
-            A.axpy(1.0, S, how)
+            A = levels.getMGSmoother(level - 1).getOperators()[1]
+            if S is not None:
+                S, A = S.PtAP(P), A.copy()
+                A.axpy(1.0, S, how)
+                own += [S, A]
             pc.getMGSmoother(level - 1).setOperators(A, A)
-            own += [S, A]
         pc.setUp()
         for matrix in own:  # PETSc has its own references
             matrix.destroy()
@@ -91,3 +75,13 @@ def _as(known: PETSc.KSP, smoother: PETSc.KSP) -> None:
     smoother.setTolerances(max_it=known.getTolerances()[3])
     smoother.getPC().setType(known.getPC().getType())
     smoother.setFromOptions()
+
+
+def _sweeps(smoother: PETSc.KSP) -> None:
+    """Let a smoother be one symmetric Gauss-Seidel sweep, whatever options say of all levels."""
+    smoother.setOptionsPrefix(f"{smoother.getOptionsPrefix()}sweep_")
+    smoother.setType("richardson")
+    smoother.setTolerances(max_it=1)
+    smoother.setNormType(PETSc.KSP.NormType.NONE)
+    smoother.getPC().setType("python")
+    smoother.getPC().setPythonContext(GaussSeidel())

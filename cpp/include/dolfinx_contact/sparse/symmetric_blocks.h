@@ -1,0 +1,123 @@
+// Copyright (c) 2025 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace dolfinx_contact {
+
+// A sparse symmetric matrix A = L + D + L^T in blocks of Size x Size: L below the diagonal blocks
+// D. Products and sweeps of large matrices take the time in which these come from memory: half of
+// the blocks, half of the time.
+template <int Size> class SymmetricBlocks {
+  public:
+    static constexpr int Width = Size;
+    using Block = Eigen::Matrix<double, Size, Size>;
+    using Vector = Eigen::Matrix<double, Size, 1>;
+
+    // Block k of row i, row by row in `blocks`, stands in column `columns[k]`, starts[i] <= k <
+    // starts[i + 1]. Blocks above the diagonal are not used.
+    SymmetricBlocks(std::size_t rows, const std::int32_t *starts, const std::int32_t *columns,
+                    const double *blocks)
+        : diagonal_(rows, Block::Zero()), inverse_(rows), left_(rows) {
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < rows; ++i)
+            for (std::int32_t k = starts[i]; k < starts[i + 1]; ++k)
+                if (std::size_t(columns[k]) < i)
+                    ++count;
+        auto lower = std::make_shared<Lower>();
+        lower->columns.reserve(count), lower->blocks.reserve(count);
+        lower->starts.reserve(rows + 1);
+        for (std::size_t i = 0; i < rows; ++i) {
+            for (std::int32_t k = starts[i]; k < starts[i + 1]; ++k) {
+                const Given block(blocks + std::ptrdiff_t(k) * Size * Size);
+                const auto column = std::uint32_t(columns[k]);
+                if (column == i)
+                    diagonal_[i] = block;
+                if (column < i)
+                    lower->columns.push_back(column), lower->blocks.push_back(block);
+            }
+            lower->starts.push_back(lower->columns.size());
+        }
+        lower_ = lower;
+        invert();
+    }
+
+    // This matrix with `blocks` added to those of its diagonal; what is below is shared.
+    SymmetricBlocks plus(const double *blocks) const {
+        SymmetricBlocks sum(*this);
+        for (std::size_t i = 0; i < rows(); ++i)
+            sum.diagonal_[i] += Given(blocks + i * Size * Size);
+        sum.invert();
+        return sum;
+    }
+
+    std::size_t rows() const { return diagonal_.size(); }
+
+    // y = A x.
+    void multiply(const double *x, double *y) const {
+        const auto &[starts, columns, blocks] = *lower_;
+        for (std::size_t i = 0; i < rows(); ++i) {
+            const Vector own = at(x, i);
+            Vector sum = diagonal_[i] * own;
+            for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) {
+                sum += blocks[k] * at(x, columns[k]);
+                at(y, columns[k]) += blocks[k].transpose() * own;
+            }
+            at(y, i) = sum;
+        }
+    }
+
+    // The symmetric Gauss-Seidel sweep from zero: (D + L) D^-1 (D + L^T) x = b.
+    void sweep(const double *b, double *x) {
+        const auto &[starts, columns, blocks] = *lower_;
+        for (std::size_t i = 0; i < rows(); ++i) {
+            Vector left = at(b, i);
+            for (std::size_t k = starts[i]; k < starts[i + 1]; ++k)
+                left -= blocks[k] * at(x, columns[k]);
+            left_[i] = left;
+            at(x, i) = inverse_[i] * left;
+        }
+        for (std::size_t i = rows(); i-- > 0;) {
+            const Vector found = inverse_[i] * left_[i];
+            for (std::size_t k = starts[i]; k < starts[i + 1]; ++k)
+                left_[columns[k]] -= blocks[k].transpose() * found;
+            at(x, i) = found;
+        }
+    }
+
+    // The diagonal blocks.
+    const std::vector<Block> &diagonal() const { return diagonal_; }
+
+  private:
+    using Given = Eigen::Map<
+        const Eigen::Matrix<double, Size, Size, Size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+    static auto at(const double *x, std::size_t i) {
+        return Eigen::Map<const Vector>(x + i * Size);
+    }
+    static auto at(double *x, std::size_t i) { return Eigen::Map<Vector>(x + i * Size); }
+
+    void invert() {
+        for (std::size_t i = 0; i < rows(); ++i) {
+            const double size = diagonal_[i].cwiseAbs().maxCoeff(); // determinants would overflow
+            inverse_[i] = (diagonal_[i] / size).inverse() / size;
+            if (!inverse_[i].allFinite()) // sweeps leave such unknowns as they are
+                inverse_[i].setZero();
+        }
+    }
+
+    struct Lower {
+        std::vector<std::size_t> starts{0};
+        std::vector<std::uint32_t> columns;
+        std::vector<Block> blocks;
+    };
+    std::shared_ptr<const Lower> lower_;
+    std::vector<Block> diagonal_, inverse_;
+    std::vector<Vector> left_;
+};
+} // namespace dolfinx_contact
