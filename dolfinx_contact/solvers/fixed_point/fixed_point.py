@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: after so many, most nodes have found their status, and easy steps are nearly
-# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH, it was too early; if a
+# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH[0], it was too early, the
+# next times by more than GROWTH[1], which strongly crossed rules need; if a
 # tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
 # If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
-EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, 10.0, 0.9, 0.1
+EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, (10.0, 100.0), 0.9, 0.1
 
 # A body held by contact alone may slide away; its error must halve within this many iterations.
 PATIENCE = 60
@@ -178,13 +179,13 @@ class BoundFixedPoint:
         """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
         patience = math.inf if search.step.statics is None else PATIENCE
         search.begin(self._options.max_iterations, patience)
-        near = NEAR if self._contacts else 0.0
+        near, growth = NEAR if self._contacts else 0.0, GROWTH[0]
         while search.goes_on:
             known = search.step.continues and search.iterations == 0
             maps = self._set(factor, known)
             near = 0.0 if known and self.preconditioner.linearised else near
-            self._accelerate(search, maps, search.best, every, near)
-            near = 0.0
+            self._accelerate(search, maps, search.best, every, near, growth)
+            near, growth = 0.0, GROWTH[1]
 
     def _set(self, factor: float, known: bool) -> list:
         """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
@@ -200,16 +201,22 @@ class BoundFixedPoint:
         return maps
 
     def _accelerate(
-        self, search: Search, maps: Sequence[MapLike], x: np.ndarray, every: int, near: float
+        self,
+        search: Search,
+        maps: Sequence[MapLike],
+        x: np.ndarray,
+        every: int,
+        near: float,
+        growth: float,
     ) -> None:
-        """Anderson's method from ``x``, until the search ends or a tangent misleads; with one at once if the error is below ``near``."""
+        """Anderson's method from ``x``, until the search ends or the error is ``growth`` times that at the last tangent; with one at once if it is below ``near``."""
         step, tangent = search.step, np.inf  # error at the last tangent
         anderson = Anderson(x.size, self._options.depth, step.total)
         smallest, due = np.inf, search.left - every
         while True:
             x, forces = self.preconditioner.rigid.balanced(x, step, maps)
             residual = search.residual(x, maps, forces)
-            if not search.goes_on or search.error > GROWTH * tangent:
+            if not search.goes_on or search.error > growth * tangent:
                 return
             if search.left <= due or search.error < near:
                 due, near = search.left - every, 0.0
