@@ -267,11 +267,8 @@ class LinearSolver:
 
     def destroy(self) -> None:
         """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
-        self.ksp.destroy()
-        if self._multigrid is not None:
-            self._multigrid.destroy()
-            self.halved.destroy()
-            self.levels.destroy()
+        for part in filter(None, (self.ksp, self.levels, self._multigrid, self.halved)):
+            part.destroy()
 
     @property
     def exact(self) -> bool:
