@@ -30,7 +30,7 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # next times by more than GROWTH[1], which strongly crossed rules need; if a
 # tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
 # If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
-EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, (10.0, 100.0), 0.9, 0.1
+EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, (30.0, 100.0), 0.9, 0.1
 
 # A body held by contact alone may slide away; its error must halve within this many iterations.
 PATIENCE = 60
