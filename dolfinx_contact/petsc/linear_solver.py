@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.petsc.multigrid import Multigrid
-from dolfinx_contact.petsc.symmetric_matrix import halved, plus
+from dolfinx_contact.petsc.symmetric_matrix import halved, plus, with_entries
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
@@ -91,12 +91,8 @@ def _to_factorise(A: PETSc.Mat):
     Zeros are, among others, all couplings of fixed degrees of freedom.
     """
     symmetric = A.isSymmetric(_ROUNDING * A.norm(PETSc.NormType.INFINITY))
-    rows, columns, values = A.getValuesCSR()
-    stored = values != 0.0
-    rows = np.append(0, np.cumsum(stored))[rows].astype(PETSc.IntType)
-    A = PETSc.Mat().createAIJ(
-        A.getSizes(), csr=(rows, columns[stored], values[stored]), comm=A.comm
-    )
+    starts, columns, values = A.getValuesCSR()
+    A = with_entries(A, starts, columns, values, values != 0.0)
     if not symmetric:
         return A, DIRECT
     n, entries = A.getSize()[0], A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]

@@ -12,7 +12,6 @@ from dolfinx_contact._kernel import SymmetricBlocks
 # Sizes of blocks that the kernel knows.
 SIZES = 1, 2, 3
 
-
 # Part of the sum of a row's magnitudes by which the row across the diagonal may differ: rounding, also where elements are flat.
 ROUNDING = 1e-10
 
@@ -58,7 +57,9 @@ def halved(A: PETSc.Mat) -> PETSc.Mat | None:
     rows, own = _rows(A, size)
     sizes = abs(rows).sum(axis=1).A1
     blocks = SymmetricBlocks(own.indptr, own.indices, own.data)
-    others = None if A.comm.size == 1 else _without(A, rows)
+    others = None
+    if A.comm.size > 1:
+        others = with_entries(A, rows.indptr, rows.indices, rows.data, ~_are_own(A, rows))
     found = _with(A, SymmetricMatrix(blocks, others, size))
     x, y = A.createVecs()
     x.array_w[:] = np.random.default_rng(A.comm.rank).uniform(-1.0, 1.0, sizes.size)
@@ -66,9 +67,11 @@ def halved(A: PETSc.Mat) -> PETSc.Mat | None:
     product = y.array_r.copy()
     found.mult(x, y)
     differs = (np.abs(y.array_r - product) > ROUNDING * sizes).any()
-    for vector in (x, y):
-        vector.destroy()
-    return None if A.comm.tompi4py().allreduce(differs, op=MPI.LOR) else found
+    refused = A.comm.tompi4py().allreduce(differs, op=MPI.LOR)
+    for part in (x, y, *((found, others) if refused else ())):
+        if part is not None:
+            part.destroy()
+    return None if refused else found
 
 
 def plus(A: PETSc.Mat, S: PETSc.Mat) -> PETSc.Mat | None:
@@ -105,9 +108,10 @@ def _are_own(A: PETSc.Mat, rows: sparse.csr_matrix) -> np.ndarray:
     return (rows.indices >= first) & (rows.indices < last)
 
 
-def _without(A: PETSc.Mat, rows: sparse.csr_matrix) -> PETSc.Mat:
-    """Rows of this rank without columns of its own.  Collective."""
-    kept = ~_are_own(A, rows)
-    starts = np.append(0, np.cumsum(kept))[rows.indptr].astype(PETSc.IntType)
-    csr = starts, rows.indices[kept].astype(PETSc.IntType), rows.data[kept]
+def with_entries(
+    A: PETSc.Mat, starts: np.ndarray, columns: np.ndarray, values: np.ndarray, kept: np.ndarray
+) -> PETSc.Mat:
+    """A matrix of the layout of A with some of the entries in rows of this rank, ``kept`` true.  Collective."""
+    starts = np.append(0, np.cumsum(kept))[starts].astype(PETSc.IntType)
+    csr = starts, columns[kept].astype(PETSc.IntType), values[kept]
     return PETSc.Mat().createAIJ(A.getSizes(), csr=csr, comm=A.comm)
