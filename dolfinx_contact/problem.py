@@ -50,6 +50,7 @@ from dolfinx_contact.results.record import (
     warn_of_corners,
     warn_of_rounding,
 )
+from dolfinx_contact.solvers.automatic import crowded
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
@@ -176,6 +177,7 @@ class ContactProblem(Guarded):
         before = None if internal is None else internal.before_residual
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, of, form_options)  # fmt: skip
         hold(self.contacts, self.body)
+        self.body.crowded = crowded(self.solver, self.body, self.contacts)
         check_surfaces(self.contacts, self.body)
         check_weights(F, self.contacts)
         self._points = [contact.points for contact in self.contacts]

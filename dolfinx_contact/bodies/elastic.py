@@ -17,7 +17,7 @@ from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, preconditioner
+from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver, preconditioner
 from dolfinx_contact.support.collective import OverRanks, raised_together
 
 if TYPE_CHECKING:
@@ -49,6 +49,9 @@ class ElasticBody(OverRanks):
     soft: np.ndarray
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose: LooseMotions | None = None  # where rigid motions cost nothing
+    crowded = (
+        False  # whether multigrid is the default though factors would do, for many contact nodes
+    )
     scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
     def __init__(
@@ -340,9 +343,14 @@ class ElasticBody(OverRanks):
         """Whether solves are exact and cheap, as with a factorisation.  Collective at first."""
         return self.ksp.getType() == "preonly"
 
+    @property
+    def _usual(self) -> dict[str, Any] | None:
+        """PETSc options of the solvers of this body, None for those that a matrix of that size has by default."""
+        return MULTIGRID if self.options is None and self.crowded else self.options
+
     def solver(self, A: PETSc.Mat) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""
-        return LinearSolver(A, self.options, self.prefix, self.rigid_modes)
+        return LinearSolver(A, self._usual, self.prefix, self.rigid_modes)
 
     def stiffened(self, S: PETSc.Mat, how: PETSc.Mat.Structure):
         """The stiffness, anchors included, plus springs ``S``, and what applies its preconditioner; GAMG's levels are those of K.
@@ -352,7 +360,7 @@ class ElasticBody(OverRanks):
         Collective.
         """
         K = self.anchors.A if self.loose else self.K
-        if preconditioner(K, self.options, self.prefix) == "gamg":
+        if preconditioner(K, self._usual, self.prefix) == "gamg":
             return self._own_solver().stiffened(S, how)
         A = K.copy()
         A.axpy(1.0, S, how)

@@ -60,6 +60,9 @@ _ROUNDING = 1e-14
 # (notes/2026-11-27-multigrid.md).
 LARGE = {2: 500_000, 3: 50_000}
 
+# The same of solid bodies with so many contact nodes that the fixed point is tried first, see docs/howto/large_meshes.md.
+CROWDED = 20_000
+
 
 @contextmanager
 def stage(name: str):

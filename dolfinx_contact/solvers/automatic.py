@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dolfinx_contact.petsc.linear_solver import CROWDED, LARGE
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.condensed.body import ASTRAY, components
 from dolfinx_contact.solvers.condensed.compliance import fits
@@ -18,6 +19,7 @@ from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton
 
 if TYPE_CHECKING:
+    from dolfinx_contact.solvers.base import Solver
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
     from dolfinx_contact.step.errors import NodalStiffness
 
@@ -37,6 +39,17 @@ def most_nodes(unknowns: int, friction: bool) -> int:
     """
     equal, measured = 4e4, 1010
     return min(measured, round((equal * unknowns) ** (1 / 3))) if friction else measured
+
+
+def crowded(solver: Solver, body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+    """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
+    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
+    unknowns = body.comm.allreduce(body.size)
+    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= LARGE[3]
+    by_cycles = solid and not body.nonlinear and isinstance(solver, (Automatic, FixedPoint))
+    if body.options is not None or not by_cycles:
+        return False
+    return nodes > most_nodes(unknowns, friction=components(contacts) > 1)
 
 
 class Automatic:
@@ -99,7 +112,8 @@ class BoundAutomatic:
         elif not enough:
             self._why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
             self._solvers.reverse()
-        if not enough or not (body.exact or self._components * nodes <= MOST_SOLVES):
+        cheap = body.exact or body.crowded or self._components * nodes <= MOST_SOLVES
+        if not (enough and cheap):
             self._solvers = self._solvers[:1]
 
     def destroy(self) -> None:

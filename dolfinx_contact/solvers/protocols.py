@@ -74,6 +74,7 @@ class BodyLike(Protocol):
     size: int
     displacements: Displacements
     nonlinear: bool
+    crowded: bool
     closed: bool
     known: FreeState | None
     loose: LooseMotions | None

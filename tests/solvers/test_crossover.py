@@ -5,11 +5,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import scenes
 from petsc4py import PETSc
 
-from dolfinx_contact.petsc.linear_solver import preconditioner
+import dolfinx_contact as dc
+from dolfinx_contact.petsc.linear_solver import DIRECT, preconditioner
+from dolfinx_contact.solvers import automatic
 from dolfinx_contact.solvers.automatic import most_nodes
 
 ROWS = json.loads(
@@ -35,3 +38,43 @@ def test_a_plane_body_is_factorised_where_a_solid_one_has_multigrid(cells, kind)
     A.setSizes((60_000, 60_000))
     A.setBlockSize(problem.body.K.getBlockSize())
     assert preconditioner(A, None, "of_dimension_") == kind
+
+
+@pytest.mark.parametrize("most", [2, 400])
+def test_many_contact_nodes_have_multigrid_and_factors_for_the_fallback(most, monkeypatch):
+    """A solid body with many contact nodes has multigrid by default; if the fixed point fails, factors of its own are
+    there for the condensed operator, and the step ends where it ends with factors alone."""
+    settings = dict(cells=(8, 8, 4), mu=0.3, p=0.2)
+    expected = scenes.block(**settings)
+    monkeypatch.setattr(automatic, "CROWDED", 100)
+    monkeypatch.setattr(automatic, "most_nodes", lambda unknowns, friction: 50)
+    monkeypatch.setattr(automatic, "FixedPoint", lambda: dc.FixedPoint(max_iterations=most))
+    many = scenes.block(**settings)
+    for scene in (expected, many):
+        scene.move_top(0.002, 0.001, -0.005)
+    step = many.problem.solve()
+    assert not expected.problem.body.crowded and many.problem.body.crowded
+    assert many.problem.body.ksp.getPC().getType() == "mg"
+    assert step.solver == (
+        dc.SolverName.FIXED_POINT if most > 2 else dc.SolverName.CONDENSED_NEWTON
+    )
+    assert step.error <= 1e-8 and expected.problem.solve().error <= 1e-8
+    force, size = expected.contact.force(), np.abs(expected.contact.force()).max()
+    np.testing.assert_allclose(many.contact.force(), force, atol=1e-6 * size)
+    work = [s.problem.body.total(s.contact.dissipation.sum()) for s in (many, expected)]
+    assert work[0] == pytest.approx(work[1], rel=1e-5) and work[1] > 0.0
+
+
+@pytest.mark.parametrize(
+    "options, cells, solver",
+    [(DIRECT, (8, 8, 4), None), (None, (8, 8), None), (None, (8, 8, 4), dc.CondensedNewton())],
+)
+def test_what_the_user_chooses_and_plane_bodies_have_factors(options, cells, solver, monkeypatch):
+    """However many nodes are in contact: options and solvers of the user go first, a plane body is factorised."""
+    monkeypatch.setattr(automatic, "CROWDED", 100)
+    monkeypatch.setattr(automatic, "most_nodes", lambda unknowns, friction: 5)
+    scene = scenes.block(cells=cells, mu=0.3, p=None, petsc_options=options, solver=solver)
+    assert not scene.problem.body.crowded
+    scene.move_top(*[0.002, 0.001, -0.005][3 - len(cells) :])
+    scene.problem.solve()
+    assert scene.problem.body.exact

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.petsc.linear_solver import LinearSolver
 from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Responses,
@@ -82,6 +83,7 @@ class BoundCondensedNewton:
         self.comm, self._body, self._contacts = body.comm, body, list(contacts)
         self.dim = components(self._contacts)
         self._held_by, self._shared = body.anchors or body, self._any_shared()
+        self._own = None  # factors, where the body has multigrid for a solver that goes first
         self._stiffness = stiffness
         self._set_up()
 
@@ -144,7 +146,19 @@ class BoundCondensedNewton:
         return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step)
 
     def destroy(self) -> None:
-        """Nothing to free: the body owns the factorisation."""
+        """Free factors that the body does not own.  Collective."""
+        if self._own is not None:
+            self._own.destroy()
+        self._own = None
+
+    def _factors(self) -> Any:
+        """What has the linear solver for many right-hand sides as its ``ksp``.  Collective."""
+        if not self._body.crowded or self._body.exact:
+            return self._held_by
+        if self._own is None:
+            A = self._body.anchors.A if self._body.anchors else self._body.K
+            self._own = LinearSolver(A, None, f"{self._body.prefix}condensed_", None)
+        return self._own
 
     def _acting(self) -> list[Friction]:
         """Friction of each contact as it acts on this problem.  Collective."""
@@ -285,8 +299,8 @@ class BoundCondensedNewton:
         if changes and not self._body.nonlinear:
             kept = self._responses()
             if 2 * kept.bytes_needed(self._parts) <= available_first(self.comm):
-                return kept.compliance(self._held_by, self._parts)
-        return compliance(self._held_by, self._parts)
+                return kept.compliance(self._factors(), self._parts)
+        return compliance(self._factors(), self._parts)
 
     def _responses(self) -> Responses:
         """Columns of ``K^-1`` that rows whose frames or nodes change have needed so far, of the present stiffness.  Collective."""
