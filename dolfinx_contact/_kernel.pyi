@@ -354,10 +354,11 @@ class SymmetricBlocks:
         self,
         starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
         columns: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        blocks: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        size: typing.SupportsInt | typing.SupportsIndex,
     ) -> None:
         """
-        Rows of blocks: starts of shape (rows + 1,), columns (m,), blocks (m, size, size).
+        From rows of entries: starts of shape (rows * size + 1,), columns and values (m,).
         """
     def diagonal(self) -> numpy.typing.NDArray[numpy.float64]:
         """

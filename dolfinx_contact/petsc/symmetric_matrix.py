@@ -54,12 +54,14 @@ class GaussSeidel:
 def halved(A: PETSc.Mat) -> PETSc.Mat | None:
     """A matrix as one with a ``SymmetricMatrix``; None if it is not symmetric: one product tells.  Collective."""
     size = A.getBlockSize() if A.getBlockSize() in SIZES else 1
-    rows, own = _rows(A, size)
-    sizes = abs(rows).sum(axis=1).A1
-    blocks = SymmetricBlocks(own.indptr, own.indices, own.data)
+    rows, own = _rows(A)
+    blocks = SymmetricBlocks(own.indptr, own.indices, own.data, size)
     others = None
     if A.comm.size > 1:
         others = with_entries(A, rows.indptr, rows.indices, rows.data, ~_are_own(A, rows))
+    np.abs(rows.data, out=rows.data)
+    sizes = rows.sum(axis=1).A1
+    del rows, own  # as much memory as the matrix itself
     found = _with(A, SymmetricMatrix(blocks, others, size))
     x, y = A.createVecs()
     x.array_w[:] = np.random.default_rng(A.comm.rank).uniform(-1.0, 1.0, sizes.size)
@@ -77,7 +79,8 @@ def halved(A: PETSc.Mat) -> PETSc.Mat | None:
 def plus(A: PETSc.Mat, S: PETSc.Mat) -> PETSc.Mat | None:
     """A ``halved`` matrix plus springs, if they couple unknowns of the same node alone: its blocks are then shared.  Collective."""
     of = A.getPythonContext()
-    rows, own = _rows(S, of.size)
+    rows, own = _rows(S)
+    own = own.tobsr((of.size, of.size))
     nodes = np.repeat(np.arange(own.indptr.size - 1), np.diff(own.indptr))
     only = rows.nnz == np.count_nonzero(_are_own(S, rows)) and (own.indices == nodes).all()
     if not A.comm.tompi4py().allreduce(only, op=MPI.LAND):
@@ -94,12 +97,12 @@ def _with(A: PETSc.Mat, context: SymmetricMatrix) -> PETSc.Mat:
     return found
 
 
-def _rows(A: PETSc.Mat, size: int) -> tuple[sparse.csr_matrix, sparse.bsr_matrix]:
-    """Rows of this rank, and among them what couples its own unknowns, in blocks."""
+def _rows(A: PETSc.Mat) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """Rows of this rank, a copy, and among them what couples its own unknowns."""
     starts, columns, values = A.getValuesCSR()
     rows = sparse.csr_matrix((values, columns, starts), (starts.size - 1, A.getSize()[1]))
     own = rows if A.comm.size == 1 else rows[:, slice(*A.getOwnershipRange())]
-    return rows, own.tobsr((size, size))
+    return rows, own
 
 
 def _are_own(A: PETSc.Mat, rows: sparse.csr_matrix) -> np.ndarray:

@@ -18,8 +18,8 @@ using Reals = py::array_t<double, py::array::c_style | py::array::forcecast>;
 // Of one of the sizes of blocks.
 class AnySize {
   public:
-    AnySize(const Integers &starts, const Integers &columns, const Reals &blocks)
-        : matrix_(made(starts, columns, blocks)) {}
+    AnySize(const Integers &starts, const Integers &columns, const Reals &values, int size)
+        : matrix_(made(starts, columns, values, size)) {}
 
     AnySize plus(const Reals &blocks) const {
         return std::visit(
@@ -73,11 +73,14 @@ class AnySize {
             throw py::value_error("a vector must have an entry for each row");
         return Reals(x.size());
     }
-    static Matrix made(const Integers &starts, const Integers &columns, const Reals &blocks) {
-        if (starts.ndim() != 1 || starts.size() < 1 || columns.ndim() != 1 || blocks.ndim() != 3 ||
-            blocks.shape(0) != columns.size() || blocks.shape(1) != blocks.shape(2))
-            throw py::value_error("starts and columns must have one dimension, blocks shape "
-                                  "(number of columns, size, size)");
+    static Matrix made(const Integers &starts, const Integers &columns, const Reals &values,
+                       int size) {
+        if (size < 1 || size > 3)
+            throw py::value_error("blocks must have 1, 2 or 3 rows");
+        if (starts.ndim() != 1 || starts.size() < 1 || (starts.size() - 1) % size != 0 ||
+            columns.ndim() != 1 || values.ndim() != 1 || values.size() != columns.size())
+            throw py::value_error("starts, columns and values must have one dimension, starts an "
+                                  "entry more than rows of whole blocks, values one a column");
         const py::ssize_t rows = starts.size() - 1;
         for (py::ssize_t i = 0; i < rows; ++i)
             if (starts.at(i) < 0 || starts.at(i) > starts.at(i + 1) ||
@@ -86,17 +89,12 @@ class AnySize {
         for (py::ssize_t k = 0; k < columns.size(); ++k)
             if (columns.at(k) < 0 || columns.at(k) >= rows)
                 throw py::value_error("columns must be numbers of rows");
-        const auto n = std::size_t(rows);
-        switch (blocks.shape(1)) {
-        case 1:
-            return SymmetricBlocks<1>(n, starts.data(), columns.data(), blocks.data());
-        case 2:
-            return SymmetricBlocks<2>(n, starts.data(), columns.data(), blocks.data());
-        case 3:
-            return SymmetricBlocks<3>(n, starts.data(), columns.data(), blocks.data());
-        default:
-            throw py::value_error("blocks must have 1, 2 or 3 rows");
-        }
+        const auto n = std::size_t(rows / size);
+        if (size == 1)
+            return SymmetricBlocks<1>(n, starts.data(), columns.data(), values.data());
+        if (size == 2)
+            return SymmetricBlocks<2>(n, starts.data(), columns.data(), values.data());
+        return SymmetricBlocks<3>(n, starts.data(), columns.data(), values.data());
     }
 
     Matrix matrix_;
@@ -107,9 +105,9 @@ void bind_sparse(py::module_ &m) {
     py::class_<AnySize>(m, "SymmetricBlocks",
                         "A symmetric matrix by its lower half, in blocks of up to 3 rows; those "
                         "above the diagonal are not used.")
-        .def(py::init<const Integers &, const Integers &, const Reals &>(), py::arg("starts"),
-             py::arg("columns"), py::arg("blocks"),
-             "Rows of blocks: starts of shape (rows + 1,), columns (m,), blocks (m, size, size).")
+        .def(py::init<const Integers &, const Integers &, const Reals &, int>(), py::arg("starts"),
+             py::arg("columns"), py::arg("values"), py::arg("size"),
+             "From rows of entries: starts of shape (rows * size + 1,), columns and values (m,).")
         .def("plus", &AnySize::plus, py::arg("blocks"),
              "The matrix with blocks of shape (rows, size, size) added to those of its diagonal; "
              "what is below takes no memory twice.")

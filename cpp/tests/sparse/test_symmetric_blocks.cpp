@@ -14,12 +14,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-/// A sparse symmetric positive definite matrix, and its blocks; those above the diagonal are NaN.
+/// A sparse symmetric positive definite matrix, and its entries; those above the diagonal are NaN.
 template <int Size> struct Scene {
     int rows;
     MatrixXd A;
     std::vector<std::int32_t> starts{0}, columns;
-    std::vector<double> blocks;
+    std::vector<double> values;
 
     Scene(Random &random, int n, double scale) : rows(n), A(MatrixXd::Zero(n * Size, n * Size)) {
         const auto block = [this](int i, int j) { return A.block<Size, Size>(Size * i, Size * j); };
@@ -35,20 +35,24 @@ template <int Size> struct Scene {
             block(i, i) = scale * (part * part.transpose() + MatrixXd::Identity(Size, Size)) +
                           sum * MatrixXd::Identity(Size, Size);
         }
-        for (int i = 0; i < n; ++i) {
-            for (int j = 0; j < n; ++j)
-                if ((block(i, j).array() != 0.0).any()) {
+        for (int i = 0; i < n * Size; ++i) {
+            for (int j = 0; j < n * Size; ++j)
+                // A row may miss a column of a block, and so the whole block.
+                if (A(i, j) != 0.0 && (j / Size == i / Size || random.below(4) > 0)) {
                     columns.push_back(j);
-                    for (int r = 0; r < Size; ++r)
-                        for (int c = 0; c < Size; ++c)
-                            blocks.push_back(j > i ? std::numeric_limits<double>::quiet_NaN()
-                                                   : block(i, j)(r, c));
+                    values.push_back(j / Size > i / Size ? std::numeric_limits<double>::quiet_NaN()
+                                                         : A(i, j));
+                } else {
+                    A(i, j) = j / Size > i / Size ? A(i, j) : 0.0;
                 }
             starts.push_back(std::int32_t(columns.size()));
         }
+        for (int i = 0; i < n * Size; ++i) // as below the diagonal blocks
+            for (int j = (i / Size + 1) * Size; j < n * Size; ++j)
+                A(i, j) = A(j, i);
     }
     SymmetricBlocks<Size> matrix() const {
-        return {std::size_t(rows), starts.data(), columns.data(), blocks.data()};
+        return {std::size_t(rows), starts.data(), columns.data(), values.data()};
     }
 
     /// Block diagonal, and what is below it.
@@ -105,8 +109,8 @@ TEST(SymmetricBlocks, TriplesOfUnknowns) { run<3>(); }
 
 TEST(SymmetricBlocks, SweepsLeaveUnknownsWithoutStiffness) {
     const std::vector<std::int32_t> starts{0, 1, 3}, columns{0, 0, 1};
-    const std::vector<double> blocks{0.0, 0.0, 2.0}, b{1.0, 4.0};
+    const std::vector<double> values{0.0, 0.0, 2.0}, b{1.0, 4.0};
     std::vector<double> x(2);
-    SymmetricBlocks<1>(2, starts.data(), columns.data(), blocks.data()).sweep(b.data(), x.data());
+    SymmetricBlocks<1>(2, starts.data(), columns.data(), values.data()).sweep(b.data(), x.data());
     EXPECT_EQ(x, (std::vector<double>{0.0, 2.0}));
 }

@@ -20,28 +20,42 @@ template <int Size> class SymmetricBlocks {
     using Block = Eigen::Matrix<double, Size, Size>;
     using Vector = Eigen::Matrix<double, Size, 1>;
 
-    // Block k of row i, row by row in `blocks`, stands in column `columns[k]`, starts[i] <= k <
-    // starts[i + 1]. Blocks above the diagonal are not used.
+    // From all its entries, row by row: values[k] stands in column `columns[k]` of row i, starts[i]
+    // <= k < starts[i + 1], i < rows * Size. Blocks above the diagonal are not used.
     SymmetricBlocks(std::size_t rows, const std::int32_t *starts, const std::int32_t *columns,
-                    const double *blocks)
+                    const double *values)
         : diagonal_(rows, Block::Zero()), inverse_(rows), left_(rows) {
+        const auto each = [&](std::size_t i, auto &&take) { // entries in the rows of block i
+            for (std::size_t row = 0; row < Size; ++row)
+                for (auto k = starts[i * Size + row]; k < starts[i * Size + row + 1]; ++k) {
+                    const auto column = std::size_t(columns[k]);
+                    take(column / Size, row, column % Size, values[k]);
+                }
+        };
+        std::vector<std::size_t> last(rows, rows); // row of blocks where the column was met last
         std::size_t count = 0;
         for (std::size_t i = 0; i < rows; ++i)
-            for (std::int32_t k = starts[i]; k < starts[i + 1]; ++k)
-                if (std::size_t(columns[k]) < i)
-                    ++count;
+            each(i, [&](std::size_t j, std::size_t, std::size_t, double) {
+                count += j < i && last[j] != i;
+                last[j] = i;
+            });
         auto lower = std::make_shared<Lower>();
-        lower->columns.reserve(count), lower->blocks.reserve(count);
         lower->starts.reserve(rows + 1);
+        lower->columns.reserve(count), lower->blocks.reserve(count); // not twice for a moment
+        std::vector<std::size_t> place(rows, count); // of the last block in a column
         for (std::size_t i = 0; i < rows; ++i) {
-            for (std::int32_t k = starts[i]; k < starts[i + 1]; ++k) {
-                const Given block(blocks + std::ptrdiff_t(k) * Size * Size);
-                const auto column = std::uint32_t(columns[k]);
-                if (column == i)
-                    diagonal_[i] = block;
-                if (column < i)
-                    lower->columns.push_back(column), lower->blocks.push_back(block);
-            }
+            each(i, [&](std::size_t j, std::size_t row, std::size_t column, double value) {
+                if (j == i)
+                    diagonal_[i](row, column) += value;
+                if (j >= i)
+                    return;
+                if (place[j] == count || place[j] < lower->starts.back()) {
+                    place[j] = lower->columns.size();
+                    lower->columns.push_back(std::uint32_t(j));
+                    lower->blocks.push_back(Block::Zero());
+                }
+                lower->blocks[place[j]](row, column) += value;
+            });
             lower->starts.push_back(lower->columns.size());
         }
         lower_ = lower;
