@@ -49,9 +49,7 @@ class ElasticBody(OverRanks):
     soft: np.ndarray
     nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
     loose: LooseMotions | None = None  # where rigid motions cost nothing
-    crowded = (
-        False  # whether multigrid is the default though factors would do, for many contact nodes
-    )
+    crowded = False  # whether many contact nodes make multigrid the default, not factors
     scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
 
     def __init__(

@@ -43,12 +43,12 @@ def most_nodes(unknowns: int, friction: bool) -> int:
 
 def crowded(solver: Solver, body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
     """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
-    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     unknowns = body.comm.allreduce(body.size)
     solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= LARGE[3]
-    by_cycles = solid and not body.nonlinear and isinstance(solver, (Automatic, FixedPoint))
-    if body.options is not None or not by_cycles:
+    by_cycles = isinstance(solver, (Automatic, FixedPoint)) and not body.nonlinear
+    if not (contacts and solid and by_cycles and body.options is None):
         return False
+    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
     return nodes > most_nodes(unknowns, friction=components(contacts) > 1)
 
 

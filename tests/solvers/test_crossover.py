@@ -78,3 +78,12 @@ def test_what_the_user_chooses_and_plane_bodies_have_factors(options, cells, sol
     scene.move_top(*[0.002, 0.001, -0.005][3 - len(cells) :])
     scene.problem.solve()
     assert scene.problem.body.exact
+
+
+def test_a_body_without_contacts_is_not_crowded(monkeypatch):
+    """Whatever its size: it has the solver that its unknowns ask for."""
+    monkeypatch.setattr(automatic, "CROWDED", 100)
+    scene = scenes.block(cells=(8, 8, 4))
+    problem = dc.ContactProblem(scene.F, scene.u, [], bcs=scene.bcs)
+    problem.solve()
+    assert problem.body.exact and not problem.body.crowded

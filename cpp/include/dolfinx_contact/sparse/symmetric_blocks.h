@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 namespace dolfinx_contact {
@@ -36,7 +37,7 @@ template <int Size> class SymmetricBlocks {
         std::size_t count = 0;
         for (std::size_t i = 0; i < rows; ++i)
             each(i, [&](std::size_t j, std::size_t, std::size_t, double) {
-                count += j < i && last[j] != i;
+                count += j < i && last[j] != i ? 1 : 0;
                 last[j] = i;
             });
         auto lower = std::make_shared<Lower>();
@@ -111,10 +112,10 @@ template <int Size> class SymmetricBlocks {
   private:
     using Given = Eigen::Map<
         const Eigen::Matrix<double, Size, Size, Size == 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
-    static auto at(const double *x, std::size_t i) {
-        return Eigen::Map<const Vector>(x + i * Size);
+    template <class Real> static auto at(Real *x, std::size_t i) {
+        using Values = std::conditional_t<std::is_const_v<Real>, const Vector, Vector>;
+        return Eigen::Map<Values>(x + i * Size);
     }
-    static auto at(double *x, std::size_t i) { return Eigen::Map<Vector>(x + i * Size); }
 
     void invert() {
         for (std::size_t i = 0; i < rows(); ++i) {
