@@ -27,16 +27,16 @@ template <int Size> class SymmetricBlocks {
                     const double *values)
         : diagonal_(rows, Block::Zero()), inverse_(rows), left_(rows) {
         const auto each = [&](std::size_t i, auto &&take) { // entries in the rows of block i
-            for (std::size_t row = 0; row < Size; ++row)
-                for (auto k = starts[i * Size + row]; k < starts[i * Size + row + 1]; ++k) {
-                    const auto column = std::size_t(columns[k]);
-                    take(column / Size, row, column % Size, values[k]);
-                }
+            for (int row = 0; row < Size; ++row) {
+                const std::int32_t *ends = starts + i * Size + row;
+                for (std::int32_t k = ends[0]; k < ends[1]; ++k)
+                    take(std::size_t(columns[k] / Size), row, columns[k] % Size, values[k]);
+            }
         };
         std::vector<std::size_t> last(rows, rows); // row of blocks where the column was met last
         std::size_t count = 0;
         for (std::size_t i = 0; i < rows; ++i)
-            each(i, [&](std::size_t j, std::size_t, std::size_t, double) {
+            each(i, [&](std::size_t j, int, int, double) {
                 count += j < i && last[j] != i ? 1 : 0;
                 last[j] = i;
             });
@@ -45,7 +45,7 @@ template <int Size> class SymmetricBlocks {
         lower->columns.reserve(count), lower->blocks.reserve(count); // not twice for a moment
         std::vector<std::size_t> place(rows, count); // of the last block in a column
         for (std::size_t i = 0; i < rows; ++i) {
-            each(i, [&](std::size_t j, std::size_t row, std::size_t column, double value) {
+            each(i, [&](std::size_t j, int row, int column, double value) {
                 if (j == i)
                     diagonal_[i](row, column) += value;
                 if (j >= i)
