@@ -33,6 +33,7 @@ class Search:
 
     Attributes:
         best: The iterate with the smallest errors.
+        nearest: That of the present attempt.
         error: The largest error of the last iterate.
         forward_error: Forward error of the best iterate, see docs/errors.md.
         iterations: Iterations so far.
@@ -42,18 +43,19 @@ class Search:
     """
 
     def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float, most: float = math.inf):
-        self.step, self.best = step, x
+        self.step, self.best, self.nearest = step, x, x
         self.error = self._smallest = self.forward_error = np.inf
-        self._rank = (True, np.inf)
+        self._rank = self._attempt = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=WINDOW + 1)
         self.iterations = self.left = 0
         self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT)
         self._start, self._seconds, self._most = perf_counter(), max_seconds, most
         self.over = self._lost = False
 
-    def begin(self, most: int, patience: float = math.inf) -> None:
-        """Begin an attempt of at most ``most`` iterations; it is lost if the smallest error does not halve within ``patience`` of them."""
+    def begin(self, x: np.ndarray, most: int, patience: float = math.inf) -> None:
+        """Begin an attempt at ``x`` of at most ``most`` iterations; it is lost if its smallest error does not halve within ``patience`` of them."""
         self.left, self._lost, self._patience = most, False, patience
+        self.nearest, self._attempt, self._smallest = x, (True, np.inf), np.inf
         self._halved, self._since = np.inf, self.iterations
 
     @property
@@ -82,6 +84,8 @@ class Search:
         rank = (not within, max(self.error, change) if within else self.error)
         if rank < self._rank:
             self._rank, self.best, self.forward_error = rank, x, change
+        if rank < self._attempt:
+            self._attempt, self.nearest = rank, x
         self._smallest = min(self._smallest, self.error)
         if self._smallest < 0.5 * self._halved:
             self._halved, self._since = self._smallest, self.iterations

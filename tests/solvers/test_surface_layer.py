@@ -1,6 +1,8 @@
 """The linearised contact near the plane: its Jacobian, its block, and what it is for."""
 
+import math
 import resource
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
+from dolfinx_contact.solvers.search import Search
 
 LAWS = [(0.0, None), (0.2, None), ((0.3, 0.15), None), ((0.3, 0.15), (0.05, 0.2))]
 
@@ -130,3 +133,34 @@ def test_replaced_solvers_give_their_memory_back(monkeypatch):
         solve(k)
     # The allocator takes 26 MB once, at some step (40 steps were watched); a leak takes 8 factors and more.
     assert resident() - before < 4 * factor
+
+
+class _Errors:
+    """A step whose errors are a list, one for each displacement ``[k]``."""
+
+    tol, contacts = 1e-10, ()
+
+    def __init__(self, errors):
+        self.errors = errors
+
+    def residual(self, x, maps, forces):
+        error = self.errors[int(x[0])]
+        return x, SimpleNamespace(largest=error, change=0.0, acts=True, within=lambda tol: False)
+
+
+def test_an_attempt_has_a_best_state_of_its_own():
+    """A search that begins anew goes on from the best state since then, not from that of a lost attempt, and returns the best of all."""
+    search = Search(_Errors([1e-3, 1e-5, 1e-2, 1e-1, 1e-4]), np.array([0.0]), math.inf)
+
+    def seen(*places):
+        for k in places:
+            search.residual(np.array([float(k)]), (), np.zeros(1))
+            search.count(1)
+
+    search.begin(search.best, 400, 2)
+    seen(0, 1, 2, 3, 3)
+    assert not search.goes_on and search.best == search.nearest == 1
+    search.begin(np.array([3.0]), 400, 2)
+    assert search.goes_on and search.nearest == 3
+    seen(3, 2, 4)
+    assert search.goes_on and search.nearest == 4 and search.best == 1

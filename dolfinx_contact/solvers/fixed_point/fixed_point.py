@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: after so many, most nodes have found their status, and easy steps are nearly
-# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH[0], it was too early, the
-# next times by more than GROWTH[1], which strongly crossed rules need; if a
+# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH, it was too early; each time, the limit rises by the factor RAISE, since a search that begins
+# again at its best state with the same limit would repeat itself for ever. If a
 # tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
 # If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
-EVERY, SOONER, GROWTH, USELESS, NEAR = 20, 10, (30.0, 100.0), 0.9, 0.1
+EVERY, SOONER, GROWTH, RAISE, USELESS, NEAR = 20, 10, 30.0, 10.0, 0.9, 0.1
 
-# A body held by contact alone may slide away; its error must halve within this many iterations.
-PATIENCE = 60
+# The error must halve within so many iterations, or the next attempt follows: where a tangent or differences mislead, they do so for ever.
+PATIENCE = 100
 
 # Limit of all iterations of a step over ``max_iterations`` if one is a multigrid cycle: ten times the iterations of a hard step.
 BUDGET = 2.5
@@ -52,7 +52,8 @@ class FixedPoint:
     contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
     unless the last tangent did not help.
 
-    If the error stalls, Newton's method is applied to the same residual, see ``search_by_newton``: an iteration is then one of
+    If the error does not halve within a hundred iterations, the step is tried once more from its start and with tangents more often.
+    If that fails, Newton's method is applied to the same residual, see ``search_by_newton``: an iteration is then one of
     GMRES, preconditioned by the same correction.  If that also fails, the fixed point continues with another rho.  The solution does
     not depend on rho.
 
@@ -149,13 +150,15 @@ class BoundFixedPoint:
         search = Search(step, start, options.max_seconds, most)
         newton = options.newton
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            self._fall(search, factor, EVERY)
+            self._fall(search, factor, EVERY, search.best)
             if not search.over and _slides(step, search.best):
                 break
             if not search.over and self.preconditioner.soften():
-                self._fall(search, factor, EVERY)
-            if not search.over and options.max_iterations > EVERY:
-                self._fall(search, factor, SOONER)
+                self._fall(search, factor, EVERY, search.best)
+            # from the start another way, where states near the best lead nowhere
+            for every, x in ((EVERY, start), (SOONER, search.best)):
+                if not search.over and options.max_iterations > EVERY:
+                    self._fall(search, factor, every, x)
             if newton and not search.over:
                 search_by_newton(search, self.preconditioner, search.best)
                 newton = False
@@ -175,17 +178,17 @@ class BoundFixedPoint:
         twice = 2 * self._options.max_iterations
         return f"{said}; a step of this size has {most:.0f} iterations, FixedPoint(max_iterations={twice}) gives it twice as many"
 
-    def _fall(self, search: Search, factor: float, every: int) -> None:
-        """Iterate with one rho while the errors fall, with a tangent every so many iterations."""
-        patience = math.inf if search.step.statics is None else PATIENCE
-        search.begin(self._options.max_iterations, patience)
-        near, growth = NEAR if self._contacts else 0.0, GROWTH[0]
+    def _fall(self, search: Search, factor: float, every: int, x: np.ndarray) -> None:
+        """Iterate from ``x`` with one rho while the errors fall, with a tangent every so many iterations."""
+        first = search.iterations == 0
+        search.begin(x, self._options.max_iterations, PATIENCE)
+        near, growth = NEAR if first and self._contacts else 0.0, GROWTH
         while search.goes_on:
             known = search.step.continues and search.iterations == 0
             maps = self._set(factor, known)
             near = 0.0 if known and self.preconditioner.linearised else near
-            self._accelerate(search, maps, search.best, every, near, growth)
-            near, growth = 0.0, GROWTH[1]
+            self._accelerate(search, maps, search.nearest, every, near, growth)
+            near, growth = 0.0, RAISE * growth
 
     def _set(self, factor: float, known: bool) -> list:
         """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
@@ -233,6 +236,6 @@ class BoundFixedPoint:
             search.count(1)
             if norm > ASTRAY * smallest:  # the differences mislead: start again from the best
                 anderson.restart()
-                following, smallest = search.best, np.inf
+                following, smallest = search.nearest, np.inf
             smallest = min(smallest, norm)
             x = following

@@ -43,7 +43,7 @@ def search_by_newton(search: Search, preconditioner: ContactPreconditioner, x: n
         x: Displacement of owned degrees of freedom.
     """
     step = search.step
-    search.begin(MOST, PATIENCE)
+    search.begin(x, MOST, PATIENCE)
     with closing(NewtonKrylov(step, preconditioner)) as newton:
         for tangential in cycle(TANGENTIAL):
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]

@@ -74,7 +74,7 @@ class BoundSNES(OnTangent):
         """
         x = step.start() if start is None else start
         search = Search(step, x, math.inf)
-        search.begin(MOST)
+        search.begin(search.best, MOST)
         maps = [ReturnMap(NORMAL * of.normal, of.normal) for of in step.stiffness]
         said = "converged at its start"
         with np.errstate(all="ignore"):  # a trial may turn elements inside out

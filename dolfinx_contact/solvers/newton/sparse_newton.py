@@ -80,7 +80,7 @@ class BoundSparseNewton(OnTangent):
         """
         x = step.start() if start is None else start
         search = Search(step, x, self._options.max_seconds)
-        search.begin(self._options.max_iterations, PATIENCE)
+        search.begin(search.best, self._options.max_iterations, PATIENCE)
         descent, forces = Descent(step, self._tangent, stands=start is None), step.forces(x)
         for tangential in cycle(TANGENTIAL):
             maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
