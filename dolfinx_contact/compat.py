@@ -267,6 +267,11 @@ def tagged(tags: Any, mesh: Any) -> bool:
     return topology is _cpp(mesh).topology
 
 
+def same_mesh(V: fem.FunctionSpace, W: fem.FunctionSpace) -> bool:
+    """Whether two spaces are of one mesh."""
+    return _cpp(V.mesh).topology is _cpp(W.mesh).topology
+
+
 def is_condition(bc: object) -> bool:
     """Whether it is what ``dirichletbc`` returns."""
     return hasattr(_cpp(bc), "dof_indices")

@@ -171,8 +171,8 @@ class ContactProblem(Guarded):
             )
             self._variables = checked_internal(internal)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
-        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol)  # fmt: skip
         self.u, self.monitor = u, None
+        self._agree(comm)
         of = self.contacts[0].displacements if self.contacts else None
         before = None if internal is None else internal.before_residual
         self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, of, form_options)  # fmt: skip
@@ -687,7 +687,11 @@ class ContactProblem(Guarded):
 
     def _check_input(self) -> None:
         check_step(self.u, self.body.comm, self.contacts)
-        agree(self.body.comm, solver=self.solver, tol=self.tol, monitor=self.monitor is not None)
+        self._agree(self.body.comm)
+
+    def _agree(self, comm: MPI.Comm) -> None:
+        """Raise a ``ValueError`` on all ranks if what may change between steps differs between them.  Collective."""
+        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, monitor=self.monitor is not None)  # fmt: skip
 
     def _renew_laws(self, begin: bool = False) -> None:
         """Let friction follow the present state, at the ``begin`` of a step too, and the solver know of what changed.  Collective."""

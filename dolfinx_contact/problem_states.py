@@ -13,6 +13,7 @@ import numpy as np
 
 from dolfinx_contact.results import checkpoint
 from dolfinx_contact.solvers.base import KEPT
+from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
@@ -122,10 +123,11 @@ class ProblemStates:
 
     def go_to(self, kept: Kept) -> None:
         """Go on from a snapshot, see ``ContactProblem.restore``.  Collective."""
-        if not isinstance(kept, Kept) or kept.of is not self._mine:
-            raise ValueError(
-                f"restore takes what snapshot of the same problem has returned, got {type(kept).__name__}."
-            )
+        with raised_together(self._body.comm):
+            if not isinstance(kept, Kept) or kept.of is not self._mine:
+                raise ValueError(
+                    f"restore takes what snapshot of the same problem has returned, got {type(kept).__name__}."
+                )
         self._go_to(kept)
 
     def _go_to(self, kept: Kept) -> None:

@@ -22,6 +22,7 @@ from dolfinx_contact.contact.friction_field import guided, wear_on_nodes
 from dolfinx_contact.contact.input import (
     check_coefficients,
     check_law,
+    check_opposite,
     check_space,
     check_wear,
     checked_facets,
@@ -38,7 +39,7 @@ from dolfinx_contact.law.supported import supported
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
-from dolfinx_contact.support.checks import place, positive
+from dolfinx_contact.support.checks import number, place, positive
 from dolfinx_contact.support.collective import agree, raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
@@ -109,9 +110,11 @@ class Contact(Guarded):
             check_space(V)
             facets = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
             check_law(surface, friction, gdim)
+            check_opposite(V, surface)
             check_wear(wear, surface)
         self.V, self.comm, self.surface = V, mesh.comm, surface
         self.displacements = Displacements(V)
+        agree(mesh.comm, weight="given" if weight is not None else None)
         with raised_together(mesh.comm):
             self._weight = weight_on(self.displacements.V, weight)
         nodes = contact_nodes(self.displacements.V, facets, self._weight)
@@ -211,7 +214,8 @@ class Contact(Guarded):
 
     @repeats.setter
     def repeats(self, times: float) -> None:
-        self._repeats = positive("repeats", times, finite=True) if times != 0 else 0.0
+        count = number("repeats", times)
+        self._repeats = positive("repeats", count) if count != 0.0 else 0.0
 
     @property
     def law(self):
@@ -231,7 +235,7 @@ class Contact(Guarded):
     def check(self) -> None:
         """Raise a ``ValueError`` on all ranks if a law does not fit their nodes, or surface or laws differ.  Collective."""
         if self.comm.size > 1:
-            agree(self.comm, **self._laws.described(self.surface))
+            agree(self.comm, **self._laws.described(self.surface), repeats=self._repeats)
         with raised_together(self.comm):
             check_coefficients(self.friction, self.nodes.size)
 

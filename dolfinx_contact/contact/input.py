@@ -121,6 +121,15 @@ def check_law(
         )
 
 
+def check_opposite(V: Any, surface: Surface) -> None:
+    """A deformable surface lies in the mesh of ``V``: numbers of facets mean nothing in another one."""
+    if surface.deformable and not compat.same_mesh(V, surface.V):
+        raise ValueError(
+            "V of the DeformableSurface is a space of another mesh than V of the Contact: both bodies have to be parts of one mesh, which "
+            "need not be connected. In gmsh, make both volumes in one model."
+        )
+
+
 def warn_of_percent(friction: Friction | float) -> None:
     """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
     largest = friction.mu.max(initial=0.0)

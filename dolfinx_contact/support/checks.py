@@ -101,7 +101,7 @@ def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -
     """A positive number, or a ``ValueError``; a whole number must be finite."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # of 10**400, too
         number = math.nan
     fits = number > 0 and not ((whole or finite) and math.isinf(number))
     if not fits or whole and number != int(number):

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem
+from dolfinx import fem, mesh
 from dolfinx.mesh import locate_entities_boundary
 from two_bodies import COMM, E, blocks, dc, patch
 
@@ -277,3 +277,17 @@ def test_the_wrong_side_is_told(cells, moduli, told, caplog):
             scene.problem.solve()
     lines = [line for line in caplog.messages if "carries the unknowns" in line]
     assert len(lines) == bool(told and COMM.rank == 0) and all(told in line for line in lines)
+
+
+@pytest.mark.parametrize("cells", [(2, 2, 2), (5, 5, 5)])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_surface_of_another_mesh_is_refused(cells, swapped):
+    """Numbers of facets mean nothing in another mesh, of as many cells or of other ones: refused, naming V and what to do."""
+    spaces = [
+        functionspace(mesh.create_unit_cube(COMM, *n), ("Lagrange", 1, (3,))) for n in (cells, (2, 2, 2))
+    ]  # fmt: skip
+    facets = [locate_entities_boundary(V.mesh, 2, lambda x: np.isclose(x[2], 0)) for V in spaces]
+    mine, other = (1, 0) if swapped else (0, 1)
+    surface = dc.DeformableSurface(spaces[other], facets[other])
+    with pytest.raises(ValueError, match="V of the DeformableSurface is a space of another mesh"):
+        dc.Contact(spaces[mine], facets[mine], surface, dc.Friction(0.3))

@@ -332,3 +332,48 @@ def test_a_copied_surface_is_driven_by_itself():
     axes = [motion.axis for motion in other.motions]
     np.testing.assert_array_equal(axes, other.frame[[0, 2]])
     assert np.abs(other.frame - first.frame).max() > 0.09
+
+
+@pytest.mark.parametrize("times", [np.array([]), 10**400, np.inf, np.nan, -1, "twice", [1, 2]])
+def test_how_often_a_step_counts_is_one_number(times):
+    """What is no finite number of zero or more is refused, and the last value stays."""
+    scene = pressed()
+    with pytest.raises(ValueError, match="repeats must be"):
+        scene.contact.repeats = times
+    assert scene.contact.repeats == 1.0
+
+
+@pytest.mark.skipif(COMM.size == 1, reason="needs ranks that differ")
+@pytest.mark.parametrize("name, mine, others", [("geometry_tol", 1e-6, 1e-1), ("undetermined", "refused", "nearest")])  # fmt: skip
+def test_ranks_that_differ_are_told(name, mine, others):
+    """What one rank has set otherwise than the others is a ValueError on all before a step, and the step is solved once it is the same."""
+    scene = pressed()
+    setattr(scene.problem, name, mine if COMM.rank == 0 else others)
+    with pytest.raises(ValueError, match=f"{name} differs between ranks"):
+        scene.problem.solve()
+    setattr(scene.problem, name, others)
+    scene.problem.solve()
+
+
+@pytest.mark.skipif(COMM.size == 1, reason="needs ranks that differ")
+def test_what_one_rank_gives_alone_is_told():
+    """A snapshot that is none, a count of cycles, or a weight of one rank alone, is a ValueError on all, which go on from where they were."""
+    scene = pressed()
+    kept, force = scene.problem.snapshot(), scene.contact.force()
+    with pytest.raises(ValueError, match="restore takes what snapshot"):
+        scene.problem.restore(3 if COMM.rank == 0 else kept)
+    assert np.array_equal(scene.contact.force(), force)
+    scene.contact.repeats = 2.0 if COMM.rank == 0 else 3.0
+    with pytest.raises(ValueError, match="repeats differs between ranks"):
+        scene.problem.solve()
+    scene.contact.repeats = 1.0
+    scene.problem.solve()
+    x, facets = ufl.SpatialCoordinate(scene.contact.V.mesh), scene.contact.facets
+    with pytest.raises(ValueError, match="weight differs between ranks"):
+        dc.Contact(
+            scene.contact.V,
+            facets,
+            scene.contact.surface,
+            0.3,
+            weight=x[0] + 2 if COMM.rank == 0 else None,
+        )
