@@ -55,7 +55,7 @@ from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
 from dolfinx_contact.step.nonlinear import NonlinearStep
-from dolfinx_contact.step.trial import NO_SOLUTION, floating, unmoved, without_reactions
+from dolfinx_contact.step.trial import NO_SOLUTION, UNHELD, floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
@@ -319,8 +319,8 @@ class ContactProblem(Guarded):
         if said or not converged(step.errors, done, self.tol):
             if not said:
                 tried = f"{done}, tol {self.tol:.1e}, by {named(done)}"
-                if done.reason == NO_SOLUTION:  # nothing was tried: errors are of the last state
-                    tried = NO_SOLUTION
+                if done.reason in (NO_SOLUTION, UNHELD):  # untried: errors are of the last state
+                    tried = done.reason
                 said = f"not converged: {tried}. {step.refusal()}"
             raise NotConverged(
                 f"{said}.",
@@ -593,7 +593,7 @@ class ContactProblem(Guarded):
         statics = Statics(body, self.contacts, step, last)
         step = step.held_by(statics)
         if statics.said:
-            return step, unmoved(body, step, last)
+            return step, unmoved(body, step, last, statics.reason)
         if not statics.loads.any():
             found = floating(body, self.contacts, step, last)
         pressed = np.concatenate([contact.last.reaction[:, -1] for contact in self.contacts])

@@ -15,6 +15,7 @@ from dolfinx_contact.contact.nodal import times
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.solvers.condensed.input import principal_axes
 from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
+from dolfinx_contact.step.trial import NO_SOLUTION, UNHELD
 from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 
@@ -59,6 +60,7 @@ class Statics:
         last: The last converged displacement.
         start: Displacement near which the solution may lie; ``placed`` if it is not the last one.
         said: Why there is no static state, in words; empty where there may be one.
+        reason: The same as the record of a step has it.
 
     Raises:
         ValueError: on all ranks, if no contact node is on a part of the body that nothing holds.
@@ -81,15 +83,20 @@ class Statics:
             coefficients.append(np.broadcast_to(mu, (points.count, self._dim - 1)))
         self._motion, self._mu = np.concatenate(parts), np.concatenate(coefficients)
         self._felt = body.total((self._motion**2).sum(axis=(0, 1)))
+        self.start, self.last, self.placed, self.said = last, last, False, ""
+        self.reason = NO_SOLUTION
         if not self._felt.all():
-            raise ValueError(
-                f"{body.loose.refusal(np.eye(m)[:, self._felt == 0.0])} No contact node can hold it: fix it by Dirichlet "
-                "conditions, add a soft spring to F, or name the facets that may touch."
-            )
+            free = body.loose.refusal(np.eye(m)[:, self._felt == 0.0])
+            if not any(contact.has_history for contact in contacts):
+                raise ValueError(
+                    f"{free} No contact node can hold it: fix it by Dirichlet "
+                    "conditions, add a soft spring to F, or name the facets that may touch."
+                )
+            self.said = f"where the search has moved it, {free} A smaller step stays nearer to what held it in the last one"
+            self.reason = UNHELD
         b = step.free(step.b)
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
         self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
-        self.start, self.last, self.placed, self.said = last, last, False, ""
         escape, self._balancing = self._escape(self._motion, self.loads)
         if escape is None and step.surfaces is not None:
             escape, _ = self._escape(*self._with_surfaces(step.surfaces))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 CERTAIN = 0.1
 
 NOTHING, NO_SOLUTION = "nothing touches", "there is no solution"
+UNHELD = "a body leaves what held it"
 
 
 def without_reactions(
@@ -42,12 +43,14 @@ def without_reactions(
     return None
 
 
-def unmoved(body: BodyLike, step: StepLike, last: np.ndarray) -> SolverResult:
+def unmoved(
+    body: BodyLike, step: StepLike, last: np.ndarray, reason: str = NO_SOLUTION
+) -> SolverResult:
     """The last displacement with the present boundary values, judged as what it is: no solution."""
     x, fixed = last.copy(), body.fixed
     x[fixed] = step.b[fixed]
     step.measure(x)
-    return SolverResult(x, 0, np.inf, SolverName.NONE, reason=NO_SOLUTION)
+    return SolverResult(x, 0, np.inf, SolverName.NONE, reason=reason)
 
 
 def floating(

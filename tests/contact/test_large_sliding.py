@@ -276,6 +276,26 @@ def test_a_body_that_lies_on_the_other():
         scene.problem.solve()
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("push", [0.5, 1.5])
+def test_a_body_that_is_pushed_off(push, swapped):
+    """What friction has held slides off in a search: NotConverged, which names the motion, not a mistake of the user's; held back, it is solved."""
+    scene = blocks("quadrilateral", 1, ((6, 4), (11, 4)), size=(1.0, 4.0), sliding="large", mu=0.3, held=False, swapped=swapped, tol=1e-8)  # fmt: skip
+    pressed, V = fem.Constant(scene.domain, -0.01), scene.V.sub(1)
+    scene.problem.bcs = [*scene.bcs, fem.dirichletbc(pressed, fem.locate_dofs_topological(V, 1, scene.ends[0]), V)]  # fmt: skip
+    scene.problem.solve()
+    normal = abs(scene.contact.force()[1])
+    scene.load.value[0] = push * 0.3 * normal
+    if push < 1.0:
+        scene.problem.solve()
+        assert abs(scene.contact.force()[0]) == pytest.approx(push * 0.3 * normal, rel=1e-6)
+        return
+    with pytest.raises(dc.NotConverged, match="translation along"):
+        scene.problem.solve()
+    scene.load.value[0] = 0.0
+    assert scene.problem.solve().error <= 1e-8
+
+
 def test_three_in_a_row():
     """A block slides on another one that lies on a rigid floor: both contacts carry the same."""
     domain, top, bottom, upper, lower, _ = pair("quadrilateral", ((4, 2), (9, 2)), (1.0, 2.0))
