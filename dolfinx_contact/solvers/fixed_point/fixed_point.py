@@ -15,6 +15,7 @@ from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.solvers.fixed_point.newton_krylov import search_by_newton
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
+from dolfinx_contact.step.errors import contact_defects
 from dolfinx_contact.support.checks import positive
 
 if TYPE_CHECKING:
@@ -33,7 +34,10 @@ PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 EVERY, SOONER, GROWTH, RAISE, USELESS, NEAR = 20, 10, 30.0, 10.0, 0.9, 0.1
 
 # The error must halve within so many iterations, or the next attempt follows: where a tangent or differences mislead, they do so for ever.
-PATIENCE = 100
+PATIENCE = 60
+
+# Nodes with more than this part of the largest defect are put back where they were, before another attempt.
+WRONG = 0.05
 
 # Limit of all iterations of a step over ``max_iterations`` if one is a multigrid cycle: ten times the iterations of a hard step.
 BUDGET = 2.5
@@ -155,10 +159,9 @@ class BoundFixedPoint:
                 break
             if not search.over and self.preconditioner.soften():
                 self._fall(search, factor, EVERY, search.best)
-            # from the start another way, where states near the best lead nowhere
-            for every, x in ((EVERY, start), (SOONER, search.best)):
+            for every, again in ((EVERY, True), (EVERY, False), (SOONER, False)):
                 if not search.over and options.max_iterations > EVERY:
-                    self._fall(search, factor, every, x)
+                    self._fall(search, factor, every, start if again else self._stuck(search))
             if newton and not search.over:
                 search_by_newton(search, self.preconditioner, search.best)
                 newton = False
@@ -177,6 +180,21 @@ class BoundFixedPoint:
             return said
         twice = 2 * self._options.max_iterations
         return f"{said}; a step of this size has {most:.0f} iterations, FixedPoint(max_iterations={twice}) gives it twice as many"
+
+    def _stuck(self, search: Search) -> np.ndarray:
+        """The best state, but nodes that it is wrong at are back where they were: their slip may have no solution nearby.  Collective."""
+        search.step.measure(search.best)
+        wrong, x = [], search.best.copy()
+        for contact, stiffness in zip(self._contacts, self._stiffness):
+            defect, _, slip = contact_defects(contact, stiffness)
+            wrong.append(np.linalg.norm(defect, axis=1) + np.linalg.norm(slip, axis=1))
+        largest = self._body.largest(np.concatenate([np.zeros(0), *wrong]))
+        for contact, amount in zip(self._contacts, wrong):
+            motion = np.zeros_like(contact.reaction)
+            motion[:, :-1] = -contact.slip_increment * (amount > WRONG * largest)[:, None]
+            contact.points.add_forces(motion, x)
+        x[self._body.fixed] = search.best[self._body.fixed]
+        return x
 
     def _fall(self, search: Search, factor: float, every: int, x: np.ndarray) -> None:
         """Iterate from ``x`` with one rho while the errors fall, with a tangent every so many iterations."""
@@ -215,13 +233,14 @@ class BoundFixedPoint:
         """Anderson's method from ``x``, until the search ends or the error is ``growth`` times that at the last tangent; with one at once if it is below ``near``."""
         step, tangent = search.step, np.inf  # error at the last tangent
         anderson = Anderson(x.size, self._options.depth, step.total)
-        smallest, due = np.inf, search.left - every
+        smallest, due, limit = np.inf, search.left - every, growth
         while True:
             x, forces = self.preconditioner.rigid.balanced(x, step, maps)
             residual = search.residual(x, maps, forces)
-            if not search.goes_on or search.error > growth * tangent:
+            if not search.goes_on or search.error > limit * tangent:
                 return
             if search.left <= due or search.error < near:
+                limit = growth if near == 0.0 else 1.0  # one at once has to help at once
                 due, near = search.left - every, 0.0
                 useless = search.error > USELESS * tangent
                 # not if less reduction of the error is left than the last tangent has brought
