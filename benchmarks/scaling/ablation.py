@@ -40,14 +40,11 @@ def plain(self, x, g):
 INGREDIENTS = {
     "nothing": ({}, []),
     "Anderson's method": ({}, [(Anderson, "step", plain)]),
-    "tangent near the plane, Newton's method": (
-        dict(newton=False), [(fixed_point, "EVERY", 10**9), (fixed_point, "SOONER", 10**9)],
-    ),
-    "tangents sooner": ({}, [(fixed_point, "SOONER", 10**9)]),
+    "tangent near the plane": ({}, [(fixed_point, "EVERY", 10**9), (fixed_point, "AGAIN", ())]),
+    "further attempts": ({}, [(fixed_point, "AGAIN", ())]),
     "soft motions apart": ({}, [(rigid_balance, "STIFFENED", math.inf)]),
     "motions of contacts": ({}, [(preconditioner, "patch_motions", lambda body, _: body.rigid_modes())]),
     "other rho": (dict(rho=1.0), []),
-    "Newton's method": (dict(newton=False), []),
 }  # fmt: skip
 PUNCHES = {  # case, mesh, displacements of the top face; None: the paper's first cycle
     "A_35451": (dict(case="A", tol=1e-10), dict(divisions=16, layers=8), None),

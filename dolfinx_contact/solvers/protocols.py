@@ -8,7 +8,7 @@ They serve type checkers only; nothing is imported for them at run time.  Arrays
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -311,7 +311,6 @@ class StepLike(Protocol):
     def size(self, forces: np.ndarray) -> float: ...
     def out_of_balance(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None) -> np.ndarray: ...  # fmt: skip
     def derivatives(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None) -> list[tuple]: ...  # fmt: skip
-    def along(self, x: np.ndarray, dx: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None) -> Callable[[float], float]: ...  # fmt: skip
     def residual(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None) -> tuple[np.ndarray, Errors]: ...  # fmt: skip
     def with_reactions(self, forces: np.ndarray) -> np.ndarray: ...
     def by_form(self, x: np.ndarray) -> np.ndarray: ...

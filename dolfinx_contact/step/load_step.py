@@ -164,10 +164,11 @@ class LoadStep:
 
     def _hard(self) -> str:
         """What may help where a state should exist, in words.  Collective."""
-        from dolfinx_contact.step.stalled import slow, tall
+        from dolfinx_contact.step.stalled import slow
 
-        said = tall(self.body, self.contacts), slow(self.body, self.b)
-        return "; ".join(filter(None, ("Smaller load steps help most often", *said)))
+        return "; ".join(
+            filter(None, ("Smaller load steps help most often", slow(self.body, self.b)))
+        )
 
     def _no_state(self) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""
@@ -234,7 +235,9 @@ class LoadStep:
             maps: Of the contacts.
             forces: ``forces(x)``, where they are known; so with the other methods.
         """
-        return self._left(x, self.forces(x) if forces is None else forces, maps)
+        forces = self.free(self.forces(x) if forces is None else forces)
+        self._respond(x, forces, maps)
+        return self.with_reactions(forces)
 
     def derivatives(
         self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
@@ -245,22 +248,6 @@ class LoadStep:
         both = zip(self._asked(x, forces), maps)
         derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
         return derivatives if self._shared is None else self._shared.coupled(derivatives)
-
-    def along(
-        self,
-        x: np.ndarray,
-        dx: np.ndarray,
-        maps: Sequence[MapLike],
-        forces: np.ndarray | None = None,
-    ):
-        """Function of a length: norm of what is left at ``x + length dx``, without a product with K."""
-        forces = self.forces(x) if forces is None else forces
-        change = self.body.multiply(dx)
-
-        def size(length: float) -> float:
-            return self.size(self._left(x + length * dx, forces - length * change, maps))
-
-        return size
 
     # -- errors --------------------------------------------------------------------------------
 
@@ -382,11 +369,6 @@ class LoadStep:
             contact.respond(x, map)
         if self.holding is not None:
             self.holding.share()
-
-    def _left(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> np.ndarray:
-        forces = self.free(forces)
-        self._respond(x, forces, maps)
-        return self.with_reactions(forces)
 
     def with_reactions(self, forces: np.ndarray) -> np.ndarray:
         """Forces plus the contacts' present reactions."""

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Why a search ends without a solution, in words: nodes that change their status again and again, tall elements."""
+"""What is known of a search that ended without a solution, in words: where its error is, nodes that change status, tall elements."""
 
 from __future__ import annotations
 
@@ -16,35 +16,50 @@ from dolfinx_contact.support.checks import place
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
-# Height over width of elements at the surface from which on they are called tall.
-TALL = 2.0
+# Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
+# where few do, it is not that.
+TALL, MANY_CHANGE = 2.0, 0.01
+
+# The error is where its largest parts make up so much of its square.
+MOST = 0.9
 
 # Iterations of an elastic solve from which on its preconditioner is called a bad one; even meshes need 25 to 40.
 MANY = 60
 
 
-def changing(
-    body: BodyLike, contacts: Sequence[ContactLike], statuses: Iterable[Sequence[np.ndarray]]
+def stalled(
+    body: BodyLike,
+    contacts: Sequence[ContactLike],
+    statuses: Iterable[Sequence[np.ndarray]],
+    wrong: Sequence[np.ndarray],
 ) -> str:
-    """How many nodes have changed their status in the last states of a search, and which one most often.  Collective.
+    """At how many nodes the law is not met, where most, how many have changed status in the last states, and what may help.  Collective.
 
     Args:
         body: The body.
         contacts: Its contacts.
         statuses: Of each contact in each of these states, ``shape=(n,)``.
+        wrong: Forces by which the nodes of each miss the law, ``shape=(n,)``.
     """
     every = np.array([np.concatenate(one) for one in statuses])
-    times = (every[1:] != every[:-1]).sum(axis=0)
-    x = np.concatenate([contact.x for contact in contacts])
-    count, nodes = body.total(np.array([np.count_nonzero(times), times.size])).astype(int)
-    if not count:
-        return f"no node has changed its status in the last {len(every)} states, errors fall slowly"
-    most = int(times.argmax()) if times.size else None
-    mine = (0, "") if most is None else (int(times[most]), place(x, most))
-    often, where = max(body.comm.allgather(mine), key=lambda one: one[0])
-    return (
-        f"the search goes from state to state: {count} of {nodes} contact nodes have changed their status in the last "
-        f"{len(every)}, most often ({often} times) the one at {where}"
+    changed = np.count_nonzero((every[1:] != every[:-1]).any(axis=0))
+    changed, nodes = body.total(np.array([changed, every.shape[1]])).astype(int)
+    x, amount = np.concatenate([contact.x for contact in contacts]), np.concatenate(wrong)
+    largest = int(amount.argmax()) if amount.size else None
+    mine = (amount, 0.0, "") if largest is None else (amount, amount[largest], place(x, largest))
+    found = body.comm.allgather(mine)
+    squares = np.sort(np.concatenate([one[0] for one in found]) ** 2)[::-1]
+    few = 1 + int(np.searchsorted(np.cumsum(squares), MOST * squares.sum()))
+    where = max(found, key=lambda one: one[1])[2]
+    return "; ".join(
+        filter(
+            None,
+            (
+                f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
+                f"{changed} have changed their status in the last {len(every)} states",
+                tall(body, contacts) if changed > MANY_CHANGE * nodes else "",
+            ),
+        )
     )
 
 

@@ -65,7 +65,7 @@ class Run:
         if kind == 0:
             self.scene.force.value[1] = math.nan
         elif kind == 1:
-            problem.solver, problem.tol = dc.FixedPoint(max_iterations=1, newton=False), 1e-12
+            problem.solver, problem.tol = dc.FixedPoint(max_iterations=1), 1e-12
         else:
             problem.monitor = self.stop if kind == 2 else self.interrupt
         try:

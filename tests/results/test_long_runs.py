@@ -303,7 +303,7 @@ def test_a_step_is_a_line_of_the_log(caplog):
         for top in ((0, 0, -0.005), (0.001, 0, -0.01)):
             scene.move_top(*top)
             scene.problem.solve()
-        scene.problem.solver = dc.FixedPoint(max_iterations=1, newton=False)
+        scene.problem.solver = dc.FixedPoint(max_iterations=1)
         scene.move_top(0.003, 0, -0.02)
         with pytest.raises(dc.NotConverged):
             scene.problem.solve()

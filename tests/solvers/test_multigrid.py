@@ -174,14 +174,14 @@ def test_a_step_that_stalls_is_refused_with_its_reason():
         solver=dc.FixedPoint(max_iterations=40), tol=1e-8,
     )  # fmt: skip
     scene.move_top(0.001, 0.0005, -0.01)
-    assert scene.problem.solve().iterations <= 60  # 52 on three ranks
+    assert scene.problem.solve().iterations < 100
     scene.move_top(-0.001, 0.0005, -0.01)
     with pytest.raises(dc.NotConverged) as refused:
         scene.problem.solve()
-    assert 100 <= refused.value.step.iterations <= 120  # those of one step of Newton's method more
-    assert refused.match("changed (their|its) status in the last 50")
+    assert refused.value.step.iterations == 100
+    assert refused.match("the law is not met at .* have changed their status in the last 50")
     assert refused.match(
-        "has 100 iterations, .*max_iterations=80.* elements at the surface are 4.8 times as high as wide"
+        "elements at the surface are 4.8 times as high as wide.* has 100 iterations, .*max_iterations=80.* rho 1 .0., .*from the start .40."
     )
     assert "without contact, the body" not in str(refused.value)  # multigrid is good there
 

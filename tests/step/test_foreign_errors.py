@@ -179,7 +179,7 @@ def test_failures_travel_between_processes():
     result = dc.solve_condensed(W, q, dc.Friction(0.3))
     lost = pickle.loads(pickle.dumps(dc.CondensedNotConverged(result)))
     assert np.array_equal(lost.best.reaction, result.reaction) and lost.tried == result.tried
-    scene = scenes.block(cells=(2, 2, 2), solver=dc.FixedPoint(max_iterations=1, newton=False))
+    scene = scenes.block(cells=(2, 2, 2), solver=dc.FixedPoint(max_iterations=1))
     scene.move_top(0.01, 0, -0.01)
     with pytest.raises(dc.NotConverged) as caught:
         scene.problem.solve()

@@ -238,7 +238,7 @@ def test_a_modulus_that_changes_on_one_rank_alone_changes_the_next_step():
 
 @pytest.mark.parametrize(
     "cap, iterations",
-    [(dict(rho=1.0, max_iterations=3, newton=False), 3), (dict(max_seconds=1e-9), 0)],
+    [(dict(rho=1.0, max_iterations=3), 3), (dict(max_seconds=1e-9), 0)],
 )
 def test_failed_step_leaves_the_last_state_and_its_record(cap, iterations):
     """A step that does not converge raises with its error and iterations; nothing computed is lost."""

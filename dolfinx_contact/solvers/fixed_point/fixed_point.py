@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,6 @@ import numpy as np
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
-from dolfinx_contact.solvers.fixed_point.newton_krylov import search_by_newton
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.step.errors import contact_defects
@@ -27,17 +26,18 @@ if TYPE_CHECKING:
 PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
 # The contact is linearised every EVERY iterations: after so many, most nodes have found their status, and easy steps are nearly
-# solved. If that does not converge, it is linearised SOONER. If the error then grows by more than GROWTH, it was too early; each time, the limit rises by the factor RAISE, since a search that begins
-# again at its best state with the same limit would repeat itself for ever. If a
-# tangent has not reduced the error below USELESS times its value by the time the next one is due, the iterations until then use none.
-# If the start has an error below NEAR, as in a repeated step, most nodes have their status at once.
-EVERY, SOONER, GROWTH, RAISE, USELESS, NEAR = 20, 10, 30.0, 10.0, 0.9, 0.1
+# solved. If the error then grows by more than GROWTH, it was too early, and the search goes on from its best state without; the limit rises as
+# much each time, since the same one would repeat the same iterations for ever. If a tangent has not reduced the error below USELESS times its
+# value by the time the next one is due, the iterations until then use none.
+# If the start has an error below NEAR, as in a repeated step, most nodes have their status at once: a tangent then has to help at once.
+EVERY, GROWTH, USELESS, NEAR = 20, 30.0, 0.9, 0.1
 
-# The error must halve within so many iterations, or the next attempt follows: where a tangent or differences mislead, they do so for ever.
+# The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
 PATIENCE = 60
 
-# Nodes with more than this part of the largest defect are put back where they were, before another attempt.
-WRONG = 0.05
+# Further attempts: tangents every so many iterations, and where they begin: at the start of the step (None), or in the best state, of
+# which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no solution nearby.
+AGAIN = (EVERY, None), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
 
 # Limit of all iterations of a step over ``max_iterations`` if one is a multigrid cycle: ten times the iterations of a hard step.
 BUDGET = 2.5
@@ -56,10 +56,9 @@ class FixedPoint:
     contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
     unless the last tangent did not help.
 
-    If the error does not halve within a hundred iterations, the step is tried once more from its start and with tangents more often.
-    If that fails, Newton's method is applied to the same residual, see ``search_by_newton``: an iteration is then one of
-    GMRES, preconditioned by the same correction.  If that also fails, the fixed point continues with another rho.  The solution does
-    not depend on rho.
+    If the error does not halve within sixty iterations, further attempts begin: at the step's start, then in the best state,
+    in which the nodes that miss the law most are put back where they were; at last with tangents twice as often.  If they also fail, the
+    fixed point continues with another rho.  The solution does not depend on rho.  ``step.reason`` lists the attempts.
 
     Attributes:
         map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
@@ -68,9 +67,7 @@ class FixedPoint:
         rho: Augmentation parameter relative to the nodal normal stiffness.  None tries the values of a short list until one
             converges, at the cost of a factorisation each.
         depth: Number of previous corrections that Anderson's method combines.
-        newton: Whether Newton's method may be tried, with the first rho.
-        max_iterations: Iteration limit with each rho, not counting Newton's method.  If iterations are multigrid cycles, a step
-            ends after 2.5 times as many in all.
+        max_iterations: Iteration limit of each attempt.  If iterations are multigrid cycles, a step ends after 2.5 times as many in all.
         max_seconds: Wall time after which the search ends, seconds; infinite by default.
 
     Raises:
@@ -83,7 +80,6 @@ class FixedPoint:
     map: str = "return"
     rho: float | None = None
     depth: int = 20
-    newton: bool = True
     max_iterations: int = 400
     max_seconds: float = math.inf
 
@@ -152,46 +148,62 @@ class BoundFixedPoint:
         start = step.start() if start is None else start
         most = math.inf if self._body.exact else BUDGET * options.max_iterations
         search = Search(step, start, options.max_seconds, most)
-        newton = options.newton
+        attempts: list[str] = []
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            self._fall(search, factor, EVERY, search.best)
-            if not search.over and _slides(step, search.best):
-                break
-            if not search.over and self.preconditioner.soften():
-                self._fall(search, factor, EVERY, search.best)
-            for every, again in ((EVERY, True), (EVERY, False), (SOONER, False)):
-                if not search.over and options.max_iterations > EVERY:
-                    self._fall(search, factor, every, start if again else self._stuck(search))
-            if newton and not search.over:
-                search_by_newton(search, self.preconditioner, search.best)
-                newton = False
+            for name, every, x in self._attempts(search, factor, start):
+                attempts.append(f"{name} ({search.iterations})")
+                self._fall(search, factor, every, x)
+                if search.over or _slides(step, search.best):
+                    break
             if search.over or _slides(step, search.best, tried=True):
                 break
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
-        stopped = search.within or _slides(step, search.best, tried=True)
-        return SolverResult(*found, reason="" if stopped else self._stalled(search, most))
+        tried = (
+            f"attempts, begun after so many iterations: {', '.join(attempts)}"
+            if attempts[1:]
+            else ""
+        )
+        if not search.within and not _slides(step, search.best, tried=True):
+            tried = "; ".join(filter(None, (self._stalled(search, most), tried)))
+        return SolverResult(*found, reason=tried)
+
+    def _attempts(self, search: Search, factor: float, start: np.ndarray) -> Iterator[tuple]:
+        """Attempts with one rho: a name, every how many iterations there is a tangent, where it begins.  Collective."""
+        yield f"rho {factor:g}", EVERY, search.best
+        if self.preconditioner.soften():
+            yield "soft motions", EVERY, search.best
+        for every, part in AGAIN if self._options.max_iterations > EVERY else ():
+            if part is None:
+                yield "from the start", every, start
+            else:
+                yield "nodes put back", every, self._put_back(search, part)
 
     def _stalled(self, search: Search, most: float) -> str:
         """What stands in the way, in words.  Collective."""
-        from dolfinx_contact.step.stalled import changing
+        from dolfinx_contact.step.stalled import stalled
 
-        said = changing(self._body, self._contacts, search.statuses)
+        said = stalled(self._body, self._contacts, search.statuses, self._wrong(search))
         if search.iterations < most:
             return said
         twice = 2 * self._options.max_iterations
         return f"{said}; a step of this size has {most:.0f} iterations, FixedPoint(max_iterations={twice}) gives it twice as many"
 
-    def _stuck(self, search: Search) -> np.ndarray:
-        """The best state, but nodes that it is wrong at are back where they were: their slip may have no solution nearby.  Collective."""
+    def _wrong(self, search: Search) -> list[np.ndarray]:
+        """Forces by which the nodes of the best state miss the law, ``shape=(n,)`` for each contact.  Collective."""
         search.step.measure(search.best)
-        wrong, x = [], search.best.copy()
+        wrong = []
         for contact, stiffness in zip(self._contacts, self._stiffness):
             defect, _, slip = contact_defects(contact, stiffness)
             wrong.append(np.linalg.norm(defect, axis=1) + np.linalg.norm(slip, axis=1))
+        return wrong
+
+    def _put_back(self, search: Search, part: float) -> np.ndarray:
+        """The best state, but nodes that miss the law by more than a part of the most do not slip.  Collective."""
+        wrong, x = self._wrong(search), search.best.copy()
         largest = self._body.largest(np.concatenate([np.zeros(0), *wrong]))
         for contact, amount in zip(self._contacts, wrong):
             motion = np.zeros_like(contact.reaction)
-            motion[:, :-1] = -contact.slip_increment * (amount > WRONG * largest)[:, None]
+            motion[:, :-1] = -contact.slip_increment * (amount > part * largest)[:, None]
             contact.points.add_forces(motion, x)
         x[self._body.fixed] = search.best[self._body.fixed]
         return x
@@ -206,7 +218,7 @@ class BoundFixedPoint:
             maps = self._set(factor, known)
             near = 0.0 if known and self.preconditioner.linearised else near
             self._accelerate(search, maps, search.nearest, every, near, growth)
-            near, growth = 0.0, RAISE * growth
+            near, growth = 0.0, GROWTH * growth
 
     def _set(self, factor: float, known: bool) -> list:
         """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
