@@ -29,7 +29,6 @@ class Search:
         step: The ``LoadStep``.
         x: Initial displacement, owned degrees of freedom.
         max_seconds: Wall time after which the search ends, seconds.
-        most: Iterations after which it ends.
 
     Attributes:
         best: The iterate with the smallest errors.
@@ -38,18 +37,18 @@ class Search:
         forward_error: Forward error of the best iterate, see docs/errors.md.
         iterations: Iterations so far.
         left: Iterations left in the present attempt.
-        over: Whether the step is solved, or time or iterations have run out.
+        over: Whether the step is solved, or time has run out.
         statuses: Statuses of each contact in the last iterates.
     """
 
-    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float, most: float = math.inf):
+    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float):
         self.step, self.best, self.nearest = step, x, x
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = self._attempt = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=WINDOW + 1)
         self.iterations = self.left = 0
         self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT)
-        self._start, self._seconds, self._most = perf_counter(), max_seconds, most
+        self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
     def begin(self, x: np.ndarray, most: int, patience: float = math.inf) -> None:
@@ -93,8 +92,7 @@ class Search:
         solved = errors.acts and max(self.error, change) <= tol
         stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error
         rounded = stalled and errors.within(0.0)
-        spent = self.iterations >= self._most
-        self.over = bool(solved or rounded or spent or self._late())
+        self.over = bool(solved or rounded or self._late())
         return residual
 
     def _contraction(self) -> float:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
 # where few do, it is not that.
-TALL, MANY_CHANGE = 2.0, 0.01
+TALL, MANY_CHANGE = 2.0, 0.05
 
 # The error is where its largest parts make up so much of its square.
 MOST = 0.9
@@ -32,7 +32,7 @@ def stalled(
     contacts: Sequence[ContactLike],
     statuses: Iterable[Sequence[np.ndarray]],
     wrong: Sequence[np.ndarray],
-) -> str:
+) -> list[str]:
     """At how many nodes the law is not met, where most, how many have changed status in the last states, and what may help.  Collective.
 
     Args:
@@ -51,28 +51,23 @@ def stalled(
     squares = np.sort(np.concatenate([one[0] for one in found]) ** 2)[::-1]
     few = 1 + int(np.searchsorted(np.cumsum(squares), MOST * squares.sum()))
     where = max(found, key=lambda one: one[1])[2]
-    return "; ".join(
-        filter(
-            None,
-            (
-                f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
-                f"{changed} have changed their status in the last {len(every)} states",
-                tall(body, contacts) if changed > MANY_CHANGE * nodes else "",
-            ),
-        )
-    )
+    said = [
+        f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
+        f"{changed} have changed their status in the last {len(every)} states",
+    ]
+    return said + tall(body, contacts) if changed > MANY_CHANGE * nodes else said
 
 
-def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> str:
-    """That elements at the surface are tall, in the mean, and what to do; empty if they are not.  Collective."""
+def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> list[str]:
+    """That elements at the surface are tall, in the mean, and what to do; nothing if they are not.  Collective."""
     ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
     if total <= TALL * count:
-        return ""
-    return (
+        return []
+    return [
         f"elements at the surface are {total / count:.1f} times as high as wide, which makes steps harder where nodes slip: "
         "make them flatter there"
-    )
+    ]
 
 
 def slow(body: BodyLike, forces: np.ndarray) -> str:

@@ -168,28 +168,26 @@ def test_checkpoint_continues_to_the_same_bits(tmp_path):
 
 
 def test_a_step_that_stalls_is_refused_with_its_reason():
-    """Tall elements under a strongly crossed slip rule, reversed: refused within a budget that is enough for a usual step, and said why."""
+    """Tall elements under a strongly crossed slip rule, reversed: refused with few iterations for an attempt, and said why and what was tried."""
     scene = scenes.block(
         cells=(16, 16, 2), mu=(0.3, 0.03), p=(1e-3, 1.0), petsc_options=MULTIGRID,
         solver=dc.FixedPoint(max_iterations=40), tol=1e-8,
     )  # fmt: skip
     scene.move_top(0.001, 0.0005, -0.01)
-    assert scene.problem.solve().iterations < 100
+    assert scene.problem.solve().error <= 1e-8
     scene.move_top(-0.001, 0.0005, -0.01)
     with pytest.raises(dc.NotConverged) as refused:
         scene.problem.solve()
-    assert refused.value.step.iterations == 100
+    assert 400 < refused.value.step.iterations <= 3 * 6 * 40
     assert refused.match("the law is not met at .* have changed their status in the last 50")
-    assert refused.match(
-        "elements at the surface are 4.8 times as high as wide.* has 100 iterations, .*max_iterations=80.* rho 1 .0., .*from the start .40."
-    )
-    assert "without contact, the body" not in str(refused.value)  # multigrid is good there
+    assert refused.match("elements at the surface are 4.8 times as high as wide")
+    assert refused.match(r"rho 1 \(0\), from the start \(40\), nodes put back \(80\)")
 
 
 def test_a_body_that_is_hard_for_its_preconditioner_is_named():
     """Iterations preconditioned by Jacobi, as bad as multigrid on a graded mesh: the refusal counts those of the body alone, and advises factors."""
     options = dict(ksp_type="cg", pc_type="jacobi", ksp_rtol=1e-10)
-    solver = dc.FixedPoint(max_iterations=40)
+    solver = dc.FixedPoint(max_iterations=15)
     scene = scenes.block(cells=(12, 12, 6), solver=solver, petsc_options=options)
     scene.move_top(0.001, 0.0005, -0.01)
     with pytest.raises(

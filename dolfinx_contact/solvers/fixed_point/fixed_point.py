@@ -37,10 +37,10 @@ PATIENCE = 60
 
 # Further attempts: tangents every so many iterations, and where they begin: at the start of the step (None), or in the best state, of
 # which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no solution nearby.
-AGAIN = (EVERY, None), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
-
-# Limit of all iterations of a step over ``max_iterations`` if one is a multigrid cycle: ten times the iterations of a hard step.
-BUDGET = 2.5
+AGAIN = (
+    ("from the start", EVERY, None), ("nodes put back", EVERY, 0.5),
+    ("nodes put back", EVERY, 0.05), ("nodes put back", EVERY // 2, 0.05),
+)  # fmt: skip
 
 # If corrections grow by this factor, Anderson's differences mislead.
 ASTRAY = 1e3
@@ -67,7 +67,7 @@ class FixedPoint:
         rho: Augmentation parameter relative to the nodal normal stiffness.  None tries the values of a short list until one
             converges, at the cost of a factorisation each.
         depth: Number of previous corrections that Anderson's method combines.
-        max_iterations: Iteration limit of each attempt.  If iterations are multigrid cycles, a step ends after 2.5 times as many in all.
+        max_iterations: Iteration limit of each attempt.
         max_seconds: Wall time after which the search ends, seconds; infinite by default.
 
     Raises:
@@ -146,47 +146,34 @@ class BoundFixedPoint:
         """
         options = self._options
         start = step.start() if start is None else start
-        most = math.inf if self._body.exact else BUDGET * options.max_iterations
-        search = Search(step, start, options.max_seconds, most)
-        attempts: list[str] = []
-        for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            for name, every, x in self._attempts(search, factor, start):
-                attempts.append(f"{name} ({search.iterations})")
-                self._fall(search, factor, every, x)
-                if search.over or _slides(step, search.best):
-                    break
-            if search.over or _slides(step, search.best, tried=True):
+        search, attempts = Search(step, start, options.max_seconds), []
+        for name, factor, every, x in self._attempts(search, start):
+            attempts.append(f"{name} ({search.iterations})")
+            self._fall(search, factor, every, x)
+            if search.over or _slides(step, search.best):
                 break
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
-        tried = (
-            f"attempts, begun after so many iterations: {', '.join(attempts)}"
-            if attempts[1:]
-            else ""
-        )
+        said = []
         if not search.within and not _slides(step, search.best, tried=True):
-            tried = "; ".join(filter(None, (self._stalled(search, most), tried)))
-        return SolverResult(*found, reason=tried)
+            from dolfinx_contact.step.stalled import stalled
 
-    def _attempts(self, search: Search, factor: float, start: np.ndarray) -> Iterator[tuple]:
-        """Attempts with one rho: a name, every how many iterations there is a tangent, where it begins.  Collective."""
-        yield f"rho {factor:g}", EVERY, search.best
-        if self.preconditioner.soften():
-            yield "soft motions", EVERY, search.best
-        for every, part in AGAIN if self._options.max_iterations > EVERY else ():
-            if part is None:
-                yield "from the start", every, start
-            else:
-                yield "nodes put back", every, self._put_back(search, part)
+            said += stalled(self._body, self._contacts, search.statuses, self._wrong(search))
+        if len(attempts) > 1:
+            said.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
+        return SolverResult(*found, reason="; ".join(said))
 
-    def _stalled(self, search: Search, most: float) -> str:
-        """What stands in the way, in words.  Collective."""
-        from dolfinx_contact.step.stalled import stalled
-
-        said = stalled(self._body, self._contacts, search.statuses, self._wrong(search))
-        if search.iterations < most:
-            return said
-        twice = 2 * self._options.max_iterations
-        return f"{said}; a step of this size has {most:.0f} iterations, FixedPoint(max_iterations={twice}) gives it twice as many"
+    def _attempts(self, search: Search, start: np.ndarray) -> Iterator[tuple]:
+        """The attempts in their order: a name, rho, every how many iterations there is a tangent, and where it begins.  Collective."""
+        options = self._options
+        again = AGAIN if options.max_iterations > EVERY else ()
+        for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
+            yield f"rho {factor:g}", factor, EVERY, search.best
+            if self.preconditioner.soften():
+                yield "soft motions", factor, EVERY, search.best
+            for name, every, part in again:
+                yield name, factor, every, start if part is None else self._put_back(search, part)
+            if _slides(search.step, search.best, tried=True):
+                return
 
     def _wrong(self, search: Search) -> list[np.ndarray]:
         """Forces by which the nodes of the best state miss the law, ``shape=(n,)`` for each contact.  Collective."""
