@@ -369,9 +369,16 @@ class Contact(Guarded):
         """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
         return self._placement.changes or (self._laws.textured and not self.surface.deformable)
 
-    def texture_turned(self, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
-        """By how much the surface's texture at other positions differs from that in use, see ``Laws.turned``."""
-        return self._laws.turned(self, at, frame)
+    @property
+    def body_has_axes(self) -> bool:
+        """Whether axes are a field of the body on a rigid surface, which does not carry them; the same on all ranks."""
+        return self._laws.body_has_axes and not self.surface.deformable
+
+    def axes_turned(
+        self, at: np.ndarray, frame: np.ndarray, points: ContactPoints | None = None
+    ) -> np.ndarray | float:
+        """By how much axes at other positions differ from those in use, see ``Laws.turned``."""
+        return self._laws.turned(self, at, frame, points)
 
     @property
     def placement(self) -> Placement:

@@ -127,28 +127,36 @@ def directions(contact: ContactLike, friction: Friction) -> np.ndarray:
 
 
 def _axes(contact: ContactLike, friction: Friction):
-    if not is_field(given := friction.given()["axes"]):
-        return given
-    if friction.of == "surface":
-        return axes_at(contact, given, contact.home, contact.own_frame)
-    return axes_at(contact, given, None, contact.frame)
+    if not is_field(friction.given()["axes"]):
+        return friction.given()["axes"]
+    frame = contact.own_frame if friction.of == "surface" else contact.frame
+    return axes_at(contact, friction, contact.home, frame, contact.points)
 
 
 def axes_at(
-    contact: ContactLike, given: Any, at: np.ndarray | None, frame: np.ndarray
+    contact: ContactLike,
+    friction: Friction,
+    at: np.ndarray,
+    frame: np.ndarray,
+    points: Any,
 ) -> np.ndarray:
-    """Axes at positions of the nodes in frames there, ``shape=(n, 2)``; None is the reference positions.
+    """A field's axes in frames, ``shape=(n, 2)``: of the surface at these positions on it, of the body at the nodes.
+
+    Deformable bodies carry theirs with them.
 
     Raises:
         ValueError: values of another shape, or along the normal.  On this rank alone.
     """
     n, gdim = contact.nodes.size, contact.points.dim
-    values = _values(contact, "axes", given, {}, at)
+    given, of = friction.given()["axes"], friction.of
+    values = _values(contact, "axes", given, {}, at if of == "surface" else None)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
+    if contact.surface.deformable:
+        values = contact.placement.directions(values, of, points)
     if len(values) == 2:
         along = values
     elif contact.surface.curved:

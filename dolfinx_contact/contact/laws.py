@@ -11,6 +11,7 @@ import numpy as np
 
 from dolfinx_contact.contact.friction_field import axes_at, directed, directions, followed, on_nodes
 from dolfinx_contact.contact.input import check_law, warn_of_percent
+from dolfinx_contact.contact.placement import times
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.collective import raised_together
@@ -74,18 +75,34 @@ class Laws:
         """Whether axes of friction depend on where nodes are on the surface."""
         return self._field is not None and self._field.of == "surface"
 
-    def turned(self, contact: ContactLike, at: np.ndarray, frame: np.ndarray) -> np.ndarray | float:
-        """Radians by which axes of the surface's texture at other positions differ from those in use, ``shape=(n,)``; 0 of others.
+    @property
+    def body_has_axes(self) -> bool:
+        """Whether a field of axes belongs to the body."""
+        return self._field is not None and self._field.of == "body" and is_field(self._field.given()["axes"])  # fmt: skip
+
+    def turned(
+        self, contact: ContactLike, at: np.ndarray, frame: np.ndarray, points: Any = None
+    ) -> np.ndarray | float:
+        """Radians by which axes at other positions differ from those in use, ``shape=(n,)``: of a texture of the surface, or of bodies.
 
         Args:
             contact: The contact.
             at: Positions relative to the surface, ``shape=(n, gdim)``.
             frame: Frames there, in its axes.
+            points: Rows there, of a deformable surface.
         """
-        if not self.textured:
+        used, deformable = self.friction.axes, contact.surface.deformable
+        if not (self.textured or deformable) or self.friction.isotropic or contact.points.dim == 2:
             return 0.0
-        new, old = axes_at(contact, self._field.given()["axes"], at, frame), self.friction.axes
-        return np.abs(new[:, 0] * old[:, 1] - new[:, 1] * old[:, 0])
+        given = self._field is not None and is_field(self._field.given()["axes"])
+        new = axes_at(contact, self._field, at, frame, points) if given else used
+        if deformable:  # their frames turn as well
+            old = contact.frame
+            new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
+            new = times(old[:, :2], np.einsum("ni,nij->nj", new, frame[:, :2]))
+            used = (1.0, 0.0) if used is None else used
+        used = np.broadcast_to(used, new.shape)
+        return np.abs(new[:, 0] * used[:, 1] - new[:, 1] * used[:, 0])
 
     @property
     def follow_pressure(self) -> bool:

@@ -70,6 +70,7 @@ class MortarPlacement(Placement):
     def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
         """See ``Placement``: where the undeformed bodies stand.  Collective."""
         self.now = self.placed(np.zeros(self._owned[0]))
+        self._undeformed = self.now.frame
 
     def placed(self, u: np.ndarray) -> Placed:
         """Frames, gaps and rows of the state with a displacement of owned degrees of freedom.  Collective."""
@@ -84,14 +85,16 @@ class MortarPlacement(Placement):
             rows = rows._replace(covered=rows.covered & ~self._left)
             normals = _without(self._supported, self._mean_normals(slaves))
             turns = self._turns(moved, there)
-            axis = None if self.surface.axis is None else turns[0] @ self.surface.axis
+            axis = self.surface.axis
+            if axis is not None and len(axis) == 3:
+                axis = self._slave.deformed(moved)[self._mine] @ axis
             frames = frames_along(normals, axis, self.x, self.surface)
         # What presses on a node, in the undeformed state; textures of the other side are asked for there.
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
         flat[~rows.covered] = self._apart  # opposite nothing: closed
         points = MortarPoints(self._dofs, frames, self._owned, rows, self._master, self._comm)
-        points.met, points.turns = self._supported, turns
+        points.met, points.turns, points.sides = self._supported, turns, (moved, there)
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
         found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
@@ -113,6 +116,22 @@ class MortarPlacement(Placement):
             mirror[k], foot[k] = -1.0, 2.0 * plane
             pairs = [[np.concatenate((x, mirror * x + foot)) for x in pair] for pair in pairs]
         return [nearest_rotation((y - y.mean(axis=0)).T @ (x - x.mean(axis=0))) for x, y in pairs]
+
+    def directions(self, given: np.ndarray, of: str, points: MortarPoints) -> np.ndarray:
+        """Directions on the undeformed side that has them, ``shape=(gdim, n)`` or in its frames ``(2, n)``, where these rows are: ``(gdim, n)``.
+
+        They are lines of the material, of the slave at its nodes, of the other side opposite to these.
+        """
+        if len(given) == 2:
+            given = np.einsum("nij,in->jn", self._undeformed[:, :2], given)
+        moved, there = points.sides
+        if of == "body":
+            lines = self._slave.deformed(moved)[self._mine]
+        else:
+            lines = self._master.deformed(there)
+            lines = (points.m @ lines.reshape(len(lines), -1)).reshape(-1, *lines.shape[1:])
+            lines[points.alone] = points.turns[1]
+        return np.einsum("nij,jn->in", lines, given)
 
     def twist(self, u: np.ndarray) -> float:
         """Radians by which one side has turned against the other since the start of the step.  Collective."""
@@ -412,6 +431,17 @@ class Skin:
         sides = zip(self.sides, self._nodes, self._inside_out)
         return [side.moved(there[nodes], signs) for side, nodes, signs in sides], there
 
+    def deformed(self, there: np.ndarray) -> np.ndarray:
+        """What becomes of directions at each node if nodes are ``there``, ``shape=(m, gdim, gdim)``: mean of its facets by area; three dimensions."""
+        sums, areas = np.zeros((self.numbers.size, 3, 3)), np.zeros((self.numbers.size, 1, 1))
+        for side, nodes in zip(self.sides, self._nodes):
+            corners = nodes[:, side.corners]
+            (before, area), (after, _) = (_spanned(x[corners]) for x in (self.x, there))
+            parts = area[:, None, None] * after @ np.linalg.inv(before)
+            np.add.at(sums, nodes, parts[:, None])
+            np.add.at(areas, nodes, area[:, None, None, None])
+        return np.divide(sums, areas, np.zeros_like(sums), where=areas > 0.0)
+
     def keep(self, nodes: np.ndarray) -> None:
         """Of the facets keep those that have any of these nodes, which are numbered by their places here, others by -1."""
         places = np.full(self.numbers.size, -1)
@@ -436,6 +466,7 @@ class MortarPoints(ContactPoints):
         alone: Nodes opposite nothing, or next to nothing, which never touch, ``shape=(n,)``.
         share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
         turns: Rotations of both sides as a whole, ``shape=(gdim, gdim)`` each.
+        sides: Where the nodes of both are, ``shape=(m, gdim)`` each.
         met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
         m: Coefficients of the opposite nodes, sparse, ``shape=(n, m)``.
         stiffer: Of the last ``stiffness``: that of each node over that of the nodes opposite, along the normal, ``shape=(n,)``.
@@ -444,6 +475,7 @@ class MortarPoints(ContactPoints):
     local = False
     met: np.ndarray
     turns: list[np.ndarray]
+    sides: tuple[np.ndarray, np.ndarray]
     stiffer: np.ndarray
 
     def __init__(
@@ -588,6 +620,14 @@ class MortarPoints(ContactPoints):
         eye = np.eye(self.dim - 1)
         tangential = np.linalg.solve(eye + alone.tangential @ along, alone.tangential)
         return NodalStiffness(normal, tangential)
+
+
+def _spanned(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two edges of triangles or the diagonals of squares, and their unit normal, ``shape=(m, 3, 3)``, as columns, and the areas that they span."""
+    one, other = x[:, -1] - x[:, 0], x[:, 1] - x[:, 2 * (x.shape[1] - 3)]
+    normal = np.cross(one, other)
+    area = np.linalg.norm(normal, axis=1)
+    return np.stack((one, other, normal / area[:, None]), axis=2), area
 
 
 def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

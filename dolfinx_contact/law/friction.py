@@ -95,7 +95,8 @@ class Friction(Guarded):
             field may also return directions in space, ``shape=(3, n)``, of any length, which are projected on the surface.
         of: Owner of ``axes`` given as a field. "body": evaluated at reference positions; surfaces that rotate do not turn the
             directions. "surface": a callable of positions on the surface; directions move and rotate with the surface. ``mu``,
-            ``p`` and wear always belong to the body.
+            ``p`` and wear always belong to the body. On a deformable surface, directions are lines of the owner's material. On a
+            rigid one, those of a body that turns stay as they are in space, with a warning.
 
     ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as for DOLFINx's ``interpolate``, that return
     values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them at

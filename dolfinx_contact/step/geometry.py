@@ -121,7 +121,7 @@ def _missed(
     missed = way - (0.0 if placement.now.way is None else placement.now.way)
     return (
         _pressed(contact, stiffness, distance + contact.opening, contact.points.closed),
-        np.hypot(size * angle, friction * contact.texture_turned(y, own)),
+        np.hypot(size * angle, friction * contact.axes_turned(y, own)),
         _dragged(contact, stiffness, missed),
     )
 
@@ -135,7 +135,8 @@ def _missed_by_rows(
     friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
     came = contact.points.alone & ~ended.alone  # opposite something at the end alone
     with raised_together(contact.comm):  # the user's functions
-        turned = friction * contact.texture_turned(ended.home, ended.frame)
+        turned = friction * contact.axes_turned(ended.home, ended.frame, ended.points)
+    turned[ended.alone] = 0.0
     return (
         _pressed(
             contact,

@@ -19,6 +19,7 @@ from mpi4py import MPI
 
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
+from dolfinx_contact.contact.fields import nearest_rotation
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
@@ -44,6 +45,9 @@ GROWN = 0.1
 
 # Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
 SLOPES, ALONG = 0.1, 1e-5
+
+# Radians by which a body may turn under axes that stay in space, though they are the body's.
+STAY = 0.05
 
 # What is rounding, over the size of a facet.
 CLEAR = 1e-6
@@ -110,6 +114,7 @@ class Unseen:
         self._sided = self._near  # which side carries the unknowns is to be looked at
         self._held = self._near  # whether supports take friction from nodes
         self._turn, self._turns = None, bool(contacts)  # to be looked at
+        self._stay = [contact for contact in contacts if contact.body_has_axes]
 
     def check(
         self,
@@ -137,6 +142,7 @@ class Unseen:
         self._near = [contact for contact in self._near if not _check_strayed(contact)]
         self._sided = [contact for contact in self._sided if not _check_side(contact)]
         self._held = [contact for contact in self._held if not _check_held(body, contact)]
+        self._stay = [contact for contact in self._stay if not _check_axes(contact, u)]
         self._turns = self._turns and not body.nonlinear
         if self._turns:
             self._check_turn(body, contacts, stiffness, u)
@@ -261,6 +267,24 @@ def _check_side(contact: ContactLike) -> bool:
                 f"{contact!r}: its facets are {size:.2g} times as large as those opposite, and its body is {stiff:.2g} times as stiff. "
                 "The finer or softer side is better as the one that carries the unknowns: swap both, and compare."
             )
+    return True
+
+
+def _check_axes(contact: ContactLike, u: np.ndarray) -> bool:
+    """Warn of a body that has turned on a rigid surface, which carries no axes of a body; whether it has.  Collective."""
+    x, dim = contact.x[:, :3], contact.points.dim
+    pairs = np.stack((x, x + u[contact.displacements.dofs(contact.nodes)]))
+    count = contact.comm.allreduce(len(x))
+    pairs -= contact.comm.allreduce(pairs.sum(axis=1))[:, None] / max(count, 1)
+    turned = nearest_rotation(contact.comm.allreduce(pairs[1].T @ pairs[0]))
+    angle = float(np.arccos(np.clip((np.trace(turned) - dim + 2) / 2, -1.0, 1.0)))
+    if angle <= STAY:
+        return False
+    warnings.warn(
+        f"the body has turned by {angle:.2g} rad at {contact!r}, and axes of friction that a callable or Function gives for it stay as they are "
+        "in space on a rigid surface: let the surface turn instead of the body, or, if the axes are the surface's, say of='surface'.",
+        stacklevel=5,
+    )
     return True
 
 

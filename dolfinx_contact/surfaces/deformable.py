@@ -30,8 +30,8 @@ class DeformableSurface(Surface):
         V: The space of displacements, the same as that of the contact.
         facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
         axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node.
-            It belongs to the slave and turns with the best-fit rotation of the slave's facets.  Needed unless friction is
-            isotropic or bodies two-dimensional.
+            It belongs to the slave, and is a line of its material at each node.  Needed unless friction is isotropic or bodies
+            two-dimensional.
         sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end.  "small" pairs them
             once, in the undeformed state; this saves time if slip stays below a fraction of a facet.
 
