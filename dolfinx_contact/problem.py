@@ -60,6 +60,7 @@ from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together
+from dolfinx_contact.support.interrupts import uninterrupted
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
@@ -281,31 +282,43 @@ class ContactProblem(Guarded):
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
-        stood = self._states.places()
         self._states.take_variables()
+        stood, told = self._states.standing(), self._told()
         try:
             with raised_together(self.body.comm):  # whatever happens on one rank alone
                 done, found = self._step(start)
+                with uninterrupted():
+                    self._states.advance(found.x)
+                    self._large = self._large or check_size(self.body, found.x, self.u.x.array)
+                    now = self.u.x.array, done.counts, self._large
+                    self._unseen.check(self.body, self.contacts, self._stiffness, *now)
+                    warn_of_rounding(done, self.tol)
+                    warn_of_contact(done, self.tol)
+                    self._turned = self._turned or warn_of_corners(self.body, self.contacts)
+                    self._log(lambda: f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
         except BaseException as failure:
-            said = f"step failed: {type(failure).__name__}: {failure}"
-            self._log(lambda: said)
-            stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
-            if self.body.comm.allreduce(stopped, op=MPI.LOR):
-                self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
-                self.body.forget()
-            self._states.restore(stood)
+            with uninterrupted():
+                self._undo(failure, stood, told)
             raise_interrupt(failure)
             raise
-        self._states.advance(found.x)
-        self._log(lambda: f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
-        self._large = self._large or check_size(self.body, found.x, self.u.x.array)
-        self._unseen.check(
-            self.body, self.contacts, self._stiffness, self.u.x.array, done.counts, self._large
-        )
-        warn_of_rounding(done, self.tol)
-        warn_of_contact(done, self.tol)
-        self._turned = self._turned or warn_of_corners(self.body, self.contacts)
         return done
+
+    def _undo(self, failure: BaseException, stood: tuple, told: tuple) -> None:
+        """Nothing has happened, whatever did: also while a step that has converged was booked.  Collective."""
+        said = f"step failed: {type(failure).__name__}: {failure}"
+        self._log(lambda: said)
+        stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
+        if self.body.comm.allreduce(stopped, op=MPI.LOR):
+            self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
+            self.body.forget()
+        self._states.stand_again(stood)
+        self._large, self._turned, looked_at = told
+        vars(self._unseen).update(looked_at)
+
+    def _told(self) -> tuple:
+        """What users have been told of, and what is still to be looked at."""
+        looked_at = vars(self._unseen).items()
+        return self._large, self._turned, {k: v[:] if isinstance(v, list) else v for k, v in looked_at}  # fmt: skip
 
     def _step(self, start: float) -> tuple[Step, SolverResult]:
         """Record and displacement of a step that has converged, shown and given to internal variables."""

@@ -101,13 +101,23 @@ class ProblemStates:
             contact.surface.end_step()
         self._keep(self._kept)
 
-    def restore(self, places: list[tuple] | None = None) -> None:
-        """Show the last converged state; surfaces at ``places``, if these are given."""
-        if places is not None:
-            self._put_surfaces(places)
+    def restore(self) -> None:
+        """Show the last converged state."""
         self._body.show(self.last)
         for part in self._parts:
             part.restore()
+
+    def standing(self) -> tuple:
+        """Where a step begins, for ``stand_again``: this state, the one before, and surfaces where the user has put them."""
+        histories = [part.history() for part in self._parts]
+        return self._kept._replace(histories=histories), self._before, self.places()
+
+    def stand_again(self, stood: tuple) -> None:
+        """Show the state in which a step began, whatever has happened since.  Collective."""
+        kept, before, places = stood
+        self._go_to(kept)
+        self._before = before
+        self._put_surfaces(places)
 
     def rewind(self) -> None:
         """Go back by one step, see ``ContactProblem.rewind``.  Collective."""
