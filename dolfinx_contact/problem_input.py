@@ -284,7 +284,7 @@ def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
         with raised_together(body.comm):
             height = surface.distance(surface.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
-        inside = body.largest(-contact.gap)
+        inside = body.largest(-contact.present.gap)
         if highest < DEEP * deepest:
             said = f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
         elif inside > DEEP * body.extent:

@@ -231,8 +231,9 @@ class _Run:
         while True:
             length = int(max(min(self.record["next"], self._longest), SHORTEST))
             left = cycles - self.record["done"]
-            length = -(-left // -(-left // length))  # the last ones have one length
-            row = self._tried(length, 2 * length >= left)
+            length = _even(left, length)
+            late = 2 * length >= left or _even(left - length, length) <= SHORTEST
+            row = self._tried(length, late)
             if row is not None:
                 self.show()
                 return row
@@ -355,6 +356,11 @@ class _Run:
         return max(parts) / CHANGE
 
 
+def _even(left: int, length: int) -> int:
+    """The length of the next jump, such that the last ones have one length."""
+    return -(-left // -(-left // length))
+
+
 def _parts(length: int, number: int) -> list[int]:
     """A jump's length in so many parts, as equal as can be."""
     return np.diff(np.arange(number + 1) * length // number).tolist()
@@ -369,6 +375,24 @@ def _extrapolation(length: int, fewer: int, more: int) -> float:
 def _part(of: float, whole: float) -> float:
     """``of`` over ``whole``, none of nothing."""
     return of / whole if of > 0.0 and whole > 0.0 else np.inf if of > 0.0 else 0.0
+
+
+def _is_record(record: Any) -> bool:
+    """Whether it is one that ``_Run`` has written; errors say that it is not, too."""
+    counts = [record[name] for name in ("done", "simulated", "rejected")]
+    at, *errors = record["measured"]
+    rows = [[row[of] for of in ("volume", "depth", "cycle", "jump", "simulated")] for row in record["table"]]  # fmt: skip
+    whole = [*counts, at, *(number for row in rows for number in row[2:])]
+    return (
+        all(type(number) is int and number >= 0 for number in whole)
+        and np.isfinite([record["next"], *(number for row in rows for number in row)]).all()
+        and record["next"] >= SHORTEST
+        and len(errors) == 3
+        and min(errors) >= 0.0
+        and at < len(rows)
+        and np.array_equal(np.cumsum([row[3] for row in rows]), [row[2] for row in rows])
+        and counts[0] == rows[-1][2]
+    )
 
 
 class _Folder:
@@ -403,11 +427,7 @@ class _Folder:
         file = self._path / RECORD
         try:
             record = json.loads(file.read_text())
-            done = record["done"]
-            complete = (
-                done == record["table"][-1]["cycle"]
-                and {"simulated", "rejected", "next", "measured"} <= record.keys()
-            )
+            done, complete = record["done"], _is_record(record)
         except FileNotFoundError:
             self._path.mkdir(parents=True, exist_ok=True)
             return None

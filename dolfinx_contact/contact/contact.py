@@ -123,6 +123,7 @@ class Contact(Guarded):
         self._area: np.ndarray | None = None
         self._opposite_area: np.ndarray | None = None
         self._repeats, self._wearing = 1.0, None
+        self._bare: np.ndarray | None = None  # nodes opposite nothing where the last step has ended
         self._axial: bool | None = None
         self._dragged: np.ndarray | None = None
         self._forget_supported()
@@ -452,8 +453,11 @@ class Contact(Guarded):
         """Let gaps of open nodes on a deformable surface be those at a displacement, not of the rows that a step used.  Collective."""
         if self.surface.deformable and self.changes:
             gap, points = self._placement.gap_at(u)
-            gap = np.where(self.reaction[:, -1] > 0.0, self.gap, gap + self.opening_at(points))
+            gap = np.where(
+                self.reaction[:, -1] > 0.0, self.present.gap, gap + self.opening_at(points)
+            )
             self.take(gap=gap)
+            self._bare = points.alone
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
@@ -531,7 +535,9 @@ class Contact(Guarded):
     def respond(self, u: fem.Function | np.ndarray, map: MapLike) -> None:
         """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
         self.move(u)
-        reaction, status = map(self.law_of(self.law), self.reaction, self.gap, self.slip_increment)
+        reaction, status = map(
+            self.law_of(self.law), self.reaction, self.present.gap, self.slip_increment
+        )
         self.take(reaction=reaction, status=status)
 
     def respond_with_derivatives(
@@ -544,7 +550,7 @@ class Contact(Guarded):
             ``shape=(n, gdim, gdim)`` each, local frame.
         """
         self.move(u)
-        state = self.reaction, self.gap, self.slip_increment
+        state = self.reaction, self.present.gap, self.slip_increment
         reaction, status, *derivatives = map.linearised(self.law_of(self.law), *state)
         self.take(reaction=reaction, status=status)
         return tuple(derivatives)
@@ -577,6 +583,7 @@ class Contact(Guarded):
         if self.follows:
             self._placement.stand(self._wanders)
         self._history.begin(self._placement.at_rest())
+        self._bare = None
         self._settle_here()
 
     def _settle_here(self) -> None:
@@ -727,11 +734,11 @@ class Contact(Guarded):
 
     def history(self) -> tuple:
         """All that a step leaves to the next one, for ``go_back``."""
-        return self._placement.now, self._history.kept()
+        return self._placement.now, self._bare, self._history.kept()
 
     def go_back(self, history: tuple) -> None:
         """Take back what ``history`` returned."""
-        placed, kept = history
+        placed, self._bare, kept = history
         self._placement.restore(placed)
         self._history.go_back(kept)
         self._laws.restore(self)
@@ -804,8 +811,9 @@ class Contact(Guarded):
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance to the surface, ``shape=(n,)``, length units; negative is penetration."""
-        return self.present.gap
+        """Distance to the surface, ``shape=(n,)``, length units; negative is penetration, infinite where nothing is opposite."""
+        bare = self.points.alone if self._bare is None else self._bare
+        return frozen(np.where(bare, np.inf, self.present.gap)) if bare.any() else self.present.gap
 
     @property
     def slip_increment(self) -> np.ndarray:
@@ -874,7 +882,7 @@ class Contact(Guarded):
         Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``; ``gap`` shows penetration.
         """
         return self.law.bipotential_gap(
-            self.reaction, np.maximum(self.gap, 0.0), self.slip_increment
+            self.reaction, np.maximum(self.present.gap, 0.0), self.slip_increment
         )
 
     @property

@@ -166,7 +166,7 @@ class SharedNodes:
         starts = np.zeros((n + 2, m, n, dim))
         for k, (contact, rows, slots) in enumerate(zip(self._contacts, self._rows, self._slots)):
             contact.move(x)
-            self._motions.append((contact.gap[rows], contact.slip_increment[rows]))
+            self._motions.append((contact.present.gap[rows], contact.slip_increment[rows]))
             starts[:2, slots, k] = contact.last.reaction[rows], contact.reaction[rows]
             starts[2 + k, :, k] = times(self._frames[:, k], self._force)
         starts = starts.reshape(n + 2, m, n * dim)

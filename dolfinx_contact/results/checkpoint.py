@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 # Of what is written.  Files of before 27 November 2026 have none.
-VERSION = 1
+VERSION = 2
 
-# Ends of the names of arrays that not every history has, and of those that files without a version may lack.
-LATELY = ("law_of_last_step", "home", "rotation_of_plane", "_placed", "_worn", "fixed")
-NEWER = (*LATELY, "laws", "texture", "rigid_plane", "slip_kept")
+# Ends of the names of arrays that not every history has, and of those that files of the first version, and of none, may lack.
+SOME = ("law_of_last_step", "home", "rotation_of_plane")
+LACKING = [(*SOME, "_placed", "_worn", "fixed", "laws", "texture", "rigid_plane", "slip_kept"), (*SOME, "_placed", "_worn", "fixed"), SOME]  # fmt: skip
 
 ANEW = "Take another one, or write it anew with problem.save."
 
@@ -284,7 +284,7 @@ def _check_arrays(
     path: str | PathLike[str], file: dict[str, np.ndarray], like: dict[str, np.ndarray]
 ) -> None:
     """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
-    older = NEWER if "version" not in file else LATELY
+    older = LACKING[int(_number(path, file, "version", 0))]
     missing = [name for name in like if name not in file and not name.endswith(older)]
     if missing:
         raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {ANEW}")
@@ -299,6 +299,8 @@ def _check_arrays(
             )
         if not surface and not name.startswith("state_") and not np.isfinite(array).all():
             raise ValueError(f"checkpoint {path}: {name} must be finite. {ANEW}")
+        if name.endswith("_worn") and (array < 0.0).any():
+            raise ValueError(f"checkpoint {path}: {name} must not be negative. {ANEW}")
         if name not in like or surface:
             continue
         rows = () if name.endswith("_plane") else file[_nodes_of(name)].shape

@@ -82,6 +82,10 @@ def gathered(comm: MPI.Comm, *arrays: np.ndarray) -> list[np.ndarray]:
     ]
 
 
+# What vertices of second-order tetrahedra, which are no contact nodes, are given.
+RECOVERED = ("pressure", "shear_traction", "slip", "wear_depth")
+
+
 def padded(values: np.ndarray) -> np.ndarray:
     """Vectors and tensors of two dimensions, ``shape=(n, 2)`` or ``(n, 4)``, with zeros as the third component."""
     size = values.shape[1]
@@ -208,6 +212,7 @@ class SurfaceMesh:
             "dissipation": contact.dissipation,
             "reaction": padded(np.einsum("ni,nij->nj", reaction, frames)),
             "normal": padded(frames[:, -1]),
+            "covered": contact.covered,
             "contact_node": np.ones(contact.nodes.size, dtype=np.int32),
         }
         values = {
@@ -216,7 +221,8 @@ class SurfaceMesh:
         gap = self._gaps(moved)
         values["gap"], values["displacement"] = gathered(self._comm, gap, padded(moved))
         if TRIANGLE6 in self._cells:
-            recovered(self._x, self._cells[TRIANGLE6], values)
+            names = (*RECOVERED, "gap") if contact.surface.deformable else RECOVERED
+            recovered(self._x, self._cells[TRIANGLE6], values, names)
         if LINE3 in self._cells:
             recovered_on_axis(self._cells[LINE3], values)
         return Mesh(self._x, self._cells, values, {})
@@ -230,7 +236,9 @@ class SurfaceMesh:
     def _gaps(self, moved: np.ndarray) -> np.ndarray:
         """Of all nodes: of those that are no contact nodes the distance from the surface where it stands."""
         contact = self._contact
-        gaps = self._placed(contact.gap)
+        gaps = self._placed(
+            np.where(np.isinf(contact.gap), np.nan, contact.gap)
+        )  # pictures leave it out
         others = np.setdiff1d(np.arange(self._owned.size), self._at)
         if others.size and not contact.surface.deformable:
             dim = moved.shape[1]
@@ -255,7 +263,12 @@ def recovered_on_axis(lines: np.ndarray, values: dict[str, np.ndarray]) -> None:
             values["status"][first] = values["status"][middle]
 
 
-def recovered(x: np.ndarray, triangles: np.ndarray, values: dict[str, np.ndarray]) -> None:
+def recovered(
+    x: np.ndarray,
+    triangles: np.ndarray,
+    values: dict[str, np.ndarray],
+    names: tuple[str, ...] = RECOVERED,
+) -> None:
     r"""Give vertices of second-order triangles values that fit those at the middles of edges, in place.
 
     .. math:: v_i = \sum_T A_T (m_{ij} + m_{ki} - m_{jk}) \Big/ \sum_T A_T
@@ -268,6 +281,7 @@ def recovered(x: np.ndarray, triangles: np.ndarray, values: dict[str, np.ndarray
         x: Positions of nodes.
         triangles: Nodes in VTK's order, ``shape=(m, 6)``.
         values: By name; ``contact_node`` says which nodes stay as they are.
+        names: Of those that are recovered.
     """
     free = values["contact_node"] == 0
     corners, middles = triangles[:, :3], triangles[:, 3:]
@@ -276,7 +290,7 @@ def recovered(x: np.ndarray, triangles: np.ndarray, values: dict[str, np.ndarray
     total = np.zeros(len(x))
     np.add.at(total, corners, area[:, None])
     free &= total > 0.0
-    for name in ("pressure", "shear_traction", "slip", "wear_depth"):
+    for name in names:
         array = values[name]
         m = array[middles]
         linear = m + np.roll(m, 1, axis=1) - np.roll(m, -1, axis=1)

@@ -164,7 +164,7 @@ def record(
         ):
             of_vertices = max(of_vertices, contact.penetration_between(found.x))
         gap += contact.bipotential_gap.sum()
-        penetration = max(penetration, -contact.gap.min(initial=0.0))
+        penetration = max(penetration, -contact.present.gap.min(initial=0.0))
     return Step(
         error=errors.error,
         slip_error=errors.slip_error,

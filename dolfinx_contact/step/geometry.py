@@ -154,7 +154,7 @@ def _pressed(
 ) -> np.ndarray:
     """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
     presses = contact.reaction[:, -1] > 0.0
-    off = np.where(presses, np.abs(exact - contact.gap), np.maximum(-exact, 0.0))
+    off = np.where(presses, np.abs(exact - contact.present.gap), np.maximum(-exact, 0.0))
     off[closed] = 0.0
     return stiffness.normal * off
 

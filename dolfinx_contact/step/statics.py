@@ -203,7 +203,7 @@ class Statics:
         """
         for contact in self._contacts:
             contact.move(self.start)
-        gaps = np.concatenate([np.zeros(0), *(contact.gap for contact in self._contacts)])
+        gaps = np.concatenate([np.zeros(0), *(contact.present.gap for contact in self._contacts)])
         mine = self._motion[:, -1], gaps, self._balancing[:, -1]
         parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
         motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
@@ -219,7 +219,7 @@ class Statics:
         left, weights = [np.zeros((0, dim))], [np.zeros((0, dim))]
         for contact in self._contacts:
             contact.move(self.last)
-            off = np.column_stack((contact.slip_increment, contact.gap - contact.last.gap))
+            off = np.column_stack((contact.slip_increment, contact.present.gap - contact.last.gap))
             left.append(times(principal_axes(contact.free_friction, len(off), dim), off))
             weights.append(np.repeat(contact.last.reaction[:, -1:], dim, axis=1))
         off, weight = np.concatenate(left), np.concatenate(weights)
@@ -250,7 +250,7 @@ class Statics:
         least = ROUNDING * self._body.largest(self._pressures())
         for contact, of in zip(self._contacts, step.stiffness):
             map = ReturnMap(of.normal, of.normal)
-            state = contact.reaction, contact.gap, contact.slip_increment
+            state = contact.reaction, contact.present.gap, contact.slip_increment
             by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
             rounding = contact_rounding(contact, of, x)[:, -1]
             by_motion[contact.reaction[:, -1] <= np.maximum(least, rounding)] = 0.0

@@ -124,6 +124,6 @@ def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol
         alone = before[k][:, -1] / step.stiffness[k].normal
         pressed = np.maximum(alone if moved is None else of.motion(moved)[:, -1], 0.0)
         beside = contact.covered == 0.0  # left the other side along the surface: that is no gap
-        way = pressed + np.where(beside, 0.0, np.maximum(contact.gap, 0.0))
+        way = pressed + np.where(beside, 0.0, np.maximum(contact.present.gap, 0.0))
         part = np.where(at, np.divide(pressed, way, np.ones_like(way), where=way > 0.0), 1.0)
         contact.take(slip_increment=part[:, None] * contact.slip_increment)

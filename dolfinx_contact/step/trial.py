@@ -88,7 +88,7 @@ def _deepest(
     depths = [np.zeros(1)]
     for contact in contacts:
         contact.move(trial)
-        depths.append(-contact.gap / unit(contact))
+        depths.append(-contact.present.gap / unit(contact))
     return body.largest(np.concatenate(depths))
 
 

@@ -110,7 +110,7 @@ def _moved(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
     if not contact.surface.curved or contact.surface.deformable:
-        return contact.points.motion(motions), contact.gap
+        return contact.points.motion(motions), contact.present.gap
     surface, there = contact.placement.ended_at(u)
     y = surface.relative(there)
     frames = surface.turned(surface.frames(y))

@@ -148,7 +148,7 @@ class Unseen:
             self._check_turn(body, contacts, stiffness, u)
         self._apart = self._apart and not large and counts.stick + counts.slip == 0
         if self._apart and counts.open:
-            smallest = -max(body.highest(-contact.gap) for contact in contacts)
+            smallest = -max(body.highest(-contact.present.gap) for contact in contacts)
             self._apart = not _check_apart(body, contacts, smallest)
             self._approach = (
                 self._apart and self._approach and not _tell_gap(body, contacts, smallest)
@@ -214,7 +214,7 @@ class Unseen:
         pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
         if not self._turns or length <= GROWN * body.largest(np.concatenate(pushed)):
             return
-        if length <= -body.highest(-np.concatenate([contact.gap for contact in contacts])):
+        if length <= -body.highest(-np.concatenate([contact.present.gap for contact in contacts])):
             return
         share = self._turn.share(contacts, u[: body.size], angles)
         if share > GROWN and 0.5 * theta**2 > GROWN * mean_strain(body.displacements, u):
@@ -394,7 +394,7 @@ def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
     """Log that one surface of several is nowhere near; whether that is said, or it is touched.  Collective."""
     if body.largest(contact.reaction[:, -1]) > 0.0:
         return True
-    gap = -body.highest(-contact.gap)
+    gap = -body.highest(-contact.present.gap)
     far = gap > FAR * body.extent
     if far and contact.comm.rank == 0:
         LOG.warning(

@@ -80,7 +80,7 @@ class Wearing:
         """
         kappa, depth = self._kappa, self._depth
         forces = [contact.reaction[:, -1] for contact in self._contacts]
-        gap = np.concatenate([contact.gap for contact in self._contacts])
+        gap = np.concatenate([contact.present.gap for contact in self._contacts])
         exact, start, c = self._worn("present", forces)
         pushed = np.concatenate(forces) + kappa * (depth - np.maximum(gap, 0.0))
         implicit = np.maximum((start + c * pushed) / (1.0 + c * kappa), start)

@@ -124,7 +124,7 @@ class SurfaceBalance:
         for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
             contact.move(self._x)
             springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
-            pressure = np.maximum(contact.reaction[:, -1] - map.normal * contact.gap, 0.0)
+            pressure = np.maximum(contact.reaction[:, -1] - map.normal * contact.present.gap, 0.0)
             bound = contact.friction.mu.max(axis=-1) * pressure
             carried = np.where(np.abs(axes[:, :-1]) >= CARRIED, axes[:, :-1], 0.0)
             node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
@@ -150,7 +150,7 @@ class SurfaceBalance:
         parts = [np.zeros((2, 0))]
         for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
             contact.move(self._x)
-            pressure = contact.reaction[:, -1] - map.normal * contact.gap
+            pressure = contact.reaction[:, -1] - map.normal * contact.present.gap
             parts.append(np.array([pressure, map.normal])[:, axes[:, -1, motion] > 0])
         at_first, rho = np.concatenate(parts, axis=1)
         spring, target, moved = surfaces.springs[motion], surfaces.driving()[motion], 0.0
@@ -179,7 +179,9 @@ class SurfaceBalance:
         parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
         for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
             contact.move(self._x)
-            parts.append(np.array([contact.reaction[:, -1] - map.normal * contact.gap, map.normal]))
+            parts.append(
+                np.array([contact.reaction[:, -1] - map.normal * contact.present.gap, map.normal])
+            )
             columns.append(axes[:, -1, which])
         (at_first, rho), D = np.concatenate(parts, axis=1), np.concatenate(columns)
         springs, target, n = surfaces.springs[which], surfaces.driving()[which], which.size

@@ -216,8 +216,8 @@ class DrivenSurfaces:
             for contact, axes in zip(self._contacts, self.axes):
                 contact.move(x)
                 # By less than rounding none touches: on one node alone a plane that may tilt has no equilibrium.
-                touching = np.abs(contact.gap) <= contact.gap_rounding(x)
-                gap, rate = np.where(touching, 0.0, contact.gap), sign * axes[:, -1, motion]
+                touching = np.abs(contact.present.gap) <= contact.gap_rounding(x)
+                gap, rate = np.where(touching, 0.0, contact.present.gap), sign * axes[:, -1, motion]
                 push = 0.0 if near is not None else sign * driving[motion] / contact.rho
                 ways.append(np.array([gap, gap + push])[:, rate > 0] / rate[rate > 0])
             first, far = np.concatenate(ways, axis=1).min(axis=1)

@@ -1,5 +1,7 @@
 """Wear over many cycles: jumps against cycles simulated one by one and closed forms; killed runs, ranks, and what is refused."""
 
+import json
+
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
@@ -258,12 +260,37 @@ def test_a_killed_programme_goes_on(tmp_path):
     assert 0.0 < further.profile_error == pytest.approx(resumed.profile_error, rel=0.1)
     with pytest.raises(ValueError, match="has done 102 cycles, more than cycles = 10"):
         dc.cycle_jump(again.problem, cycle, 10, path=path)
-    COMM.barrier()
-    if COMM.rank == 0:
-        (path / "record.json").write_text("{}")
-    COMM.barrier()
-    with pytest.raises(ValueError, match="no record of cycle_jump"):
-        dc.cycle_jump(again.problem, cycle, 100, path=path)
+    good, nan = (
+        COMM.bcast((path / "record.json").read_text() if COMM.rank == 0 else None),
+        float("nan"),
+    )
+    row = json.loads(good)["table"][0]
+    changes = (
+        dict(measured=[]), dict(measured=[99, 0.1, 0.1, 0.1]), dict(measured=[0, 0.1, nan, 0.1]), dict(next="x"), dict(next=nan), dict(next=0.0),
+        dict(simulated="a"), dict(simulated=1.5), dict(rejected=-1), dict(done=101), dict(table=[]), dict(table=[{"cycle": 102}]),
+        dict(table=[row | {"cycle": 102}]), dict(table=[row | {"jump": 102, "cycle": 102, "volume": nan}]), dict(table=3),
+    )  # fmt: skip
+    for text in (
+        "",
+        "{}",
+        "[]",
+        "3",
+        *(json.dumps(json.loads(good) | change) for change in changes),
+    ):
+        COMM.barrier()
+        if COMM.rank == 0:
+            (path / "record.json").write_text(text)
+        COMM.barrier()
+        with pytest.raises(ValueError, match="no record of cycle_jump"):
+            dc.cycle_jump(again.problem, cycle, 104, path=path)
+
+
+def test_short_jumps_have_an_error_that_is_known():
+    """Jumps of three cycles at most, whose last ones are of two: one of three is measured, whatever is left over, and the error is no infinite one."""
+    for cycles in (10, 13, 16):
+        found = dc.cycle_jump(*pad_of(1e-6, 0.2), cycles, longest=3)
+        assert max(row["jump"] for row in found.table) == 3 or cycles == 10
+        assert found.reached and found.profile_error < ACCURACY
 
 
 def pad_of(*given):

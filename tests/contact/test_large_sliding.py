@@ -11,6 +11,7 @@ from dolfinx import fem, mesh
 from two_bodies import COMM, E, blocks, dc, rubber, stress
 
 from dolfinx_contact.compat import cell_points, functionspace
+from dolfinx_contact.results.meshes import SurfaceMesh
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from mechanics.two_blocks import box, joined, pair
 
@@ -196,7 +197,41 @@ def test_checkpoints_and_rewind(tmp_path):
             parted.problem.load(file)
     for name in ("reaction", "slip_path", "dissipation", "gap", "covered"):
         one, other = (getattr(scene.contact, name) for scene in (whole, parted))
+        assert np.array_equal(np.isinf(one), np.isinf(other))  # gaps where nothing is opposite
+        one, other = one[np.isfinite(one)], other[np.isfinite(other)]
         assert largest(one - other) <= (0.0 if COMM.size == 1 else 1e-9 * largest(one))
+
+
+@pytest.mark.parametrize(
+    "cell, degree", [("quadrilateral", 1), ("triangle", 2), ("tetrahedron", 2)]
+)
+@pytest.mark.parametrize("sliding", ["large", "small"])
+def test_there_is_no_gap_where_nothing_is_opposite(cell, degree, sliding, tmp_path):
+    """Below the other body the gap is what separates both; elsewhere it is infinite, in files NaN, before and after steps, and as nodes slide out."""
+    cells = ((2, 2, 1), (4, 4, 1)) if cell == "tetrahedron" else ((4, 2), (8, 2))
+    scene = blocks(cell, degree, cells, size=(1.0, 2.0), sliding=sliding, swapped=True, gap=0.3)
+    contact = scene.contact
+
+    def check(away):
+        off = np.abs(contact.x[:, : len(cells[0]) - 1] - 1.0 - away).max(axis=1)
+        assert np.isinf(contact.gap[off > 0.8]).all()
+        assert largest(contact.gap[off < 0.4] - 0.3) <= 1e-9
+        assert np.array_equal(np.isinf(contact.gap), contact.covered == 0.0)
+
+    axes = len(cells[0]) - 1
+    check(np.zeros(axes))
+    slides = (0.0, 0.25) if sliding == "large" else (0.0,)
+    for slid in slides:
+        scene.way.value[0] = slid
+        scene.problem.solve()
+        check(np.array([slid, 0.0][:axes]))
+    mesh = SurfaceMesh(contact)(scene.u)
+    if COMM.rank == 0:
+        gap, bare = mesh.at_nodes["gap"], mesh.at_nodes["covered"] == 0.0
+        assert np.isnan(gap[bare & (mesh.at_nodes["contact_node"] == 1)]).all()
+        assert np.nanmin(gap) == pytest.approx(0.3) and np.nanmax(gap) == pytest.approx(0.3)
+    scene.problem.reset()
+    check(np.zeros(axes))
 
 
 @pytest.mark.slow

@@ -156,6 +156,26 @@ def test_histories(tmp_path):
         assert largest(one - other) <= (0.0 if COMM.size == 1 else 1e-9 * largest(one)), name
 
 
+@pytest.mark.parametrize("change", ["left out", "negative", "cut", "NaN"])
+def test_a_checkpoint_with_other_depths_of_the_other_side_is_refused(change, tmp_path):
+    """Depths of the other body that are not there, or that no step leaves: a ValueError on all ranks that names them, and nothing changes."""
+    scene, _ = rubbed("quadrilateral", 1)
+    file = COMM.bcast(str(tmp_path / "state.npz"))
+    scene.problem.save(file)
+    COMM.barrier()
+    if COMM.rank == 0:
+        with np.load(file) as saved:
+            arrays = dict(saved)
+        worn = arrays.pop("0_worn")
+        others = dict(negative=-1e-9 - worn, cut=worn[1:], NaN=np.full_like(worn, np.nan))
+        np.savez(file, **arrays, **({"0_worn": others[change]} if change in others else {}))
+    COMM.barrier()
+    before = scene.contact.worn_volume()
+    with pytest.raises(ValueError, match="0_worn"):
+        scene.problem.load(file)
+    assert scene.contact.worn_volume() == before
+
+
 def test_rigid_surfaces_do_not_wear():
     """A coefficient of the other side is refused where that is rigid, and a negative one everywhere."""
     scene = blocks("quadrilateral", 1, ((2, 2), (3, 2)))

@@ -354,7 +354,7 @@ class BoundCondensedNewton:
         for contact, moved in zip(self._contacts, self._moved):
             contact.move(displacement)
             slip = contact.slip_increment - np.where(moved[:, None], 0.0, contact.known_slip)
-            rows.append(np.column_stack((slip, contact.gap)))
+            rows.append(np.column_stack((slip, contact.present.gap)))
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
         held = anchored.of(displacement)

@@ -176,7 +176,7 @@ class Descent:
         self._step.out_of_balance(x, asked, forces)
         maps = []
         for contact, map in zip(self._step.contacts, self._maps):
-            pressed, gap = contact.reaction[:, -1], contact.gap
+            pressed, gap = contact.reaction[:, -1], contact.present.gap
             off = (gap > 0.0) & (pressed > 0.0) & (pressed < 2 * map.normal * gap)
             off &= contact.friction.frictionless
             normal = np.where(off, 0.5 * pressed / np.where(off, gap, 1.0), map.normal)
