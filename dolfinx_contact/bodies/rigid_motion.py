@@ -96,10 +96,10 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
 
 
 def free_modes(body: BodyLike) -> np.ndarray:
-    """Orthonormal rigid motions that vanish at fixed degrees of freedom.  Collective."""
-    of = body.displacements
+    """Orthonormal rigid motions of each part of the body that vanish at fixed degrees of freedom.  Collective."""
+    of, (part, parts) = body.displacements, body.parts
     x = of.x[: of.count, : of.dim]
-    modes = of.vectors(rigid_modes(x, np.ones(len(x), dtype=bool), body.comm))
+    modes = np.concatenate([of.vectors(rigid_modes(x, part[: of.count] == k, body.comm)) for k in range(parts)], axis=1)  # fmt: skip
     modes[body.fixed] = 0.0
     products = body.total(modes.T @ modes)
     values, vectors = np.linalg.eigh(products)

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 import scenes
 import ufl
-from dolfinx import fem
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import dolfinx_contact as dc
+from dolfinx_contact.compat import functionspace
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
+from mechanics.two_blocks import box, joined
 
 SHAPES = [(6, 4), (4, 4, 2)]
 
@@ -107,3 +109,49 @@ def test_fixed_point_solves_what_soft_springs_hold(cells, stiffness):
         )
         (_, found), (_, expected) = scenes.gathered(own.contact), scenes.gathered(newton.contact)
         assert np.abs(found - expected).max() <= bound * np.abs(expected).max()
+
+
+def pushed(cell, far, modulus, solver, **options):
+    """A loose block with weight on a plane, which a spring at its side pushes by several lengths, each from rest; beside it, maybe, what is far."""
+    d = 2 if cell == "quadrilateral" else 3
+    wide = (10, 4) if d == 2 else (5, 2, 2)
+    parts = [box(cell, np.zeros(d), [1.0, *[0.5] * (d - 2), 0.3], wide)]
+    if far != "nothing":
+        parts.append(box(cell, [5.0, *[0.0] * (d - 1)], [6.0] + [1.0] * (d - 1), (3,) * d))
+    domain = joined(parts)
+    V = functionspace(domain, ("Lagrange", 1, (d,)))
+    u, v, DG = fem.Function(V), ufl.TestFunction(V), functionspace(domain, ("DG", 0))
+    E, weight, way = fem.Function(DG), fem.Function(DG), fem.Constant(domain, 0.0)
+    E.interpolate(lambda x: np.where(x[0] < 2, 1e6, modulus * 1e6))
+    weight.interpolate(lambda x: np.where(x[0] < 2, 10.0, 0.0))
+    foot, side, end = (mesh.locate_entities_boundary(domain, d - 1, lambda x, k=k, at=at: (np.isclose(x[k], at)) & ((x[0] < 2) == (at < 2))) for k, at in ((d - 1, 0.0), (0, 0.0), (0, 6.0)))  # fmt: skip
+    tags = mesh.meshtags(domain, d - 1, np.sort(side), np.ones(side.size, np.int32))
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)(1)
+    strain = lambda w: ufl.sym(ufl.grad(w))  # noqa: E731
+    F = E * ufl.inner(strain(u), strain(v)) * ufl.dx + weight * v[d - 1] * ufl.dx
+    F -= 1e3 * (way - u[0]) * v[0] * ds
+    bcs = [fem.dirichletbc(np.zeros(d), fem.locate_dofs_topological(V, d - 1, end), V)] if far == "clamped" else []  # fmt: skip
+    if far == "on springs":
+        soft = fem.Function(DG)
+        soft.interpolate(lambda x: np.where(x[0] < 2, 0.0, 10.0))
+        F += soft * ufl.inner(u, v) * ufl.dx
+    contact = dc.Contact(V, foot, dc.RigidPlane(np.zeros(d), np.eye(d)[-1]), dc.Friction(0.3))
+    problem = dc.ContactProblem(F, u, [contact], bcs=bcs, solver=solver, **options)
+    problem.solve()
+    rest, found = problem.snapshot(), []
+    for way.value in (0.01, 0.1, 0.4):
+        problem.restore(rest)
+        found.append((problem.solve().iterations, *contact.force()))
+    return np.array(found)
+
+
+@pytest.mark.ranks
+@pytest.mark.parametrize("far, modulus", [("clamped", 1.0), ("clamped", 1e4), ("on springs", 1.0)])
+@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
+@pytest.mark.parametrize("solver", [None, dc.FixedPoint()])
+def test_what_is_far_away_in_the_mesh_changes_nothing(cell, far, modulus, solver):
+    """A loose block is pushed as it is alone, in about as many iterations, if an unrelated body is in the mesh."""
+    alone = pushed(cell, "nothing", 1.0, solver)
+    found = pushed(cell, far, modulus, solver)
+    assert np.abs(found[:, 1:] - alone[:, 1:]).max() <= 1e-6 * np.abs(alone[:, 1:]).max()
+    assert (found[:, 0] <= 1.5 * alone[:, 0] + 5).all()
