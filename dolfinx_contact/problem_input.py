@@ -278,6 +278,7 @@ def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
         if contact.surface.deformable:
+            _check_through(contact, body)
             continue
         surface, gdim = contact.surface, contact.points.dim
         x = body.displacements.x[:, :gdim]
@@ -292,6 +293,19 @@ def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
         else:
             continue
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
+
+
+def _check_through(contact: ContactLike, body: BodyLike) -> None:
+    """Refuse two sides of one part of the mesh that would be pressed together through it.  Collective."""
+    part, parts = body.parts
+    sides = contact.nodes, contact.placement.opposite
+    here = body.total([np.bincount(part[nodes], minlength=parts) for nodes in sides])
+    depth = body.largest(np.array([contact.placement.depth]))
+    if (here > 0).all(axis=0).any() and depth > 1.0:
+        raise ValueError(
+            f"both sides of {contact!r} belong to one part of the mesh, and stand inside each other by {depth:.3g} times the smallest facet, "
+            "like its head and its foot: the gap would be closed through the body. Name facets that face each other."
+        )
 
 
 def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:

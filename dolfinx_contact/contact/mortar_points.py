@@ -271,6 +271,12 @@ class MortarPlacement(Placement):
         return np.where(there.points.alone, np.maximum(gap, self._apart), gap), there.points
 
     @property
+    def depth(self) -> float:
+        """See ``Placement``."""
+        lengths = np.append(-self.now.flat[~self.now.points.alone], 0.0)
+        return float(lengths.max()) / self._master.smallest
+
+    @property
     def changes(self) -> bool:
         """See ``Placement``."""
         return self.surface.sliding == "large"

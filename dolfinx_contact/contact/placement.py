@@ -156,6 +156,11 @@ class Placement:
         return np.ones(len(self.x))
 
     @property
+    def depth(self) -> float:
+        """By how many of its smallest facets nodes of this rank are on the wrong side of an undeformed deformable surface."""
+        return 0.0
+
+    @property
     def opposite(self) -> np.ndarray:
         """This rank's nodes on the other side, local indices."""
         return np.zeros(0, dtype=int)

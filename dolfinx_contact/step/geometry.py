@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 REPEATED = 5
 
 # The same with deformable surfaces, and differences of ends that are mixed.
-RENEWED, MIXED = 12, 3
+RENEWED, MIXED = 24, 5
 
 # Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
 TURNED, PLACES = 0.5, 32

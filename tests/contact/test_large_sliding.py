@@ -525,3 +525,34 @@ def test_steady_sliding_takes_one_solution(monkeypatch):
     assert 0.0 < step.geometry_error <= 1e-3
     force = scene.contact.force()
     assert force[0] == pytest.approx(-0.3 * force[1], rel=0.01)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.1, 0.17, 0.2, 0.21, 0.23, 0.25, 0.3, 0.45])
+def test_a_loose_block_between_elastic_plates(x):
+    """Without friction it goes to where plates that bulge hold it, wherever its edges are in their meshes; both forces are one, and what presses is nearly the same."""
+    corners = (((x, 0), (x + 1, 1), (5, 4)), ((-0.5, -0.6), (2, 0), (8, 3)), ((-0.5, 1), (2, 1.6), (7, 3)))  # fmt: skip
+    domain = joined([box("quadrilateral", *of) for of in corners])
+    V = functionspace(domain, ("Lagrange", 1, (2,)))
+    u, way = fem.Function(V), fem.Constant(domain, np.zeros(2))
+    strain = lambda w: ufl.sym(ufl.grad(w))  # noqa: E731
+    F = 1000.0 / 1.3 * ufl.inner(strain(u) + 0.75 * ufl.div(u) * ufl.Identity(2), strain(ufl.TestFunction(V))) * ufl.dx  # fmt: skip
+
+    def inside(X):
+        return (np.abs(X[0] - x - 0.5) < 0.5 + 1e-9) & (np.abs(X[1] - 0.5) < 0.5 + 1e-9)
+
+    domain.topology.create_connectivity(1, 2)
+    block = mesh.locate_entities(domain, 2, inside)
+    links = domain.topology.connectivity(1, 2)
+
+    def side(y, of_block):
+        faces = mesh.locate_entities_boundary(domain, 1, lambda X: np.isclose(X[1], y))
+        mine = np.array([links.links(face)[0] in block for face in faces], dtype=bool)
+        return faces[mine == of_block]
+
+    bcs = [fem.dirichletbc(value, fem.locate_dofs_topological(V, 1, side(y, False)), V) for y, value in ((-0.6, np.zeros(2)), (1.6, way))]  # fmt: skip
+    contacts = [dc.Contact(V, side(y, True), dc.DeformableSurface(V, side(y, False)), 0.0) for y in (0.0, 1.0)]  # fmt: skip
+    problem = dc.ContactProblem(F, u, contacts, bcs=bcs, undetermined="nearest")
+    way.value[:] = (0.0, -0.01)
+    assert problem.solve().geometry_error <= 1e-3
+    low, high = (contact.force() for contact in contacts)
+    assert 5.9 < low[1] < 6.1 and np.abs(low + high).max() <= 1e-6 * low[1]

@@ -12,7 +12,7 @@ from dolfinx.mesh import locate_entities_boundary
 from two_bodies import COMM, E, blocks, dc, patch
 
 from dolfinx_contact.compat import functionspace
-from mechanics.two_blocks import pair
+from mechanics.two_blocks import box, joined, pair
 
 pytestmark = pytest.mark.ranks
 
@@ -291,3 +291,29 @@ def test_a_surface_of_another_mesh_is_refused(cells, swapped):
     surface = dc.DeformableSurface(spaces[other], facets[other])
     with pytest.raises(ValueError, match="V of the DeformableSurface is a space of another mesh"):
         dc.Contact(spaces[mine], facets[mine], surface, dc.Friction(0.3))
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle", "hexahedron", "tetrahedron"])
+def test_head_and_foot_of_one_body_are_no_pair(cell):
+    """A gap that would close through the body is refused; faces of one body that face each other, as of a slit, are a pair."""
+    d = 2 if cell in ("quadrilateral", "triangle") else 3
+    block = joined([box(cell, np.zeros(d), np.ones(d), (3,) * d)])
+    slit = joined([box(cell, np.zeros(d), np.ones(d), (4,) * d)])
+    x = slit.geometry.x
+    for domain, faces, whole in ((block, (0.0, 1.0), True), (slit, (0.0, 1.0), False)):
+        if not whole:  # bent to a ring that is nearly closed: its ends face each other
+            angle = 0.25 * np.pi - 1.9 * np.pi * x[:, d - 1]
+            radius = 1.0 + x[:, 0]
+            x[:, 0], x[:, d - 1] = radius * np.sin(angle), radius * np.cos(angle)
+        V = functionspace(domain, ("Lagrange", 1, (d,)))
+        u = fem.Function(V)
+        ends = [np.pi * (0.25 - 1.9 * at) for at in faces]
+        marks = [lambda X, at=at: np.isclose(X[d - 1], at) for at in faces] if whole else [lambda X, a=a: np.isclose(X[0] * np.cos(a) - X[d - 1] * np.sin(a), 0.0) & (X[0] * np.sin(a) + X[d - 1] * np.cos(a) > 0) for a in ends]  # fmt: skip
+        foot, head = (mesh.locate_entities_boundary(domain, d - 1, mark) for mark in marks)
+        contact = dc.Contact(V, foot, dc.DeformableSurface(V, head), dc.Friction(0.0))
+        F = ufl.inner(u, ufl.TestFunction(V)) * ufl.dx
+        if whole:
+            with pytest.raises(ValueError, match="closed through the body"):
+                dc.ContactProblem(F, u, [contact])
+        else:
+            dc.ContactProblem(F, u, [contact])
