@@ -260,3 +260,24 @@ def test_the_error_of_one_contact():
         starts=[-q * [1, 1, 1, 1, 1, 1.01]], newton_iterations=1, max_iterations=1, **arguments
     )
     assert state.error <= 1e-6 and state.local_error == pytest.approx(0.09 / 0.91, rel=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e2, 1e4, 1e5, 1e7, 1e9])
+def test_contacts_in_units_of_their_own(unit):
+    """Coupled contacts whose units differ: their reactions are those in one unit, or it is refused, where compliances are so far apart that the smallest cannot be told from none."""
+    for seed in (1, 96, 105):
+        rng = np.random.default_rng(seed)
+        units, A = np.repeat([1 / unit, 1.0, unit], 3), rng.standard_normal((9, 9))
+        W, q = A @ A.T / 9 + 0.2 * np.eye(9), rng.standard_normal((3, 3)) - (0, 0, 0.5)
+        law = Friction(np.repeat(10 ** rng.uniform(-1.5, 0, (3, 1)), 2, 1), 10 ** rng.uniform(-1.5, 0, (3, 2)))  # fmt: skip
+        whole, load = units[:, None] * W * units, q * units.reshape(3, 3)
+        if unit >= 1e4:
+            with pytest.raises(
+                ValueError, match="normal diagonal entry .* at contact 0, less than"
+            ):
+                solve_condensed(whole, load, law)
+            continue
+        alone = solve_condensed(W, q, law, tol=1e-12).reaction / units.reshape(3, 3)
+        found = solve_condensed(whole, load, law, tol=1e-12).reaction
+        off = np.linalg.norm(found - alone, axis=1) / np.maximum(np.linalg.norm(alone, axis=1), 1e-300)  # fmt: skip
+        assert off.max() <= 1e-6

@@ -61,7 +61,7 @@ struct Tuning {
     static constexpr double friction_at_first = 0.7; ///< of r_n, both components: inside the cone
 
     // -- scales ----------------------------------------------------------------------------------
-    static constexpr double negligible = 1e-12; ///< compliance, over the mean one: counts as none
+    static constexpr double negligible = 1e-14; ///< compliance, over the mean one: counts as none
     static constexpr double unlike = 1e2; ///< largest over least compliance: each its own units
 
     // -- judge -----------------------------------------------------------------------------------

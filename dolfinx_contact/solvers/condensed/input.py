@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.solvers.protocols import ContactLike
 
+# Compliance over the mean one that counts as none, as the kernel has it (Tuning::negligible).
+NEGLIGIBLE = 1e-14
+
 
 def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
     """``q``, ``W`` and ``r0`` as arrays of numbers that belong together, and a ``Friction`` with them."""
@@ -59,6 +62,14 @@ def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
         raise ValueError(
             f"W has a negative {direction} diagonal entry, {diagonal[at]:g} at contact {at // dim}: a contact must give "
             "way to its reaction."
+        )
+    own = diagonal[dim - 1 :: dim]
+    stiff = np.flatnonzero((own > 0) & (own < NEGLIGIBLE * own.mean()))
+    if stiff.size:
+        raise ValueError(
+            f"W has the normal diagonal entry {own[stiff[0]]:g} at contact {stiff[0]}, less than {NEGLIGIBLE:g} of their mean: so small a "
+            "compliance cannot be told from none, beside the others. Set it to zero if the contact does not give way, or "
+            "give contacts units of their own, in which all diagonal entries are about 1: the law does not depend on them."
         )
     if r0 is not None:
         r0 = finite("r0", r0)
@@ -113,7 +124,7 @@ def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
     except RuntimeError:  # too many iterations
         return False
     own = W.diagonal()[dim - 1 :: dim]
-    own = np.maximum(own, 1e-12 * own.mean() or 1.0)  # as the kernel has it
+    own = np.maximum(own, NEGLIGIBLE * own.mean() or 1.0)  # as the kernel has it
     load = np.linalg.norm(np.column_stack((q[:, :-1], np.minimum(gaps, 0))) / own[:, None])
     moved = np.linalg.norm(columns @ y) + eps * np.linalg.norm(np.abs(columns) @ y)
     allowed = math.sqrt(tol) * load * (own @ y)  # the judge would allow tol of it

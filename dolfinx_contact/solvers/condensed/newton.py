@@ -203,7 +203,7 @@ def solve_condensed(
         A ``CondensedResult``: reactions, displacements, status, errors and the methods used.
 
     Raises:
-        ValueError: an array of the wrong shape, or not real and finite; a negative diagonal entry of ``W``; or ``friction`` for other contacts.
+        ValueError: an array of the wrong shape, or not real and finite; a negative diagonal entry of ``W``, or a normal one next to none; or ``friction`` for other contacts.
         CondensedNotConverged: no method reached ``tol``, or none can, ``failure.infeasible``; ``failure.best`` is the best state.
 
     Example:
