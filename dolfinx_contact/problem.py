@@ -397,7 +397,17 @@ class ContactProblem(Guarded):
             self._unbind()
             self._freedom = freedom
         kind = NonlinearStep if body.nonlinear else LoadStep
-        given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor, holding
+        given = (
+            self._stiffness,
+            b,
+            external,
+            starts,
+            self.tol,
+            self._unit,
+            self.monitor,
+            holding,
+            last,
+        )
         return kind(body, self.contacts, *given)
 
     def _predicted(self, b: np.ndarray) -> np.ndarray:

@@ -82,6 +82,7 @@ class LoadStep:
         unit: Of force, any that keeps squares within the range of double precision.
         monitor: None, or the user's function of iteration, largest error and ``Counts``.
         holding: As the attribute.
+        last: Displacement of the last step that converged; None is the first start.
 
     Attributes:
         surfaces: The ``DrivenSurfaces``, None where force drives none.  They follow every displacement that is asked for.
@@ -108,6 +109,7 @@ class LoadStep:
         unit: float,
         monitor: Callable | None = None,
         holding: HeldSurfaces | None = None,
+        last: np.ndarray | None = None,
     ):
         self.body, self.contacts, self.stiffness = body, contacts, stiffness
         self.b, self.external, self.tol = b, external, tol
@@ -115,6 +117,7 @@ class LoadStep:
         self._shared = _shared_nodes(contacts, stiffness, body.fixed)
         self.statics, self.holding = None, holding
         self._starts, self.unit, self._monitor = starts, unit, monitor
+        self.last = starts[0] if last is None else last
         self._before, self._told = None, 0  # reactions of the state judged before, states told
         self._judged: Judged | None = None  # the state judged last by F
 
@@ -139,6 +142,15 @@ class LoadStep:
     def finer(self, tol: float, x: np.ndarray) -> LoadStep:
         """The step with a smaller tolerance, from what was found with another one."""
         return self._but(tol=tol, _starts=[x], continues=True)
+
+    def half_way(self) -> LoadStep:
+        """The step with half of what its loads and boundary values change, for a start; of tolerance zero, since F itself has all of them."""
+        last, fixed, reactions = self.last, self.body.fixed, np.zeros_like(self.b)
+        for contact in self.contacts:
+            contact.points.add_forces(contact.last.reaction, reactions)
+        b = 0.5 * (self.b + self.body.multiply(last) - reactions)
+        b[fixed] = 0.5 * (self.b + last)[fixed]
+        return self._but(b=b, tol=0.0, _starts=[last], _judged=None, _before=None)
 
     def _but(self, **parts: Any) -> LoadStep:
         other = copy(self)

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
 
 pytestmark = pytest.mark.ranks
@@ -404,3 +405,18 @@ def test_reactions_balance_the_applied_force():
     function = scene.contact.reaction_function()
     summed = body.total(function.x.array[: body.size].reshape(-1, 3).sum(axis=0))
     assert summed == pytest.approx(scene.contact.force(), rel=1e-12)
+
+
+def test_half_the_way_of_a_step():
+    """Of a step that is linear, since all nodes stick, half the way leads to the mean of both ends, with half of what boundary values change."""
+    scene = scenes.block(cells=(3, 3, 2), mu=np.inf, p=None, solver=dc.FixedPoint(), tol=1e-12)
+    scene.move_top(0, 0, -0.01)
+    scene.problem.solve()
+    before = scene.u.x.array[: scene.problem.body.size].copy()
+    scene.move_top(0.001, 0.0005, -0.008)
+    half = scene.problem.load_step().half_way()
+    scene.problem.solve()
+    mean = 0.5 * (before + scene.u.x.array[: scene.problem.body.size])
+    maps = [ReturnMap(of.normal, of.normal) for of in half.stiffness]
+    left, _ = half.residual(mean, maps)
+    assert half.held(mean) and half.size(left) <= 1e-9 * half.scale

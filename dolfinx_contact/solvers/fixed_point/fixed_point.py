@@ -13,8 +13,8 @@ from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
+from dolfinx_contact.solvers.fixed_point.put_back import put_back, wrong
 from dolfinx_contact.solvers.search import Search
-from dolfinx_contact.step.errors import contact_defects
 from dolfinx_contact.support.checks import positive
 
 if TYPE_CHECKING:
@@ -35,12 +35,10 @@ EVERY, GROWTH, USELESS, NEAR = 20, 30.0, 0.9, 0.1
 # The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
 PATIENCE = 60
 
-# Further attempts: tangents every so many iterations, and where they begin: at the start of the step (None), or in the best state, of
-# which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no solution nearby.
-AGAIN = (
-    ("from the start", EVERY, None), ("nodes put back", EVERY, 0.5),
-    ("nodes put back", EVERY, 0.05), ("nodes put back", EVERY // 2, 0.05),
-)  # fmt: skip
+# Further attempts: tangents every so many iterations, and where they begin. None: where half of the loads lead, of what contact alone holds
+# at the start of the step. A number: in the best state, of which nodes that miss the law by more than this part of the most are put
+# back where they were: their slip may have no solution nearby.
+AGAIN = (EVERY, None), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
 
 # If corrections grow by this factor, Anderson's differences mislead.
 ASTRAY = 1e3
@@ -56,7 +54,7 @@ class FixedPoint:
     contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
     unless the last tangent did not help.
 
-    If the error does not halve within sixty iterations, further attempts begin: at the step's start, then in the best state,
+    If the error does not halve within sixty iterations, further attempts begin: where half of the loads lead, then in the best state,
     in which the nodes that miss the law most are put back where they were; at last with tangents twice as often.  If they also fail, the
     fixed point continues with another rho.  The solution does not depend on rho.  ``step.reason`` lists the attempts.
 
@@ -157,7 +155,7 @@ class BoundFixedPoint:
         if not search.within and not _slides(step, search.best, tried=True):
             from dolfinx_contact.step.stalled import stalled
 
-            said += stalled(self._body, self._contacts, search.statuses, self._wrong(search))
+            said += stalled(self._body, self._contacts, search.statuses, wrong(step, search.best))
         if len(attempts) > 1:
             said.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
         return SolverResult(*found, reason="; ".join(said))
@@ -170,35 +168,30 @@ class BoundFixedPoint:
             yield f"rho {factor:g}", factor, EVERY, search.best
             if self.preconditioner.soften():
                 yield "soft motions", factor, EVERY, search.best
-            for name, every, part in again:
-                yield name, factor, every, start if part is None else self._put_back(search, part)
+            for every, part in again:
+                if part is not None:
+                    yield "nodes put back", factor, every, put_back(search.step, search.best, part)
+                elif search.step.may_slide:
+                    yield "from the start", factor, every, start
+                else:
+                    yield "half the way", factor, every, self._half_way(search, factor)
             if _slides(search.step, search.best, tried=True):
                 return
 
-    def _wrong(self, search: Search) -> list[np.ndarray]:
-        """Forces by which the nodes of the best state miss the law, ``shape=(n,)`` for each contact.  Collective."""
-        search.step.measure(search.best)
-        wrong = []
-        for contact, stiffness in zip(self._contacts, self._stiffness):
-            defect, _, slip = contact_defects(contact, stiffness)
-            wrong.append(np.linalg.norm(defect, axis=1) + np.linalg.norm(slip, axis=1))
-        return wrong
-
-    def _put_back(self, search: Search, part: float) -> np.ndarray:
-        """The best state, but nodes that miss the law by more than a part of the most do not slip.  Collective."""
-        wrong, x = self._wrong(search), search.best.copy()
-        largest = self._body.largest(np.concatenate([np.zeros(0), *wrong]))
-        for contact, amount in zip(self._contacts, wrong):
-            motion = np.zeros_like(contact.reaction)
-            motion[:, :-1] = -contact.slip_increment * (amount > part * largest)[:, None]
-            contact.points.add_forces(motion, x)
-        x[self._body.fixed] = search.best[self._body.fixed]
+    def _half_way(self, search: Search, factor: float) -> np.ndarray:
+        """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
+        step, half = search.step, search.step.half_way()
+        other = Search(half, half.start(), self._options.max_seconds)
+        self._fall(other, factor, EVERY, other.best, 2 * EVERY)
+        search.count(other.iterations)
+        x = other.nearest.copy()
+        x[self._body.fixed] = step.b[self._body.fixed]
         return x
 
-    def _fall(self, search: Search, factor: float, every: int, x: np.ndarray) -> None:
-        """Iterate from ``x`` with one rho while the errors fall, with a tangent every so many iterations."""
+    def _fall(self, search: Search, factor: float, every: int, x: np.ndarray, most: int = 10**9) -> None:  # fmt: skip
+        """Iterate from ``x`` with one rho while the errors fall, with a tangent every so many iterations; ``most`` of them."""
         first = search.iterations == 0
-        search.begin(x, self._options.max_iterations, PATIENCE)
+        search.begin(x, min(most, self._options.max_iterations), PATIENCE)
         near, growth = NEAR if first and self._contacts else 0.0, GROWTH
         while search.goes_on:
             known = search.step.continues and search.iterations == 0
