@@ -22,6 +22,8 @@ from dolfinx.mesh import create_interval, create_mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from dolfinx_contact.support.collective import raised_together
+
 if TYPE_CHECKING:
     pass
 
@@ -70,9 +72,18 @@ def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int | None = None) -> 
     """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10).
 
     Without ``gdim`` vectors have as many components as the model has dimensions; DOLFINx's own function makes it three then.
+
+    Raises:
+        ValueError: on all ranks, if the model is empty, as after ``gmsh.open`` of a missing file, or has no physical group of cells.
     """
+    with raised_together(comm):
+        dim = model.getDimension() if comm.rank == rank else gdim
+        if comm.rank == rank and dim < 1:
+            raise ValueError("the gmsh model is empty: gmsh.open does not say that its file is missing; or make bodies, and occ.synchronize().")  # fmt: skip
+        if comm.rank == rank and not model.getPhysicalGroups(dim):
+            raise ValueError(f"the gmsh model has no physical group of dimension {dim}, its cells: model.addPhysicalGroup({dim}, bodies).")  # fmt: skip
     if gdim is None:
-        gdim = comm.bcast(model.getDimension() if comm.rank == rank else None, root=rank)
+        gdim = comm.bcast(dim, root=rank)
     try:
         from dolfinx.io import gmsh
     except ImportError:

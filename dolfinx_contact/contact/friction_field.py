@@ -96,7 +96,7 @@ def _arguments(given: Callable) -> list[str]:
 def _coefficients(contact: ContactLike, name: str, given: Any, state: dict[str, np.ndarray]):
     if not is_field(given):
         return given
-    state = {key: state[key].copy() for key in _arguments(given)}
+    state = {key: state[key].copy() for key in _arguments(given) if key in state}
     values, n = _values(contact, name, given, state), contact.nodes.size
     if values.shape not in ((), (n,), (1, n), (2, n)):
         raise ValueError(
@@ -184,10 +184,22 @@ def _values(
         return _of_function(contact, name, given)
     n = contact.nodes.size
     at = contact.x if at is None else at
+    _check_call(name, given, state)
     values = given(at.T.copy(), **state)
     finite(f"what {name} gives", rough(values) if name == "mu" else values)
     values = np.asarray(values, dtype=np.float64)  # infinite ones are for the law
     return np.zeros((2, 0)) if n == 0 else values
+
+
+def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> None:
+    """Raise a ``ValueError`` if a function has arguments that it is not called with."""
+    try:
+        signature(given, follow_wrapped=False).bind(None, **state)
+    except TypeError as wrong:
+        also = f", and {', '.join(STATE)} if it has arguments of these names" if name in ("mu", "p") else " alone"  # fmt: skip
+        raise ValueError(f"{name} is called with x{also}: {wrong} in {given!r}.") from None
+    except ValueError:  # arguments that Python does not know
+        pass
 
 
 def _of_function(contact: ContactLike, name: str, function: fem.Function) -> np.ndarray:

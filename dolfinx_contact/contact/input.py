@@ -152,6 +152,8 @@ def check_coefficients(friction: Friction, n: int) -> None:
 
 def check_wear(wear: object, surface: Surface) -> None:
     if not (wear is None or isinstance(wear, Wear)):
-        raise ValueError(f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}.")
+        raise ValueError(
+            f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}; of a coefficient k, volume per frictional work, make dc.Wear(k)."
+        )
     if wear is not None and wear.opposite.any() and not surface.deformable:
         raise ValueError(f"{wear!r}: {surface!r} does not wear, only a DeformableSurface does: give the sum of both as coefficient.")  # fmt: skip

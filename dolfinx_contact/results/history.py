@@ -37,7 +37,7 @@ class History:
         resume: Number of rows to keep of an existing file, those of the steps before a checkpoint.
 
     Raises:
-        ValueError: ``points`` have another dimension, or the file has fewer rows than ``resume``.
+        ValueError: ``points`` have another dimension, the folder of the file does not exist, or the file has fewer rows than ``resume``.
 
     Attributes:
         rows: List of dictionaries, the same on all ranks.
@@ -62,6 +62,10 @@ class History:
         self.problem, self.comm = problem, a_problem(problem).body.comm
         with raised_together(self.comm):
             self.path = None if path is None else Path(path)
+            if path is not None and self.comm.rank == 0 and not self.path.parent.is_dir():
+                raise ValueError(f"there is no folder {self.path.parent} for {self.path.name}: make it, or give another path.")  # fmt: skip
+            if path is not None and self.comm.rank == 0 and self.path.is_dir():
+                raise ValueError(f"{self.path} is a folder: give the path of a file.")
             if contact not in range(len(problem.contacts)):
                 raise ValueError(f"contact {contact!r}: the problem has {len(problem.contacts)}.")
             if not isinstance(resume, (int, np.integer)) or resume < 0:

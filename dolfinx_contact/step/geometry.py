@@ -195,7 +195,7 @@ def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
     """Where the way of a step cannot be followed, in words; empty where it can.  Collective.
 
     The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
-    opens.  Its normal must not turn by more than half a radian: then the way is shorter than half of the least radius, and
+    opens.  Its frame must not turn by more than half a radian, about the normal either: then the way is shorter than half of the least radius, and
     the side of the surface stays.
 
     Args:
@@ -224,8 +224,8 @@ def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
     if part > 1.0:
         return ""
     return (
-        f"the step is too long: after {part:.2g} of it the contact node at {at} has gone so far along the surface that the "
-        f"normal has turned by {TURNED:g}. Divide the step, or let dc.advance do so"
+        f"the step is too long: after {part:.2g} of it the contact node at {at} has gone so far along the surface, or the "
+        f"surface has turned so far about its normal there, that the local frame has turned by {TURNED:g} radians. Divide the step, or let dc.advance do so"
     )
 
 

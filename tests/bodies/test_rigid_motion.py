@@ -30,6 +30,38 @@ def two_cubes():
         gmsh.finalize()
 
 
+@pytest.mark.ranks
+@pytest.mark.parametrize(
+    "state, message",
+    [
+        ("missing file", "the gmsh model is empty"),
+        ("not synchronized", "the gmsh model is empty"),
+        ("no group", "no physical group of dimension 3"),
+        ("group of faces", "no physical group of dimension 3"),
+    ],
+)
+def test_a_model_without_cells_is_refused(state, message):
+    """What gmsh and DOLFINx answer with an IndexError, an AssertionError or a mesh of faces is a ValueError on all ranks."""
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        if scenes.COMM.rank == 0:
+            if state == "missing file":
+                gmsh.open("no such file.msh")
+            else:
+                gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+            if state in ("no group", "group of faces"):
+                gmsh.model.occ.synchronize()
+                gmsh.model.mesh.generate(3)
+            if state == "group of faces":
+                gmsh.model.addPhysicalGroup(2, [1], 1)
+        for gdim in (None, 3):
+            with pytest.raises(ValueError, match=message):
+                model_to_mesh(gmsh.model, scenes.COMM, 0, gdim=gdim)
+    finally:
+        gmsh.finalize()
+
+
 @pytest.mark.parametrize("held", ["both", "one", "one and a spring"])
 def test_every_part_of_a_body_must_be_held(two_cubes, held):
     """Holding one of two separate cubes is not enough, though a factorisation would go through."""

@@ -146,6 +146,10 @@ MISTAKES = {
     "an expression of UFL": (of_ufl, "mu is an expression of UFL.*interpolate it"),
     "a Constant": (lambda scene: dc.Friction(fem.Constant(scene.mesh, 0.3)), "of a Constant its value"),
     "axes of UFL": (lambda scene: dc.Friction((0.3, 0.1), axes=scene.u / 2), "axes is an expression"),
+    "another argument": (lambda scene: dc.Friction(mu=lambda x, velocity: x[0]), "mu is called with x, and pressure, .*wear_depth if it has .*'velocity'"),
+    "a keyword": (lambda scene: dc.Friction(0.3, p=lambda x, pressure, *, time: x[0]), "p is called with x, and .*'time'"),
+    "no argument": (lambda scene: dc.Friction(mu=lambda: 0.3), "mu is called with x"),
+    "axes of the pressure": (lambda scene: dc.Friction((0.3, 0.1), axes=lambda x, pressure: x), "axes is called with x alone: .*'pressure'"),
     "three values": (lambda scene: dc.Friction(mu=lambda x: x + 1.0), "mu must give one value"),
     "words": (lambda scene: dc.Friction(mu=lambda x: "rough"), "real numbers"),
     "negative": (lambda scene: dc.Friction(mu=lambda x: x[0] - 10), "must not be negative"),
@@ -167,6 +171,15 @@ def test_fields_that_make_no_sense_are_refused(mistake):
     assert scene.contact.friction is before
     with pytest.raises(ValueError, match=message):
         dc.Contact(scene.V, scene.facets, scene.surface, law(scene))
+
+
+def test_wear_of_another_argument_is_refused():
+    """A wear coefficient is a function of x alone."""
+    scene = scenes.block(cells=(2, 2, 2))
+    for field in (lambda x, pressure: 1e-8 + 0 * x[0], lambda x, velocity: x[0]):
+        with pytest.raises(ValueError, match="wear coefficient is called with x alone"):
+            scene.contact.wear = dc.Wear(field)
+    assert scene.contact.wear is None
 
 
 def test_a_mistake_on_one_rank_is_raised_on_all():

@@ -127,10 +127,14 @@ def test_a_closed_problem_says_so():
 
 
 def test_a_table_that_cannot_be_written_is_an_error_on_all_ranks(tmp_path):
-    """A folder that is not there, on the rank that writes, raises on all; the row is kept and written later."""
+    """A folder that is gone, on the rank that writes, raises on all; the row is kept and written later."""
     scene, folder = pressed(), COMM.bcast(tmp_path, root=0) / "later"
+    if COMM.rank == 0:
+        folder.mkdir()
     history = dc.History(scene.problem, folder / "run.csv")
     step = scene.problem.solve()
+    if COMM.rank == 0:
+        folder.rmdir()
     with pytest.raises(FileNotFoundError):
         history.record(step)
     COMM.barrier()

@@ -70,6 +70,7 @@ def test_misspelt_attributes_are_refused():
     for thing, wrong, meant in [
         (scene.surface, "displacment", "displacement"),
         (scene.contact, "fricton", "friction"),
+        (scene.contact, "presure", "pressure"),
         (scene.problem, "montor", "monitor"),
         (scene.problem, "toll", "tol"),
     ]:
@@ -163,7 +164,7 @@ def test_friction_that_does_not_fit_is_refused():
     u, old = scene.u.x.array.copy(), scene.contact.friction
     with pytest.raises(ValueError, match="friction must be a Friction"):
         scene.contact.friction = "0.3"
-    with pytest.raises(ValueError, match="wear must be a Wear"):
+    with pytest.raises(ValueError, match="wear must be a Wear.*: 0.0001; of .* make dc.Wear"):
         scene.contact.wear = 1e-4
     rows = len(scene.contact.nodes) + (COMM.rank == 0)
     scene.contact.friction = dc.Friction(np.tile((0.3, 0.15), (rows, 1)))

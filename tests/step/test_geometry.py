@@ -304,6 +304,17 @@ def past_the_centre(ways, kind="sphere"):
     return scene
 
 
+@pytest.mark.parametrize("kind, axis", [("plane", 2), ("sphere", 2), ("sphere", 1)])
+def test_a_frame_that_turns_too_far_is_told_in_words_of_both_ways(kind, axis):
+    """Turned about the normal, or along the surface: what has turned is the frame."""
+    surface = dc.RigidPlane((0.5, 0.5, 0), (0, 0, 1)) if kind == "plane" else dc.RigidSphere((0.5, 0.5, -10), 10.0)  # fmt: skip
+    scene = slab([0, 0, 0], [1, 1, 0.5], [2, 2, 1], surface, 0.1)
+    scene.step(0, 0, -1e-3)
+    surface.rotation = 0.7 * np.eye(3)[axis]
+    with pytest.raises(dc.NotConverged, match="about its normal there, that the local frame has turned by 0.5 radians"):  # fmt: skip
+        scene.problem.solve()
+
+
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
 def test_a_ball_is_not_led_through_its_centre(kind):
     """In one step it would pull: refused. In halves it presses as in steps chosen by hand."""
