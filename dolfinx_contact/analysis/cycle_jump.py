@@ -144,9 +144,9 @@ def cycle_jump(
 def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None) -> None:  # fmt: skip
     """Jump until all cycles are done, or ``most`` are simulated; whatever happens the problem is at the end of the last jump.  Collective."""
     comm = run.problem.body.comm
-    with progress_bar(comm.rank, cycles) as shown:
+    begun = run.record["simulated"]
+    with progress_bar(comm.rank, cycles, run.record["done"]) as shown:
         try:
-            begun = run.record["simulated"]
             while run.record["done"] < cycles:
                 if run.record["simulated"] - begun >= most:
                     raise RuntimeError(run.told(cycles, folder is not None))

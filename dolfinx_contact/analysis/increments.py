@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger("dolfinx_contact")
 
-# Steps in a row after which an increment is doubled again.
+# Steps in a row after which an increment is doubled again; twice as many each time that the doubled one fails at once.
 EASY = 2
 
 
@@ -40,8 +40,8 @@ def advance(
     """Solve the load steps of a load history, from ``start`` through all ``points``.
 
     The increment from one point to the next is first tried as a whole.  If a step does not converge, it is repeated with half the
-    increment, from the last converged state.  After two converged steps, increments are doubled again.  Every point is the end of
-    a step.  ``logging.getLogger("dolfinx_contact")`` reports halved increments; on a terminal there is a progress bar if tqdm is installed.
+    increment, from the last converged state.  After two converged steps, increments are doubled again; if the doubled one fails, only after
+    four, then eight.  Every point is the end of a step.  ``logging.getLogger("dolfinx_contact")`` reports halved increments; on a terminal there is a progress bar if tqdm is installed.
 
     Args:
         problem: The ContactProblem.  Collective.
@@ -115,7 +115,7 @@ def _in_increments(
     """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
     whole, begun = end - now, now
     # Increments are the whole over ``parts``, of which so many are done.
-    parts, done, easy = 1, 0, 0
+    parts, done, easy, wait, grown = 1, 0, 0, EASY, False
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
         with raised_together(problem.body.comm):
@@ -125,11 +125,11 @@ def _in_increments(
         except NotConverged as failure:
             if 0.5 / parts < smallest:
                 raise
-            parts, done, easy = 2 * parts, 2 * done, 0
+            parts, done, easy, wait, grown = 2 * parts, 2 * done, 0, wait * (1 + grown), False
             if problem.body.comm.rank == 0:
                 LOG.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
             continue
-        now, done, easy = at, done + 1, easy + 1
+        now, done, easy, grown = at, done + 1, easy + 1, False
         accepted(at, step)
-        if easy >= EASY and parts > 1 and done % 2 == 0:
-            parts, done, easy = parts // 2, done // 2, 0
+        if easy >= wait and parts > 1 and done % 2 == 0:
+            parts, done, easy, grown = parts // 2, done // 2, 0, True

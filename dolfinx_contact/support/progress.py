@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(rank: int, total: float, start: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """Context of a function that shows how far a load history is.
+    """Context of a function that shows how far a load history is on its way from ``start`` to ``total``.
 
     Args:
         rank: Of this process; rank 0 shows.
@@ -23,13 +23,13 @@ def progress_bar(rank: int, total: float, start: float = 0.0) -> Iterator[Callab
         try:
             from tqdm import tqdm
 
-            bar = tqdm(total=total, initial=start)
+            bar = tqdm(total=max(total - start, 0.0))
         except ImportError:
             pass
 
     def show(now: float) -> None:
         if bar is not None:
-            bar.update(now - bar.n)
+            bar.update(now - start - bar.n)
 
     try:
         yield show

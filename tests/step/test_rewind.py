@@ -3,6 +3,8 @@
 """Steps that are tried: taken back, or made again in smaller increments."""
 
 import logging
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,6 +138,46 @@ def test_increments_grow_within_an_interval():
 
     history = dc.advance(scene.problem, programme, [1.0])
     assert history.column("t") == pytest.approx([0.25, 0.5, 1.0])
+
+
+def test_increments_that_fail_again_grow_later():
+    """Where every increment is hard, the next larger one is tried after 2, 4 and 8 steps, not after every second one."""
+    scene = scenes.block()
+    scene.problem.solver = solver = Reluctant(scene, 0.0006)
+
+    def programme(t):
+        scene.move_top(0, 0, -0.008 * t)
+
+    history = dc.advance(scene.problem, programme, [1.0])
+    assert history.column("t") == pytest.approx(np.arange(1, 17) / 16)
+    assert solver.refused == 4 + 3  # 11 if after every second one
+
+
+@pytest.mark.parametrize("start, points", [(-0.2, [0.0, 1.0]), (0.0, [0.5]), (3.0, [4.0, 7.0])])
+def test_a_progress_bar_goes_from_nothing_to_all(monkeypatch, start, points):
+    """Wherever the parameter starts, the bar is between 0 and 100 %."""
+    bars = []
+
+    class Bar:
+        def __init__(self, total, initial=0.0):
+            self.total, self.n, self.seen = total, initial, [initial / total]
+            bars.append(self)
+
+        def update(self, more):
+            self.n += more
+            self.seen.append(self.n / self.total)
+
+        def close(self):
+            pass
+
+    monkeypatch.setitem(sys.modules, "tqdm", SimpleNamespace(tqdm=Bar))
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    scene = scenes.block(cells=(2, 2, 2))
+    dc.advance(scene.problem, lambda t: scene.move_top(0, 0, -1e-3 * t), points, start=start)
+    assert len(bars) == (COMM.rank == 0)
+    for bar in bars:
+        whole = points[-1] - start
+        assert bar.seen == pytest.approx([0.0, *((t - start) / whole for t in points)])
 
 
 def test_a_step_that_no_increment_solves_is_raised():
