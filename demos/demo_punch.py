@@ -129,8 +129,9 @@ def main(argv=None) -> None:
     head, records = punch.head(), numbers["steps"]
     numbers |= {"seconds": perf_counter() - begin, "processor_seconds": process_time()}
     if punch.comm.rank == 0:
-        rows = [ROW.format(step=step, **record) for step, record in enumerate(records, start=1)]
-        print(HEAD, *rows, sep="\n")
+        if accuracy is not None:
+            rows = [ROW.format(step=step, **record) for step, record in enumerate(records, start=1)]
+            print(HEAD, *rows, sep="\n")
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps({"head": head} | numbers, indent=1) + "\n")
         print(f"\nnumbers   {json_file}")
@@ -148,6 +149,13 @@ def main(argv=None) -> None:
         sys.exit(failure if punch.comm.rank == 0 else 1)
 
 
+def tell(punch: Punch, line: str) -> None:
+    """Print at once on rank 0, into a file, too, past the progress bar."""
+    if punch.comm.rank == 0:
+        tqdm.write(line)
+        sys.stdout.flush()
+
+
 def compute(parameters, solver, shown, output) -> tuple:
     """Numbers, punch, discs to draw, and the reason if a step failed: one run on the mesh that the parameters name."""
     punch, records, maps, failure = Punch(parameters, solver=solver), [], [], None
@@ -155,9 +163,11 @@ def compute(parameters, solver, shown, output) -> tuple:
     von_Mises = ufl.sqrt(1.5 * ufl.inner(ufl.dev(sigma), ufl.dev(sigma)))
     fields = {"stress": sigma, "von_Mises": von_Mises}
     writer = dc.Writer(punch.problem, output / "punch.pvd", fields=fields)
+    tell(punch, HEAD)
     try:
         for index, record in enumerate(run(punch)):
             records.append(record)
+            tell(punch, ROW.format(step=index + 1, **record))
             writer.write(index + 1)
             if index in shown:
                 maps.append((f"{shown[index]}, {record['displacement']:g} mm", gather(punch)))

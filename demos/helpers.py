@@ -17,7 +17,7 @@ COMM = MPI.COMM_WORLD
 def say(text: str) -> None:
     """Print on rank 0."""
     if COMM.rank == 0:
-        print(text)
+        print(text, flush=True)  # also into a file
 
 
 def picture(draw, *data) -> None:
