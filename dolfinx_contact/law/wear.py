@@ -11,7 +11,9 @@ from dolfinx_contact.support.checks import finite, number, valued
 
 
 class Wear(Guarded):
-    """Archard wear, in which the worn depth opens the gap; immutable.
+    """Archard wear, in which the worn depth opens the gap: ``k`` is volume per frictional work; immutable.
+
+    A specific wear rate, volume per normal force and sliding distance, is ``mu`` times as large, in the same unit mm³/(N mm): ``k = rate / mu``.
 
     In a step, the depth of a node grows by ``sum_i k_i w_i / A``, with the frictional work ``w_i >= 0`` along principal
     direction i (``dissipation.py``) and the nodal area ``A``.  So the worn volume, the sum of depth times area, grows by ``sum_i
