@@ -55,9 +55,8 @@ def test_a_model_without_cells_is_refused(state, message):
                 gmsh.model.mesh.generate(3)
             if state == "group of faces":
                 gmsh.model.addPhysicalGroup(2, [1], 1)
-        for gdim in (None, 3):
-            with pytest.raises(ValueError, match=message):
-                model_to_mesh(gmsh.model, scenes.COMM, 0, gdim=gdim)
+        with pytest.raises(ValueError, match=message):
+            model_to_mesh(gmsh.model, scenes.COMM, 0)
     finally:
         gmsh.finalize()
 

@@ -180,7 +180,7 @@ def test_history_is_a_table_of_the_run(tmp_path):
         dc.History(scene.problem, points=[(0.0, 0.0)])
 
 
-@pytest.mark.parametrize("name, message", [("none/run.csv", "there is no folder .*none for run.csv"), ("none/a/run.csv", "there is no folder"), (".", "is a folder")])  # fmt: skip
+@pytest.mark.parametrize("name, message", [("none/run.csv", "no folder .*none for run.csv"), ("none/a/run.csv", "no folder"), (".", "is a folder")])  # fmt: skip
 def test_a_table_without_a_folder_is_refused_before_the_run(tmp_path, name, message):
     """A path that rank 0 cannot write to is a ValueError of all ranks when the table is made, not of its first row."""
     scene = scenes.block(cells=(2, 2, 1))
