@@ -112,7 +112,7 @@ class ContactProblem(Guarded):
             step, largest error and ``Counts``.  For iterates of the condensed problem, the error is the residual over the largest
             reaction; the errors of the body follow.
 
-    ``logging.getLogger("dolfinx_contact")`` gets a line per step, of level INFO, on rank 0; ``logging.basicConfig(level=20)``
+    ``logging.getLogger("dolfinx_contact")`` gets a line per step, of level INFO, on rank 0; ``logging.basicConfig(level=20, force=True)``
     prints them.
 
     On several ranks, constants in ``F`` and ``bcs`` must be the same on all; for Functions, the values on the owning ranks count.
