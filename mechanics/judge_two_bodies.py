@@ -182,15 +182,17 @@ class TwoBodiesJudge:
         gap_range, slip_range = (slave.of_nodes(of, extent) for of in (gaps, slips))
         r_n = (force * normals).sum(axis=1)
         tangential = force - r_n[:, None] * normals
-        axes = self._axes()
-        slip = slip @ axes
-        r = np.column_stack((tangential[:, :-1] @ axes, r_n))  # normals are close to the scene's
+        axes, between = self._axes()
+        slip = np.einsum("ni,nij->nj", slip, axes)
+        r = np.column_stack(
+            (np.einsum("ni,nij->nj", tangential[:, :-1], axes), r_n)
+        )  # normals are close to the scene's
         stiff = np.full(len(r), self.stiff)
         gap[~some] = np.where(r_n > 0, 0.0, np.inf)[~some]
         slip[~(some & self.pressed)] = 0.0
         normal, cone, slipped = law_defects(r, gap, slip, stiff, stiff[:, None, None] * np.eye(d - 1), self.mu, self.p)  # fmt: skip
         bare = covered == 0.0
-        turned = np.linalg.norm(r, axis=1) * spread
+        turned = np.linalg.norm(r, axis=1) * (spread + between)
         tilted = turned * (1 + np.max(self.mu) / np.min(self.mu)) if np.any(self.mu) else turned
         allowed = turned + self.stiff * RANGE * np.where(some, gap_range, 0.0)
         over = np.where(bare, np.linalg.norm(r, axis=1), np.maximum(normal - allowed, 0))
@@ -199,16 +201,21 @@ class TwoBodiesJudge:
         return dict(normal=norm(over), cone=norm(np.maximum(cone - tilted, 0)), slip=norm(np.maximum(slipped, 0)))  # fmt: skip
 
     def _axes(self):
-        """Principal friction directions, columns: the scene's first ones, turned about its normal as the slave is as a whole."""
-        scene, d = self.scene, self.d
+        """Principal friction directions of each node, columns, ``shape=(n, d - 1, d - 1)``, and radians by which they differ between its facets.
+
+        The scene's first one is a line drawn on the slave: on each facet it turns as the points of this facet do, in their best affine map.
+        """
+        scene, d, slave = self.scene, self.d, self.faces[0]
         if d == 2 or scene.sliding == "small":
-            return np.eye(d - 1)
-        nodes = self.faces[0].nodes
-        x = self.x[nodes, :2]
-        there = x + (scene.u.x.array.reshape(-1, d)[nodes] @ scene.turn)[:, :2]
-        a, b = x - x.mean(axis=0), there - there.mean(axis=0)
-        turned = np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
-        return np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+            return np.tile(np.eye(d - 1), (slave.nodes.size, 1, 1)), np.zeros(slave.nodes.size)
+        before = slave.x.reshape(len(slave.near), slave.count, d)[:, :, :2]
+        after = before + slave.moved(scene.u).reshape(*before.shape[:2], d)[:, :, :2]
+        lines = [np.linalg.lstsq(x - x.mean(axis=0), y - y.mean(axis=0), rcond=None)[0][0] for x, y in zip(before, after)]  # fmt: skip
+        angles = np.repeat([np.arctan2(line[1], line[0]) for line in lines], slave.count)[:, None]
+        turned = slave.of_nodes(angles, lambda of: (of.max() + of.min()) / 2)
+        cos, sin = np.cos(turned), np.sin(turned)
+        axes = np.stack((np.stack((cos, -sin), axis=-1), np.stack((sin, cos), axis=-1)), axis=-2)
+        return axes, slave.of_nodes(angles, np.ptp)
 
     def _moment(self, on_slave, on_master, gaps, off) -> float:
         """What is left of moments of both faces, beyond the gap between them and what else is ``off`` at nodes, over the scene's length."""

@@ -35,10 +35,11 @@ EVERY, GROWTH, USELESS, NEAR = 20, 30.0, 0.9, 0.1
 # The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
 PATIENCE = 60
 
-# Further attempts: tangents every so many iterations, and where they begin. None: where half of the loads lead, of what contact alone holds
-# at the start of the step. A number: in the best state, of which nodes that miss the law by more than this part of the most are put
-# back where they were: their slip may have no solution nearby.
-AGAIN = (EVERY, None), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
+# Further attempts: tangents every so many iterations, and where they begin: as the first one, or where half of the loads lead, or in the best
+# state, of which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no
+# solution nearby.
+START, HALF = "from the start", "half the way"
+AGAIN = (EVERY, START), (EVERY, HALF), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
 
 # If corrections grow by this factor, Anderson's differences mislead.
 ASTRAY = 1e3
@@ -54,7 +55,7 @@ class FixedPoint:
     contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
     unless the last tangent did not help.
 
-    If the error does not halve within sixty iterations, further attempts begin: where half of the loads lead, then in the best state,
+    If the error does not halve within sixty iterations, further attempts begin: at the step's start, where half of the loads lead, then in the best state,
     in which the nodes that miss the law most are put back where they were; at last with tangents twice as often.  If they also fail, the
     fixed point continues with another rho.  The solution does not depend on rho.  ``step.reason`` lists the attempts.
 
@@ -168,13 +169,13 @@ class BoundFixedPoint:
             yield f"rho {factor:g}", factor, EVERY, search.best
             if self.preconditioner.soften():
                 yield "soft motions", factor, EVERY, search.best
-            for every, part in again:
-                if part is not None:
-                    yield "nodes put back", factor, every, put_back(search.step, search.best, part)
-                elif search.step.may_slide:
-                    yield "from the start", factor, every, start
+            for every, where in again:
+                if where == START:
+                    yield where, factor, every, start
+                elif where == HALF:
+                    yield where, factor, every, self._half_way(search, factor)
                 else:
-                    yield "half the way", factor, every, self._half_way(search, factor)
+                    yield "nodes put back", factor, every, put_back(search.step, search.best, where)
             if _slides(search.step, search.best, tried=True):
                 return
 
