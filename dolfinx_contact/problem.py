@@ -14,12 +14,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     NUMBERS,
+    body_of,
     check_alive,
     check_size,
     check_step,
@@ -32,6 +32,7 @@ from dolfinx_contact.problem_input import (
     checked_solver,
     checked_tolerance,
     checked_undetermined,
+    crowded,
     follow,
     hold,
     support,
@@ -50,17 +51,13 @@ from dolfinx_contact.results.record import (
     warn_of_corners,
     warn_of_rounding,
 )
-from dolfinx_contact.solvers.automatic import crowded
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
-from dolfinx_contact.solvers.newton.linearised import Linearised
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
-from dolfinx_contact.step.nonlinear import NonlinearStep
 from dolfinx_contact.step.trial import NO_SOLUTION, UNHELD, floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
-from dolfinx_contact.support.collective import agree, raised_together
-from dolfinx_contact.support.interrupts import uninterrupted
+from dolfinx_contact.support.collective import agree, raised_together, uninterrupted
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
@@ -343,7 +340,7 @@ class ContactProblem(Guarded):
             )
         for contact in self.contacts:
             contact.renew_gaps(found.x)
-        if any(contact.has_history for contact in self.contacts):
+        if self.body.comm.allreduce(any(c.opens for c in self.contacts), op=MPI.LOR):
             from dolfinx_contact.step.touching import opening
 
             opening(self.body, self.contacts, step, self.geometry_tol)
@@ -396,7 +393,9 @@ class ContactProblem(Guarded):
         if freedom != self._freedom:
             self._unbind()
             self._freedom = freedom
-        kind = NonlinearStep if body.nonlinear else LoadStep
+        kind = LoadStep
+        if body.nonlinear:
+            from dolfinx_contact.step.nonlinear import NonlinearStep as kind
         given = (
             self._stiffness,
             b,
@@ -451,6 +450,8 @@ class ContactProblem(Guarded):
             self._unbind()
             solver = self.solver
             if self.body.nonlinear and not getattr(solver, "nonlinear", False):
+                from dolfinx_contact.solvers.newton.linearised import Linearised
+
                 solver = Linearised(solver)
             self._bound = solver.bind(
                 self.body, self.contacts, self._stiffness, self._states.memory

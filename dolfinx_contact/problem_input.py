@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,13 @@ import numpy as np
 from ufl.classes import Indexed, Product, ScalarValue, SpatialCoordinate, Sum
 
 from dolfinx_contact import compat
+from dolfinx_contact.bodies.elastic import ElasticBody
+from dolfinx_contact.bodies.forms import check_meshes, derivative_of
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.interface import surfaces_of
-from dolfinx_contact.solvers.automatic import Automatic
+from dolfinx_contact.contact.interface import components, surfaces_of
+from dolfinx_contact.petsc.linear_solver import CROWDED
+from dolfinx_contact.petsc.linear_solver import LARGE as TOO_LARGE
 from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import agree, raised_together
 
@@ -25,7 +28,9 @@ if TYPE_CHECKING:
     from dolfinx import fem
     from mpi4py import MPI
 
+    from dolfinx_contact.contact.displacements import Displacements
     from dolfinx_contact.problem import ContactProblem
+    from dolfinx_contact.solvers.base import Solver
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
@@ -126,7 +131,63 @@ def checked_solver(solver: Any):
         raise ValueError(
             f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
         )
-    return Automatic() if solver is None else solver
+    if solver is not None:
+        return solver
+    from dolfinx_contact.solvers.automatic import Automatic
+
+    return Automatic()
+
+
+def body_of(
+    F: Any,
+    u: fem.Function,
+    bcs: Sequence[Any],
+    J: Any = None,
+    options: dict[str, Any] | None = None,
+    prefix: str | None = None,
+    before_residual: Callable | None = None,
+    of: Displacements | None = None,
+    form_options: dict[str, Any] | None = None,
+) -> ElasticBody:
+    """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
+
+    Args:
+        F: Residual form.
+        u: Displacement.
+        bcs: Dirichlet conditions.
+        J: Derivative of ``F``; found by UFL if None.
+        options: PETSc options of linear solves.
+        prefix: Their prefix.
+        before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
+        of: Its ``Displacements``, where they are known.
+        form_options: Of the forms' compilation, see ``compat.compiled``.
+
+    Raises:
+        ValueError: ``F`` is no residual form in ``u``.
+    """
+    with raised_together(u.function_space.mesh.comm):
+        moving = before_residual is not None
+        derivative, linear = derivative_of(F, u, J, moving)
+        check_meshes(F, u, (form_options or {}).get("entity_maps"))
+    if linear:
+        return ElasticBody(F, u, bcs, derivative, options, prefix, of, form_options)
+    from dolfinx_contact.bodies.nonlinear import NonlinearBody
+
+    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, form_options)
+
+
+def crowded(solver: Solver, body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+    """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
+    unknowns = body.comm.allreduce(body.size)
+    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= TOO_LARGE[3]
+    if not (contacts and solid and body.options is None) or body.nonlinear:
+        return False
+    from dolfinx_contact.solvers.automatic import Automatic, most_nodes
+    from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
+
+    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
+    most = most_nodes(unknowns, friction=components(contacts) > 1)
+    return isinstance(solver, (Automatic, FixedPoint)) and nodes > most
 
 
 def checked_tolerance(tol: Any) -> float:

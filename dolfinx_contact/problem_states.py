@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.results import checkpoint
 from dolfinx_contact.solvers.base import KEPT
 from dolfinx_contact.support.collective import raised_together
 
@@ -161,11 +160,15 @@ class ProblemStates:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a checkpoint, see ``ContactProblem.save``.  Collective."""
+        from dolfinx_contact.results import checkpoint
+
         displacements, past = [self.last, self.before], self.memory["past"]
         checkpoint.save(path, self._body, self._contacts, displacements, past, self._variables)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint, see ``ContactProblem.load``.  Collective."""
+        from dolfinx_contact.results import checkpoint
+
         found = checkpoint.load(path, self._body, self._contacts, self._variables)
         (self.last, self.before), past = found
         self._take(past)

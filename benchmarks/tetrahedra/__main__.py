@@ -10,10 +10,10 @@ from pathlib import Path
 from time import process_time
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.law.dissipation import work_of_friction
 from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.problem_input import body_of
 
 # isort: split
 import numpy as np

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
-from dolfinx_contact.bodies.nonlinear import body_of
 from dolfinx_contact.compat import second_order
 from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.problem_input import body_of
 
 # isort: split
 import numpy as np

@@ -13,7 +13,6 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion, stiffness_checks
-from dolfinx_contact.bodies.anchors import Anchors
 from dolfinx_contact.bodies.forms import digest_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
@@ -23,6 +22,7 @@ from dolfinx_contact.support.collective import OverRanks, raised_together
 if TYPE_CHECKING:
     import ufl
 
+    from dolfinx_contact.bodies.anchors import Anchors
     from dolfinx_contact.step.loose import LooseMotions
 
 _instances = count()
@@ -328,6 +328,8 @@ class ElasticBody(OverRanks):
     def anchors(self) -> Anchors | None:
         """Springs for the soft rigid motions, None where there are none.  Collective."""
         if self._anchors is None and self.soft.shape[1] > 0:
+            from dolfinx_contact.bodies.anchors import Anchors
+
             self._anchors = Anchors(self)
         return self._anchors
 

@@ -12,7 +12,6 @@ import numpy as np
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.forms import check_meshes, derivative_of
 from dolfinx_contact.bodies.stiffness_checks import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.petsc.linear_solver import preconditioner
 from dolfinx_contact.support.collective import raised_together
@@ -22,42 +21,6 @@ if TYPE_CHECKING:
     from dolfinx import fem
 
     from dolfinx_contact.contact.displacements import Displacements
-
-
-def body_of(
-    F: Any,
-    u: fem.Function,
-    bcs: Sequence[Any],
-    J: Any = None,
-    options: dict[str, Any] | None = None,
-    prefix: str | None = None,
-    before_residual: Callable | None = None,
-    of: Displacements | None = None,
-    form_options: dict[str, Any] | None = None,
-) -> ElasticBody:
-    """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
-
-    Args:
-        F: Residual form.
-        u: Displacement.
-        bcs: Dirichlet conditions.
-        J: Derivative of ``F``; found by UFL if None.
-        options: PETSc options of linear solves.
-        prefix: Their prefix.
-        before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
-        of: Its ``Displacements``, where they are known.
-        form_options: Of the forms' compilation, see ``compat.compiled``.
-
-    Raises:
-        ValueError: ``F`` is no residual form in ``u``.
-    """
-    with raised_together(u.function_space.mesh.comm):
-        moving = before_residual is not None
-        derivative, linear = derivative_of(F, u, J, moving)
-        check_meshes(F, u, (form_options or {}).get("entity_maps"))
-    if linear:
-        return ElasticBody(F, u, bcs, derivative, options, prefix, of, form_options)
-    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, form_options)
 
 
 class NonlinearBody(ElasticBody):

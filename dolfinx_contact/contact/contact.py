@@ -18,7 +18,6 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import contact_nodes, weight_on
-from dolfinx_contact.contact.friction_field import guided, wear_on_nodes
 from dolfinx_contact.contact.input import (
     check_coefficients,
     check_law,
@@ -35,8 +34,6 @@ from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.law.supported import supported
-from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, place, positive
@@ -46,6 +43,7 @@ from dolfinx_contact.surfaces.surface import Surface
 if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # before 0.6 it has another name
 
+    from dolfinx_contact.law.wear import Wear
     from dolfinx_contact.solvers.protocols import MapLike
 
 
@@ -204,8 +202,12 @@ class Contact(Guarded):
     @wear.setter
     def wear(self, wear: Wear | None) -> None:
         check_wear(wear, self.surface)
+        self._wear_field = None
         with raised_together(self.comm):
-            self._wear_field = wear_on_nodes(self, wear)
+            if wear is not None:
+                from dolfinx_contact.contact.friction_field import wear_on_nodes
+
+                self._wear_field = wear_on_nodes(self, wear)
         self._laws.wear = wear
 
     @property
@@ -289,6 +291,8 @@ class Contact(Guarded):
         if not points.along.any() or friction.frictionless:
             return friction
         if self._free_friction is None:
+            from dolfinx_contact.contact.friction_field import guided
+
             found = guided(friction, points.count, points.supported, points.along)
             self._free_friction = found
         return self._free_friction
@@ -313,6 +317,8 @@ class Contact(Guarded):
         known, last = self.known_slip[at_rows], self.last.reaction[at_rows, :-1]
         if self.dragged is not None:
             known = np.where(self.dragged[at_rows] != 0.0, self.dragged[at_rows], known)
+        from dolfinx_contact.law.supported import supported
+
         everywhere = isinstance(nodes, slice)
         friction = self.friction if everywhere else self.friction.at(at_rows)
         found = supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
@@ -416,6 +422,12 @@ class Contact(Guarded):
             return False
         landing = self.last.gap[opens] > self.gap_rounding(u)
         return bool(landing.any()) and not self.friction.frictionless
+
+    @property
+    def opens(self) -> bool:
+        """Whether nodes of this rank that touched at the end of the last step are open in the present state."""
+        settled = self.settled.reaction[:, -1]
+        return bool(((settled > 0.0) & (self.reaction[:, -1] == 0.0)).any())
 
     def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""

@@ -12,7 +12,6 @@ import numpy as np
 from dolfinx_contact import compat
 from dolfinx_contact.contact.displacements import displacement_part
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface
 
@@ -151,9 +150,13 @@ def check_coefficients(friction: Friction, n: int) -> None:
 
 
 def check_wear(wear: object, surface: Surface) -> None:
-    if not (wear is None or isinstance(wear, Wear)):
+    if wear is None:
+        return
+    from dolfinx_contact.law.wear import Wear
+
+    if not isinstance(wear, Wear):
         raise ValueError(
             f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}; of a coefficient k, volume per frictional work, make dc.Wear(k)."
         )
-    if wear is not None and wear.opposite.any() and not surface.deformable:
+    if wear.opposite.any() and not surface.deformable:
         raise ValueError(f"{wear!r}: {surface!r} does not wear, only a DeformableSurface does: give the sum of both as coefficient.")  # fmt: skip

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
@@ -289,3 +290,11 @@ def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:
         columns = values.indices[part].astype(PETSc.IntType)
         K.setValues([first + row], columns, values.data[part], addv=PETSc.InsertMode.ADD_VALUES)
     K.assemble()
+
+
+def components(contacts: Sequence[ContactLike]) -> int:
+    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
+    smooth = all(contact.friction.frictionless for contact in contacts)
+    if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
+        return 1
+    return contacts[0].points.dim

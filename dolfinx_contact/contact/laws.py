@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.contact.friction_field import axes_at, directed, directions, followed, on_nodes
 from dolfinx_contact.contact.input import check_law, warn_of_percent
 from dolfinx_contact.contact.placement import times
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
-from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.law.wear import Wear
     from dolfinx_contact.solvers.protocols import ContactLike
     from dolfinx_contact.surfaces.surface import Surface
+
+
+def _fields() -> Any:
+    """What evaluates fields, imported where a law has any."""
+    from dolfinx_contact.contact import friction_field
+
+    return friction_field
 
 
 class Laws:
@@ -49,7 +55,7 @@ class Laws:
         else:
             check_law(contact.surface, friction, contact.V.mesh.geometry.dim)
             friction = at_most_rough(friction)
-        if field is None or not followed(
+        if field is None or not _fields().followed(
             field
         ):  # what follows the pressure may be large without any
             warn_of_percent(friction)
@@ -61,10 +67,12 @@ class Laws:
     ) -> Friction:
         """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
-        state = {name: none if empty else getattr(contact, name) for name in followed(field)}
+        state = {
+            name: none if empty else getattr(contact, name) for name in _fields().followed(field)
+        }
         with raised_together(contact.comm):
-            friction = on_nodes(contact, field, state, axes)
-            check_law(contact.surface, friction, gdim, directed(field, gdim))
+            friction = _fields().on_nodes(contact, field, state, axes)
+            check_law(contact.surface, friction, gdim, _fields().directed(field, gdim))
         return at_most_rough(friction)
 
     def _take(self, contact: ContactLike, friction: Friction) -> None:
@@ -95,7 +103,7 @@ class Laws:
         if not (self.textured or deformable) or self.friction.isotropic or contact.points.dim == 2:
             return 0.0
         given = self._field is not None and is_field(self._field.given()["axes"])
-        new = axes_at(contact, self._field, at, frame, points) if given else used
+        new = _fields().axes_at(contact, self._field, at, frame, points) if given else used
         if deformable:  # their frames turn as well
             old = contact.frame
             new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
@@ -107,7 +115,7 @@ class Laws:
     @property
     def follow_pressure(self) -> bool:
         """Whether friction follows the pressure at the end of the step."""
-        return self._field is not None and "pressure" in followed(self._field)
+        return self._field is not None and "pressure" in _fields().followed(self._field)
 
     def renew(self, contact: ContactLike, begin: bool = False) -> None:
         """Let fields have their present values.  Collective.
@@ -125,7 +133,7 @@ class Laws:
         if not begin:
             return
         self._rested = before
-        if followed(self._field):
+        if _fields().followed(self._field):
             self.begun = self.friction
 
     def restore(self, contact: ContactLike) -> None:
@@ -156,7 +164,7 @@ class Laws:
         if self._field is not None:
             law = self._evaluated(contact, self._field, empty=True, axes=law.axes)
             if is_field(self._field.given()["axes"]):
-                texture = {"texture": directions(contact, self._field)}
+                texture = {"texture": _fields().directions(contact, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else np.inf if self.wear.field else self.wear.coefficient
         parts = [contact.surface.described(), np.broadcast_to(wear, 2)]

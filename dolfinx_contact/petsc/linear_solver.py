@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.petsc.multigrid import Multigrid
-from dolfinx_contact.petsc.symmetric_matrix import halved, plus, with_entries
+from dolfinx_contact.petsc.entries import with_entries
+
+if TYPE_CHECKING:
+    from dolfinx_contact.petsc.multigrid import Multigrid
 
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
@@ -229,8 +231,12 @@ class LinearSolver:
         self.levels, self.halved, self._multigrid = self.ksp.getPC(), None, None
         gamg = self.levels.getType() == "gamg" and self.levels.getMGLevels() > 1
         if gamg and _sweeps(options, prefix):
+            from dolfinx_contact.petsc.symmetric_matrix import halved
+
             self.halved = halved(A)
         if self.halved is not None:
+            from dolfinx_contact.petsc.multigrid import Multigrid
+
             self._multigrid = Multigrid(self.levels, self.halved)
             self.ksp.setPC(self._multigrid.pc)
         if not self.exact:
@@ -252,6 +258,9 @@ class LinearSolver:
             S: The springs alone.
             how: How their entries lie to those of the matrix.  Collective.
         """
+        from dolfinx_contact.petsc.multigrid import Multigrid
+        from dolfinx_contact.petsc.symmetric_matrix import halved, plus
+
         A = None if self.halved is None else plus(self.halved, S)
         if A is None:
             A = self.levels.getOperators()[1].copy()

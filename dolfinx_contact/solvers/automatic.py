@@ -9,20 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.petsc.linear_solver import CROWDED, LARGE
+from dolfinx_contact.contact.interface import components
 from dolfinx_contact.solvers.base import SolverResult
-from dolfinx_contact.solvers.condensed.body import ASTRAY, components
-from dolfinx_contact.solvers.condensed.compliance import fits
-from dolfinx_contact.solvers.condensed.newton import CondensedNewton
-from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
-from dolfinx_contact.solvers.newton.linearised import Linearised
-from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import Solver
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
     from dolfinx_contact.step.errors import NodalStiffness
 
+
+# Errors above which a state is no better a start than another solver's own.
+ASTRAY = 1e-3
 
 # Largest number of multigrid solves for the condensed operator after the fixed point has failed: about a thousand cycles.
 MOST_SOLVES = 100
@@ -41,15 +38,31 @@ def most_nodes(unknowns: int, friction: bool) -> int:
     return min(measured, round((equal * unknowns) ** (1 / 3))) if friction else measured
 
 
-def crowded(solver: Solver, body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
-    """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
-    unknowns = body.comm.allreduce(body.size)
-    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= LARGE[3]
-    by_cycles = isinstance(solver, (Automatic, FixedPoint)) and not body.nonlinear
-    if not (contacts and solid and by_cycles and body.options is None):
-        return False
-    nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
-    return nodes > most_nodes(unknowns, friction=components(contacts) > 1)
+# The candidates, each imported when it is first used.
+
+
+def _condensed() -> Solver:
+    from dolfinx_contact.solvers.condensed.newton import CondensedNewton
+
+    return CondensedNewton()
+
+
+def _fixed_point() -> Solver:
+    from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
+
+    return FixedPoint()
+
+
+def _linearised() -> Solver:
+    from dolfinx_contact.solvers.newton.linearised import Linearised
+
+    return Linearised(_fixed_point())
+
+
+def _sparse() -> Solver:
+    from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton
+
+    return SparseNewton()
 
 
 class Automatic:
@@ -90,17 +103,19 @@ class BoundAutomatic:
 
     def _choose_nonlinear(self) -> None:
         body, self._components = self._arguments[0], None
-        self._solvers, self._why = [Linearised(FixedPoint())], "F is not linear in u"
+        self._solvers, self._why = [_linearised], "F is not linear in u"
         if body.factorised and not any(c.surface.free for c in self._arguments[1]):
-            self._solvers.insert(0, SparseNewton())
+            self._solvers.insert(0, _sparse)
 
     def _choose_linear(self) -> None:
+        from dolfinx_contact.solvers.condensed.compliance import fits
+
         body, contacts, *_ = self._arguments
         nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
         self._components = components(contacts)
         unknowns = body.K.getSize()[0]
         enough = fits(body.comm, nodes, self._components, unknowns)
-        self._solvers = [CondensedNewton(), FixedPoint()]
+        self._solvers = [_condensed, _fixed_point]
         most = most_nodes(unknowns, friction=self._components > 1)
         self._why = f"{nodes} contact nodes, up to {most} by CondensedNewton first"
         if nodes > most:
@@ -145,10 +160,10 @@ class BoundAutomatic:
         iterations, smallest, best, start, ended = 0, np.inf, None, None, []
         solvers = self._solvers
         # For bodies held by contact alone, the fixed point quickly solves cases that take Newton's fallbacks thousands of iterations.
-        brief = step.statics is not None and isinstance(solvers[0], CondensedNewton)
+        brief = step.statics is not None and solvers[0] is _condensed
         for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
             if solver not in self._bound:
-                self._bound[solver] = solver.bind(*self._arguments)
+                self._bound[solver] = solver().bind(*self._arguments)
             options = {"fallbacks": False} if brief and not ended else {}
             found = self._bound[solver].solve(step, start, **options)
             iterations += found.iterations

@@ -18,7 +18,6 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.rigid_motion import mean_strain
-from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.contact.fields import nearest_rotation
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.step.errors import NodalStiffness
@@ -27,6 +26,7 @@ from dolfinx_contact.support.collective import raised_together
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from dolfinx_contact.contact.facets import Facets
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -51,6 +51,10 @@ STAY = 0.05
 
 # What is rounding, over the size of a facet.
 CLEAR = 1e-6
+
+# Displacements turn a body by no more than so many times the half of their spread over its thickness: more than the thickness over the
+# root mean square of distances from the middle.
+LEVER = 4.0
 
 # Part of a hollow between nodes that these may be open and still count as touching.
 TOUCHING = 0.1
@@ -88,6 +92,18 @@ class Missed(NamedTuple):
         return max(self, Missed(float(lengths[k]), tuple(where[k].tolist()), *map(float, columns)))
 
 
+def _has_between(contact: ContactLike) -> bool:
+    """Whether anything rigid may stand between nodes of facets."""
+    surface = contact.surface
+    return (surface.varies or contact.displacements.degree > 1) and not surface.deformable
+
+
+def _facets(contact: ContactLike) -> list[Facets]:
+    from dolfinx_contact.contact.facets import facets_of
+
+    return facets_of(contact.displacements, contact.facets)
+
+
 class Unseen:
     """What the nodes of some contacts cannot see.  Collective.
 
@@ -98,12 +114,8 @@ class Unseen:
     """
 
     def __init__(self, contacts: Sequence[ContactLike]):
-        self._facets = {
-            contact: facets_of(contact.displacements, contact.facets)
-            for contact in contacts
-            if (contact.surface.varies or contact.displacements.degree > 1)
-            and not contact.surface.deformable
-        }
+        between = [contact for contact in contacts if _has_between(contact)]
+        self._facets = {contact: _facets(contact) for contact in between}
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._wavy = [c for c in self._between if getattr(c.surface, "height", None) is not None]
@@ -202,6 +214,11 @@ class Unseen:
     ) -> None:
         """A linear body that turns, and grows by so much that contact feels it.  Collective."""
         if self._turn is None:
+            pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
+            most = LEVER * _spread(body, u[: body.size]) / body.thickness  # of rotations
+            felt = GROWN * body.largest(np.concatenate(pushed))
+            if body.parts[1] == 1 and 0.5 * most**2 * body.extent <= felt:
+                return
             from dolfinx_contact.step.turned import Turn
 
             self._turns = not any(contact.axial for contact in contacts)
@@ -252,6 +269,14 @@ class Unseen:
             near = contact.surface.distances(x).min(axis=1) <= sag
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
+
+
+def _spread(body: BodyLike, u: np.ndarray) -> float:
+    """Half of the largest difference of displacements, at most.  Collective."""
+    rows = body.displacements.rows(u)
+    ends = np.concatenate([of.max(axis=0, initial=-np.inf) for of in (rows, -rows)])
+    body.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+    return float(np.linalg.norm(ends.reshape(2, -1).sum(axis=0))) / 2
 
 
 def _check_side(contact: ContactLike) -> bool:
@@ -352,10 +377,7 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: floa
             np.concatenate(
                 [
                     [-1.0],
-                    *(
-                        -of.outwards @ contact.frame[-1]
-                        for of in facets_of(contact.displacements, contact.facets)
-                    ),
+                    *(-of.outwards @ contact.frame[-1] for of in _facets(contact)),
                 ]
             )
         )
@@ -431,6 +453,8 @@ def _within(
     missed: Missed,
 ) -> Missed:
     """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
+    from dolfinx_contact.contact.facets import gauss
+
     half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
     rule = 2.0 * gauss(facets.dim) - 1.0
     for _ in range(CLOSER):

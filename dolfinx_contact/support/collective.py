@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pickle
+import signal
 import sys
 from collections.abc import Callable
+from threading import current_thread, main_thread
 from time import monotonic, sleep
 from traceback import print_exception
 from typing import Any
@@ -40,6 +42,26 @@ class raised_together:
         kind, message = comm.bcast(_told(error) if comm.rank == first else None, root=first)
         if error is None:
             raise kind(f"{message} (found on rank {first})")
+
+
+class uninterrupted:
+    """Ctrl-C in the block is answered after it; in the main thread, which alone receives it."""
+
+    def __enter__(self) -> None:
+        self._came: tuple = ()
+        self._handler: Any = signal.getsignal(signal.SIGINT)
+        self._holds = current_thread() is main_thread() and callable(self._handler)
+        if self._holds:
+            signal.signal(signal.SIGINT, self._wait)
+
+    def _wait(self, *came: Any) -> None:
+        self._came = came
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        if self._holds:
+            signal.signal(signal.SIGINT, self._handler)
+            if self._came and error is None:
+                self._handler(*self._came)
 
 
 def _first_to_fail(comm: MPI.Comm, error: BaseException | None) -> int:

@@ -1,5 +1,7 @@
 """A body, or a part of it, that nothing holds is refused; one that something holds is not."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 import scenes
@@ -47,7 +49,8 @@ def test_a_model_without_cells_is_refused(state, message):
         gmsh.option.setNumber("General.Terminal", 0)
         if scenes.COMM.rank == 0:
             if state == "missing file":
-                gmsh.open("no such file.msh")
+                with suppress(Exception):  # of late gmsh itself
+                    gmsh.open("no such file.msh")
             else:
                 gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
             if state in ("no group", "group of faces"):

@@ -181,7 +181,9 @@ def test_a_step_that_stalls_is_refused_with_its_reason():
     assert 400 < refused.value.step.iterations <= 3 * 8 * 40
     assert refused.match("the law is not met at .* have changed their status in the last 50")
     assert refused.match("elements at the surface are 4.8 times as high as wide")
-    assert refused.match(r"rho 1 \(0\), from the start \(40\), half the way \(120\), nodes put back \(160\)")
+    assert refused.match(
+        r"rho 1 \(0\), from the start \(40\), half the way \(120\), nodes put back \(160\)"
+    )
 
 
 def test_a_body_that_is_hard_for_its_preconditioner_is_named():

@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
+from dolfinx_contact.contact.interface import components
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.petsc.linear_solver import LinearSolver
 from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
@@ -30,7 +31,6 @@ from dolfinx_contact.solvers.condensed.compliance import (
 )
 from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
-from dolfinx_contact.solvers.newton.contact_tangent import next_change
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
@@ -241,7 +241,7 @@ class BoundCondensedNewton:
             change = result.change
             if self._shared and error <= step.tol < change:
                 # The kernel's moves reactions between contacts of a node, which changes nothing else.
-                change = min(change, next_change(step, x))
+                change = min(change, _next_change(step, x))
             best = x, force, result, change
             lost = step.may_slide and result.error > max(ASTRAY, goal)
             if lost or max(error, change) <= step.tol:
@@ -459,9 +459,7 @@ def acting(contact: ContactLike, moved: np.ndarray) -> Friction:
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
 
 
-def components(contacts: Sequence[ContactLike]) -> int:
-    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
-    smooth = all(contact.friction.frictionless for contact in contacts)
-    if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
-        return 1
-    return contacts[0].points.dim
+def _next_change(step: StepLike, x: np.ndarray) -> float:
+    from dolfinx_contact.solvers.newton.contact_tangent import next_change
+
+    return next_change(step, x)

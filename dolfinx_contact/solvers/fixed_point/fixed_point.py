@@ -13,7 +13,6 @@ from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
-from dolfinx_contact.solvers.fixed_point.put_back import put_back, wrong
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
 
@@ -154,6 +153,7 @@ class BoundFixedPoint:
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
         said = []
         if not search.within and not _slides(step, search.best, tried=True):
+            from dolfinx_contact.solvers.fixed_point.put_back import wrong
             from dolfinx_contact.step.stalled import stalled
 
             said += stalled(self._body, self._contacts, search.statuses, wrong(step, search.best))
@@ -175,6 +175,8 @@ class BoundFixedPoint:
                 elif where == HALF:
                     yield where, factor, every, self._half_way(search, factor)
                 else:
+                    from dolfinx_contact.solvers.fixed_point.put_back import put_back
+
                     yield "nodes put back", factor, every, put_back(search.step, search.best, where)
             if _slides(search.step, search.best, tried=True):
                 return

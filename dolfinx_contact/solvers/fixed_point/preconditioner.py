@@ -13,7 +13,6 @@ from scipy import sparse
 
 from dolfinx_contact.contact.interface import like, structure
 from dolfinx_contact.petsc.linear_solver import stage
-from dolfinx_contact.solvers.fixed_point.border import Border
 from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 
@@ -47,9 +46,11 @@ class ContactPreconditioner:
             self._softened = False
         self._A = A
         self.followed = body.loose is not None or any(c.surface.motions for c in contacts)
-        self._border = self.followed and Border(
-            body, contacts, A, self.stiffened, self._spring_rates
-        )
+        self._border = None
+        if self.followed:
+            from dolfinx_contact.solvers.fixed_point.border import Border
+
+            self._border = Border(body, contacts, A, self.stiffened, self._spring_rates)
         S.destroy()
 
     def soften(self) -> bool:
