@@ -12,6 +12,7 @@ from dolfinx_contact.analysis.estimate import estimate as estimate
 from dolfinx_contact.analysis.increments import advance as advance
 from dolfinx_contact.bodies.internal_variables import InternalVariables as InternalVariables
 from dolfinx_contact.contact.contact import Contact as Contact
+from dolfinx_contact.contact.deformable import DeformableSurface as DeformableSurface
 from dolfinx_contact.contact.state import Status as Status
 from dolfinx_contact.law.friction import Friction as Friction
 from dolfinx_contact.law.wear import Wear as Wear
@@ -32,7 +33,6 @@ from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint as FixedP
 from dolfinx_contact.solvers.newton.snes import SNES as SNES
 from dolfinx_contact.solvers.newton.sparse_newton import SparseNewton as SparseNewton
 from dolfinx_contact.support.checks import RoundingWarning as RoundingWarning
-from dolfinx_contact.surfaces.deformable import DeformableSurface as DeformableSurface
 from dolfinx_contact.surfaces.level_set import RigidSurface as RigidSurface
 from dolfinx_contact.surfaces.plane import RigidPlane as RigidPlane
 from dolfinx_contact.surfaces.round import RigidCylinder as RigidCylinder

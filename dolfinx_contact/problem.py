@@ -15,7 +15,6 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.interface import surfaces_of
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     NUMBERS,
@@ -40,6 +39,8 @@ from dolfinx_contact.problem_input import (
 )
 from dolfinx_contact.problem_states import Kept, ProblemStates
 from dolfinx_contact.results.record import (
+    NO_SOLUTION,
+    UNHELD,
     Counts,
     NotConverged,
     Step,
@@ -52,10 +53,10 @@ from dolfinx_contact.results.record import (
     warn_of_rounding,
 )
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
+from dolfinx_contact.solvers.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
-from dolfinx_contact.step.trial import NO_SOLUTION, UNHELD, floating, unmoved, without_reactions
 from dolfinx_contact.step.unseen import Unseen
-from dolfinx_contact.support.attributes import Guarded
+from dolfinx_contact.support.attributes import Guarded, surfaces_of
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together, uninterrupted
 

@@ -17,9 +17,10 @@ from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.forms import check_meshes, derivative_of
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.interface import components, surfaces_of
+from dolfinx_contact.contact.interface import components
 from dolfinx_contact.petsc.linear_solver import CROWDED
 from dolfinx_contact.petsc.linear_solver import LARGE as TOO_LARGE
+from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import agree, raised_together
 

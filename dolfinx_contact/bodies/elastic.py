@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import ufl
 
     from dolfinx_contact.bodies.anchors import Anchors
-    from dolfinx_contact.step.loose import LooseMotions
+    from dolfinx_contact.bodies.loose import LooseMotions
 
 _instances = count()
 

@@ -11,9 +11,9 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.loose import LooseMotions
     from dolfinx_contact.contact.displacements import Displacements
     from dolfinx_contact.solvers.protocols import BodyLike
-    from dolfinx_contact.step.loose import LooseMotions
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
@@ -64,7 +64,7 @@ def soft_motions(body: BodyLike) -> tuple[np.ndarray, LooseMotions | None]:
         soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
     if not loose:
         return np.concatenate(soft, axis=1), None
-    from dolfinx_contact.step.loose import LooseMotions, LoosePart
+    from dolfinx_contact.bodies.loose import LooseMotions, LoosePart
 
     return np.concatenate(soft, axis=1), LooseMotions([LoosePart(*part) for part in loose])
 

@@ -27,14 +27,13 @@ from dolfinx_contact.contact.input import (
     checked_facets,
     given_facets,
 )
-from dolfinx_contact.contact.interface import ContactPoints, add_to
+from dolfinx_contact.contact.interface import ContactPoints, NodalStiffness, add_to
 from dolfinx_contact.contact.laws import Laws, rows
 from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, place, positive
 from dolfinx_contact.support.collective import agree, raised_together

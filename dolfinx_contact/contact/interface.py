@@ -5,21 +5,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact.step.errors import EPSILON, NodalStiffness
+from dolfinx_contact.support.checks import STILL
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import ContactLike
-    from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
-FREE, STILL = 1e-12, 64 * EPSILON
+FREE = 1e-12
+
+
+class NodalStiffness(NamedTuple):
+    """Blocks of the stiffness at the contact nodes, local frame, force per length."""
+
+    normal: np.ndarray  # kappa, (n,)
+    tangential: np.ndarray  # (n, gdim - 1, gdim - 1)
 
 
 class ContactPoints:
@@ -275,11 +281,6 @@ def structure(points: Sequence[ContactPoints]) -> PETSc.Mat.Structure:
     kinds = PETSc.Mat.Structure
     local = all(of.local for of in points)
     return kinds.SUBSET_NONZERO_PATTERN if local else kinds.DIFFERENT_NONZERO_PATTERN
-
-
-def surfaces_of(contacts: Iterable[ContactLike]) -> list[Surface]:
-    """The surfaces of contacts, each once."""
-    return list({id(contact.surface): contact.surface for contact in contacts}.values())
 
 
 def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:

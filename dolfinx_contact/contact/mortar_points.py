@@ -22,11 +22,16 @@ from scipy.spatial.transform import Rotation
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import nearest_rotation
-from dolfinx_contact.contact.interface import FREE, ContactPoints, block_diagonal, nodal_blocks
+from dolfinx_contact.contact.interface import (
+    FREE,
+    ContactPoints,
+    NodalStiffness,
+    block_diagonal,
+    nodal_blocks,
+)
 from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
 from dolfinx_contact.contact.placement import CLEAR, Placed, Placement, carried, times, turned_back
 from dolfinx_contact.contact.state import State
-from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import frames_along

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dolfinx_contact.law.maps import ReturnMap
-from dolfinx_contact.step.errors import EPSILON
+from dolfinx_contact.support.checks import EPSILON
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.protocols import LawLike

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State
-from dolfinx_contact.step.errors import EPSILON
 from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.checks import EPSILON
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, composed, cross, rotation_between
 

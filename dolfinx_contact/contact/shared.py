@@ -19,8 +19,8 @@ from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part, times
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import ContactLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 # By which the product of two unit normals may miss one for them to be the same.
 ALIKE = 1e-12

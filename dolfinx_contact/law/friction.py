@@ -427,3 +427,13 @@ def split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero vectors stay zero."""
     length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
     return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)
+
+
+def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
+    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
+    turns = np.tile(np.eye(dim), (nodes, 1, 1))
+    if friction.axes is not None:
+        cos, sin = friction.axes.T
+        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
+        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
+    return turns

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.step.errors import ROUNDED
-from dolfinx_contact.support.checks import RoundingWarning
+from dolfinx_contact.support.checks import ROUNDED, RoundingWarning
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import SolverResult
@@ -24,6 +23,9 @@ WORSE = 1e3
 
 # Part of the frictional work that a step may leave unknown without a word.
 DOUBTFUL = 0.1
+
+# Reasons of steps that have no solution, in words.
+NO_SOLUTION, UNHELD = "there is no solution", "a body leaves what held it"
 
 
 class Counts(NamedTuple):

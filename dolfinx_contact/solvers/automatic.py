@@ -13,9 +13,9 @@ from dolfinx_contact.contact.interface import components
 from dolfinx_contact.solvers.base import SolverResult
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.base import Solver
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 
 # Errors above which a state is no better a start than another solver's own.

@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 KEPT = 64  # earlier steps in the memory of a problem: more than most load cycles have
 

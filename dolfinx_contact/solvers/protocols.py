@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.bodies.anchors import Anchors
     from dolfinx_contact.bodies.free_state import FreeState
+    from dolfinx_contact.bodies.loose import LooseMotions
     from dolfinx_contact.contact.displacements import Displacements
-    from dolfinx_contact.contact.interface import ContactPoints
+    from dolfinx_contact.contact.interface import ContactPoints, NodalStiffness
     from dolfinx_contact.contact.placement import Placement
     from dolfinx_contact.contact.state import State
     from dolfinx_contact.law.friction import Friction
     from dolfinx_contact.law.wear import Wear
     from dolfinx_contact.petsc.linear_solver import LinearSolver
     from dolfinx_contact.results.record import Counts
-    from dolfinx_contact.step.errors import Errors, NodalStiffness
+    from dolfinx_contact.step.errors import Errors
     from dolfinx_contact.step.load_step import Judged
-    from dolfinx_contact.step.loose import LooseMotions
     from dolfinx_contact.step.statics import Statics
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.held import HeldSurfaces

@@ -32,25 +32,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
+from dolfinx_contact.support.checks import EPSILON, ROUNDED
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.law.friction import Friction
     from dolfinx_contact.solvers.protocols import ContactLike
 
-EPSILON = np.finfo(float).eps / 2  # of one operation
-
-# Rounding is an estimate: up to this factor, errors may be rounding alone.
-ROUNDED = 2.0
-
 # If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
 BLIND = 1e-3
-
-
-class NodalStiffness(NamedTuple):
-    """Blocks of the stiffness at the contact nodes, local frame, force per length."""
-
-    normal: np.ndarray  # kappa, (n,)
-    tangential: np.ndarray  # (n, gdim - 1, gdim - 1)
 
 
 class Errors(NamedTuple):

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.contact.interface import surfaces_of
+from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.placement import LONGEST
-from dolfinx_contact.solvers.fixed_point.anderson import Anderson
-from dolfinx_contact.step.errors import NodalStiffness
+from dolfinx_contact.support.anderson import Anderson
+from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.state import State, Status
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.results.record import WORSE, Counts, counts
 from dolfinx_contact.step.errors import (
-    EPSILON,
-    ROUNDED,
     Errors,
-    NodalStiffness,
     as_errors,
     at_rest,
     contact_defects,
     contact_rounding,
 )
+from dolfinx_contact.support.checks import EPSILON, ROUNDED
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import driven_surfaces
 

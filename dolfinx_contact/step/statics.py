@@ -12,10 +12,11 @@ from mpi4py import MPI
 
 from dolfinx_contact.bodies.forms import times_volume
 from dolfinx_contact.contact.nodal import times
+from dolfinx_contact.law.friction import principal_axes
 from dolfinx_contact.law.maps import ReturnMap
-from dolfinx_contact.solvers.condensed.input import principal_axes
-from dolfinx_contact.step.errors import BLIND, EPSILON, contact_rounding
-from dolfinx_contact.step.trial import NO_SOLUTION, UNHELD
+from dolfinx_contact.results.record import NO_SOLUTION, UNHELD
+from dolfinx_contact.step.errors import BLIND, contact_rounding
+from dolfinx_contact.support.checks import EPSILON
 from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 

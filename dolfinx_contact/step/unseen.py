@@ -19,8 +19,8 @@ from mpi4py import MPI
 
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.fields import nearest_rotation
+from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.results.record import Counts
-from dolfinx_contact.step.errors import NodalStiffness
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.solvers.fixed_point.anderson import Anderson
+from dolfinx_contact.support.anderson import Anderson
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 # Stiffness with which depths follow, over the node's own.
 STIFF = 2.0

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -90,3 +91,8 @@ class Guarded:
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"{type(self).__name__}.{name} cannot be deleted.")
+
+
+def surfaces_of(contacts: Iterable[Any]) -> list[Any]:
+    """The surfaces of contacts, each once."""
+    return list({id(contact.surface): contact.surface for contact in contacts}.values())

@@ -17,6 +17,15 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12
 
 
+EPSILON = np.finfo(float).eps / 2  # of one operation
+
+# Rounding is an estimate: up to this factor, errors may be rounding alone.
+ROUNDED = 2.0
+
+# Part of a length, or of a motion, that is none.
+STILL = 64 * EPSILON
+
+
 class RoundingWarning(UserWarning):
     """The answer is as accurate as double precision allows, but not to the requested tolerance.
 

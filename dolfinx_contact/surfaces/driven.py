@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.interface import surfaces_of
+from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
 

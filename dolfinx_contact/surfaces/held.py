@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.interface import STILL, surfaces_of
-from dolfinx_contact.support.checks import place
+from dolfinx_contact.support.attributes import surfaces_of
+from dolfinx_contact.support.checks import STILL, place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:

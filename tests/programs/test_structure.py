@@ -94,6 +94,22 @@ def test_there_is_no_import_circle():
     assert "dolfinx_contact.step.load_step" in graph["dolfinx_contact.problem"]
 
 
+def test_no_two_folders_import_each_other():
+    """Of two folders of the package at most one imports from the other, be it at the start or later."""
+    pairs = set()
+    for file, tree in TREES.items():
+        for other in imports(tree):
+            ends = [module.split(".")[:2] for module in (name(file), other)]
+            whole = [
+                module.count(".") > 1 and module.startswith("dolfinx_contact.")
+                for module in (name(file), other)
+            ]
+            if all(whole) and ends[0] != ends[1]:
+                pairs.add((ends[0][1], ends[1][1]))
+    assert ("step", "contact") in pairs
+    assert not [pair for pair in pairs if pair[::-1] in pairs]
+
+
 def test_the_repository_is_light():
     """All tracked files together are below 5 MB: what programs make is made, not tracked."""
     if not (ROOT / ".git").exists():

@@ -15,7 +15,7 @@ PLAIN = {
     "bodies.elastic", "bodies.forms", "bodies.free_state", "bodies.rigid_motion", "bodies.stiffness_checks", "compat",
     "contact.contact", "contact.displacements", "contact.fields", "contact.input", "contact.interface", "contact.laws", "contact.placement",
     "contact.state", "law.dissipation", "law.friction", "law.maps", "petsc.entries", "petsc.linear_solver", "problem", "problem_input",
-    "problem_states", "results.record", "solvers.base", "step.errors", "step.load_step", "step.trial", "step.unseen", "support.attributes",
+    "problem_states", "results.record", "solvers.base", "step.errors", "step.load_step", "solvers.trial", "step.unseen", "support.attributes",
     "support.checks", "support.collective", "surfaces.plane", "surfaces.surface",
 }  # fmt: skip
 SPARSE = {
@@ -26,8 +26,8 @@ SPARSE = {
 }
 SOLVER = {
     "CondensedNewton": {f"solvers.condensed.{name}" for name in ("body", "compliance", "input", "kernel", "newton", "result")},
-    "FixedPoint": {f"solvers.fixed_point.{name}" for name in ("anderson", "fixed_point", "preconditioner", "rigid_balance", "surface_layer")}
-    | {"solvers.newton.contact_tangent", "solvers.search", "support.line_search"},
+    "FixedPoint": {f"solvers.fixed_point.{name}" for name in ("fixed_point", "preconditioner", "rigid_balance", "surface_layer")}
+    | {"solvers.newton.contact_tangent", "solvers.search", "support.anderson", "support.line_search"},
     "SparseNewton": SPARSE,
     "SNES": SPARSE | {"solvers.newton.snes"},
 }  # fmt: skip

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from dolfinx_contact.contact.interface import components
-from dolfinx_contact.law.friction import Friction
+from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.petsc.linear_solver import LinearSolver
 from dolfinx_contact.solvers.base import KEPT, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
@@ -29,14 +29,14 @@ from dolfinx_contact.solvers.condensed.compliance import (
     one_below_other,
     tie,
 )
-from dolfinx_contact.solvers.condensed.input import joint_friction, principal_axes
+from dolfinx_contact.solvers.condensed.input import joint_friction
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 # Iterations for a loose body that seems to slide away, for any other, and the error above which it is not digits that miss.
 FEW, MANY, ASTRAY = 3000, 6000, 1e-3

@@ -91,16 +91,6 @@ def checked_compliance(W: Any) -> np.ndarray:
     return finite("W", W.toarray(), copy=False)
 
 
-def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
-    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
-    turns = np.tile(np.eye(dim), (nodes, 1, 1))
-    if friction.axes is not None:
-        cos, sin = friction.axes.T
-        turns[:, 0, 0], turns[:, 0, 1] = cos, sin
-        turns[:, 1, 0], turns[:, 1, 1] = -sin, cos
-    return turns
-
-
 def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
     """Whether it is proved that a gap is negative, whatever the reactions.
 

@@ -14,12 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.solvers.condensed.input import (
-    checked_problem,
-    no_way_out,
-    principal_axes,
-)
+from dolfinx_contact.law.friction import Friction, principal_axes
+from dolfinx_contact.solvers.condensed.input import checked_problem, no_way_out
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.solvers.condensed.result import (
     Attempt,

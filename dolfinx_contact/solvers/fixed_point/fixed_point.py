@@ -11,14 +11,14 @@ import numpy as np
 
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
-from dolfinx_contact.solvers.fixed_point.anderson import Anderson
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
+from dolfinx_contact.support.anderson import Anderson
 from dolfinx_contact.support.checks import positive
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike, StepLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.

@@ -18,8 +18,8 @@ from dolfinx_contact.step.nonlinear import LinearisedStep
 from dolfinx_contact.support.line_search import halves
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import ContactLike, NonlinearBodyLike, StepLike
-    from dolfinx_contact.step.errors import NodalStiffness
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
 # largest of the last BEFORE ones.

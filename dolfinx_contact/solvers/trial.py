@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dolfinx_contact.petsc.linear_solver import stage
+from dolfinx_contact.results.record import NO_SOLUTION
 from dolfinx_contact.solvers.base import SolverName, SolverResult
 
 if TYPE_CHECKING:
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
 # Penetration over the largest displacement that three digits of it leave no doubt about.
 CERTAIN = 0.1
 
-NOTHING, NO_SOLUTION = "nothing touches", "there is no solution"
-UNHELD = "a body leaves what held it"
+NOTHING = "nothing touches"
 
 
 def without_reactions(
