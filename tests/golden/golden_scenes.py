@@ -396,9 +396,16 @@ def corner(**options):
 
 @scene()
 def edge(**options):
-    """The edge of a block in a groove, dragged along it, too."""
+    """The edge of a block in a groove, pressed deeper and dragged along it."""
+    way = [Push(along=0.3), Push(down=1.1, along=0.5), Push(0.1, 1.2, 0.9), Push(0.1, 1.1, 1.1)]
+    yield from grooved_by(way, 70, (3, 3, 2), mu=0.05, options=options)
+
+
+@scene()
+def edge_of_a_smooth_face(**options):
+    """The same with friction on one face alone, dragged from face to face."""
     way = [Push(), Push(across=0.3), Push(across=-0.3, down=1.2, along=0.2)]
-    yield from grooved_by(way, 70, (3, 3, 2), mu=0.1, options=options)
+    yield from grooved_by(way, 70, (3, 3, 2), mu=[0.0, 0.3], options=options)
 
 
 @scene()
@@ -408,8 +415,8 @@ def floor_and_wall(**options):
     problem = dc.ContactProblem(s.F, s.u, s.contacts, bcs=s.bcs, **options)
     floor = max(s.contacts, key=lambda c: c.surface.normal[1]).surface
     floor.free = ("n",)
-    for across, press in ((0.0, 100), (-0.02, 100), (-0.02, 120)):
-        s.apply(Push(across=across, down=0.1))
+    for across, press in ((0.0, 100), (0.1, 100), (0.15, 120)):
+        s.apply(Push(across, down=0.1))
         floor.force = press * floor.normal
         yield problem
 
@@ -519,18 +526,18 @@ def by_pressure(**options):
 
 
 @scene()
+def ball_by_pressure(**options):
+    """The same over a sphere: normals change within the step, too."""
+    friction = dc.Friction(lambda x, pressure: 0.15 + 0.25 / (1 + pressure / 100.0))
+    yield from moved(low(ball(None), friction, **options), *OVER[1:])
+
+
+@scene()
 def by_path(**options):
     """Friction that rises with the path slipped."""
     s = scenes.block(cells=(6, 3), **EVEN, **options)
     s.contact.friction = dc.Friction(lambda x, slip_path: 0.2 + 20 * np.minimum(slip_path, 0.01))
     yield from moved(s, *DRAG_2D)
-
-
-@scene()
-def ball_by_pressure(**options):
-    """The same over a sphere, where normals change within the step, too."""
-    friction = dc.Friction(lambda x, pressure: 0.15 + 0.25 / (1 + pressure / 100.0))
-    yield from moved(low(ball(None), friction, **options), *OVER[1:])
 
 
 # -- two deformable bodies ---------------------------------------------------------------------------------------------

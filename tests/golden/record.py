@@ -103,10 +103,8 @@ COMPARED = dict(forces=FORCE, moved=FORCE, work=SUM, worn=SUM)  # of the largest
 def rounded(values, tolerance) -> list:
     """Numbers to the digits that are compared, and one or two more."""
     largest = np.abs(values).max(initial=0.0)
-    if largest == 0.0:
-        return np.zeros(values.shape, dtype=int).tolist()
-    digits = int(np.ceil(-np.log10(largest * tolerance * DIGITS)))
-    return [[float(f"{value:.{max(digits, 0)}f}") if digits < 20 else float(f"{value:.9e}") for value in step] for step in values]  # fmt: skip
+    digits = 0 if largest == 0.0 else int(np.ceil(-np.log10(largest * tolerance * DIGITS)))
+    return [[round(value, digits) + 0.0 for value in step] for step in values.tolist()]
 
 
 def recorded(name, solver) -> dict:

@@ -19,7 +19,8 @@ CASES = [pytest.param(*case, id=title(*case)) for case in cases()]
 
 def iterations(case, ranks) -> list:
     """Iteration counts of the steps, None where one is refused."""
-    return case.get("two" if ranks == 2 else "", [step[3] for step in case["steps"]])
+    alone = [step[3] for step in case["steps"]]
+    return case.get("two", alone) if ranks == 2 else alone
 
 
 @pytest.mark.parametrize("name, solver", CASES)
