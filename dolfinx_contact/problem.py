@@ -341,7 +341,7 @@ class ContactProblem(Guarded):
             )
         for contact in self.contacts:
             contact.renew_gaps(found.x)
-        if self.body.comm.allreduce(any(c.opens for c in self.contacts), op=MPI.LOR):
+        if self.body.comm.allreduce(any(c.opens.any() for c in self.contacts), op=MPI.LOR):
             from dolfinx_contact.step.touching import opening
 
             opening(self.body, self.contacts, step, self.geometry_tol)
@@ -397,18 +397,8 @@ class ContactProblem(Guarded):
         kind = LoadStep
         if body.nonlinear:
             from dolfinx_contact.step.nonlinear import NonlinearStep as kind
-        given = (
-            self._stiffness,
-            b,
-            external,
-            starts,
-            self.tol,
-            self._unit,
-            self.monitor,
-            holding,
-            last,
-        )
-        return kind(body, self.contacts, *given)
+        given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
+        return kind(body, self.contacts, *given, holding, last)
 
     def _predicted(self, b: np.ndarray) -> np.ndarray:
         """Where a step is likely to end, for rows between bodies that slide: under the new loads, with the last reactions.  Collective.

@@ -201,13 +201,13 @@ class Contact(Guarded):
     @wear.setter
     def wear(self, wear: Wear | None) -> None:
         check_wear(wear, self.surface)
-        self._wear_field = None
+        field = None
         with raised_together(self.comm):
             if wear is not None:
                 from dolfinx_contact.contact.friction_field import wear_on_nodes
 
-                self._wear_field = wear_on_nodes(self, wear)
-        self._laws.wear = wear
+                field = wear_on_nodes(self, wear)
+        self._laws.wear, self._wear_field = wear, field
 
     @property
     def repeats(self) -> float:
@@ -423,10 +423,9 @@ class Contact(Guarded):
         return bool(landing.any()) and not self.friction.frictionless
 
     @property
-    def opens(self) -> bool:
-        """Whether nodes of this rank that touched at the end of the last step are open in the present state."""
-        settled = self.settled.reaction[:, -1]
-        return bool(((settled > 0.0) & (self.reaction[:, -1] == 0.0)).any())
+    def opens(self) -> np.ndarray:
+        """Nodes that touched at the end of the last step and are open in the present state, ``shape=(n,)``, booleans."""
+        return (self.settled.reaction[:, -1] > 0.0) & (self.reaction[:, -1] == 0.0)
 
     def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""

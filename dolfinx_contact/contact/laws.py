@@ -84,9 +84,14 @@ class Laws:
         return self._field is not None and self._field.of == "surface"
 
     @property
+    def _axes_vary(self) -> bool:
+        """Whether axes are a field."""
+        return self._field is not None and is_field(self._field.given()["axes"])
+
+    @property
     def body_has_axes(self) -> bool:
         """Whether a field of axes belongs to the body."""
-        return self._field is not None and self._field.of == "body" and is_field(self._field.given()["axes"])  # fmt: skip
+        return self._axes_vary and self._field.of == "body"
 
     def turned(
         self, contact: ContactLike, at: np.ndarray, frame: np.ndarray, points: Any = None
@@ -102,8 +107,9 @@ class Laws:
         used, deformable = self.friction.axes, contact.surface.deformable
         if not (self.textured or deformable) or self.friction.isotropic or contact.points.dim == 2:
             return 0.0
-        given = self._field is not None and is_field(self._field.given()["axes"])
-        new = _fields().axes_at(contact, self._field, at, frame, points) if given else used
+        new = used
+        if self._axes_vary:
+            new = _fields().axes_at(contact, self._field, at, frame, points)
         if deformable:  # their frames turn as well
             old = contact.frame
             new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
@@ -163,7 +169,7 @@ class Laws:
         law, texture = self.friction, {}
         if self._field is not None:
             law = self._evaluated(contact, self._field, empty=True, axes=law.axes)
-            if is_field(self._field.given()["axes"]):
+            if self._axes_vary:
                 texture = {"texture": _fields().directions(contact, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else np.inf if self.wear.field else self.wear.coefficient

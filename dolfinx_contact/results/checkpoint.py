@@ -34,7 +34,8 @@ VERSION = 2
 
 # Ends of the names of arrays that not every history has, and of those that files of the first version, and of none, may lack.
 SOME = ("law_of_last_step", "home", "rotation_of_plane")
-LACKING = [(*SOME, "_placed", "_worn", "fixed", "laws", "texture", "rigid_plane", "slip_kept"), (*SOME, "_placed", "_worn", "fixed"), SOME]  # fmt: skip
+FIRST = (*SOME, "_placed", "_worn", "fixed")
+LACKING = [(*FIRST, "laws", "texture", "rigid_plane", "slip_kept"), FIRST, SOME]
 
 ANEW = "Take another one, or write it anew with problem.save."
 
@@ -234,7 +235,7 @@ def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: A
     """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
     if not {"u", "before", "nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
-    if (version := _number(path, file, "version", 0)) > VERSION:
+    if not 0 <= (version := _number(path, file, "version", 0)) <= VERSION:
         raise ValueError(
             f"checkpoint {path} is of version {version:.0f}, this dolfinx_contact reads up to {VERSION}: take the one that wrote it."
         )

@@ -235,10 +235,8 @@ class SurfaceMesh:
 
     def _gaps(self, moved: np.ndarray) -> np.ndarray:
         """Of all nodes: of those that are no contact nodes the distance from the surface where it stands."""
-        contact = self._contact
-        gaps = self._placed(
-            np.where(np.isinf(contact.gap), np.nan, contact.gap)
-        )  # pictures leave it out
+        contact, gap = self._contact, self._contact.gap
+        gaps = self._placed(np.where(np.isinf(gap), np.nan, gap))  # pictures leave it out
         others = np.setdiff1d(np.arange(self._owned.size), self._at)
         if others.size and not contact.surface.deformable:
             dim = moved.shape[1]

@@ -10,16 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.interface import components
-from dolfinx_contact.solvers.base import SolverResult
+from dolfinx_contact.solvers.base import ASTRAY, SolverResult
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.base import Solver
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
-
-# Errors above which a state is no better a start than another solver's own.
-ASTRAY = 1e-3
 
 # Largest number of multigrid solves for the condensed operator after the fixed point has failed: about a thousand cycles.
 MOST_SOLVES = 100

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
 
+ASTRAY = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
+
 KEPT = 64  # earlier steps in the memory of a problem: more than most load cycles have
 
 

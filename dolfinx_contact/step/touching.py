@@ -108,7 +108,7 @@ def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol
         step: The ``LoadStep``.
         tol: Part of the reactions which does not matter.
     """
-    opens = [(c.settled.reaction[:, -1] > 0.0) & (c.reaction[:, -1] == 0.0) for c in contacts]
+    opens = [contact.opens for contact in contacts]
     squares = [np.square(c.settled.reaction[at]).sum() for c, at in zip(contacts, opens)]
     size = np.sqrt(body.total([sum(squares)])[0])
     if size == 0.0 or size <= tol * step.carried(tol):

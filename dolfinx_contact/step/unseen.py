@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.rigid_motion import mean_strain
-from dolfinx_contact.contact.fields import nearest_rotation
+from dolfinx_contact.contact.fields import turn_of_nodes
 from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.results.record import Counts
 from dolfinx_contact.support.collective import raised_together
@@ -213,10 +213,10 @@ class Unseen:
         u: np.ndarray,
     ) -> None:
         """A linear body that turns, and grows by so much that contact feels it.  Collective."""
+        pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
+        felt = GROWN * body.largest(np.concatenate(pushed))
         if self._turn is None:
-            pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
             most = LEVER * _spread(body, u[: body.size]) / body.thickness  # of rotations
-            felt = GROWN * body.largest(np.concatenate(pushed))
             if body.parts[1] == 1 and 0.5 * most**2 * body.extent <= felt:
                 return
             from dolfinx_contact.step.turned import Turn
@@ -228,8 +228,7 @@ class Unseen:
         if theta <= CLEAR:
             return
         length = 0.5 * theta**2 * body.extent
-        pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, stiffness)]
-        if not self._turns or length <= GROWN * body.largest(np.concatenate(pushed)):
+        if not self._turns or length <= felt:
             return
         if length <= -body.highest(-np.concatenate([contact.present.gap for contact in contacts])):
             return
@@ -297,11 +296,10 @@ def _check_side(contact: ContactLike) -> bool:
 
 def _check_axes(contact: ContactLike, u: np.ndarray) -> bool:
     """Warn of a body that has turned on a rigid surface, which carries no axes of a body; whether it has.  Collective."""
-    x, dim = contact.x[:, :3], contact.points.dim
-    pairs = np.stack((x, x + u[contact.displacements.dofs(contact.nodes)]))
-    count = contact.comm.allreduce(len(x))
-    pairs -= contact.comm.allreduce(pairs.sum(axis=1))[:, None] / max(count, 1)
-    turned = nearest_rotation(contact.comm.allreduce(pairs[1].T @ pairs[0]))
+    dim = contact.points.dim
+    x = contact.x[:, :dim]
+    moved = u[contact.displacements.dofs(contact.nodes)]
+    turned = turn_of_nodes(x, x + moved, contact.comm)
     angle = float(np.arccos(np.clip((np.trace(turned) - dim + 2) / 2, -1.0, 1.0)))
     if angle <= STAY:
         return False

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from two_bodies import COMM, E, dc, stress
+from two_bodies import E, dc, largest, rubber, stress
 
 from dolfinx_contact.compat import functionspace
 from mechanics.two_blocks import pair
@@ -17,10 +17,6 @@ pytestmark = pytest.mark.ranks
 
 MU, MIDDLE = (0.3, 0.1), np.array([1.0, 1.0, 0.0])
 ALONG = np.array([np.cos(0.4), np.sin(0.4), 0.0])  # of the grooves
-
-
-def largest(values) -> float:
-    return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
 
 
 def directions(x):
@@ -47,11 +43,7 @@ class Pair:
         domain, top, bottom, upper, lower, _ = pair("hexahedron", cells, (1.0, 2.0))
         self.V = V = functionspace(domain, ("Lagrange", 1, (3,)))
         self.u, self.way = fem.Function(V), fem.Function(V)
-        G = ufl.Identity(3) + ufl.grad(self.u)
-        log = ufl.ln(ufl.det(G))
-        energy = 50 * (ufl.tr(G.T * G) - 3 - 2 * log) + 50 * log**2
-        dx = ufl.dx(metadata={"quadrature_degree": 2})
-        F = ufl.derivative(energy * dx, self.u, ufl.TestFunction(V))
+        F = rubber(self.u, 100.0, 100.0)
         ends = fem.locate_dofs_topological(V, 2, np.concatenate((top, bottom)))
         axis = ALONG if how in ("axis", "array") else (1, 0, 0)
         friction = dc.Friction(MU)

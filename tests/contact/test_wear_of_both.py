@@ -7,7 +7,7 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from mixed_scenes import elasticity, held, taylor_hood
-from two_bodies import COMM, blocks, dc, pair, rubber
+from two_bodies import COMM, blocks, dc, largest, pair, rubber
 
 pytestmark = pytest.mark.ranks
 
@@ -17,10 +17,6 @@ K = (
 )  # of the upper and the lower body; at the speed of these scenes a part of the elastic compression
 CELLS = {"quadrilateral": ((4, 2), (15, 2)), "triangle": ((4, 2), (15, 2)), "hexahedron": ((2, 2, 1), (7, 3, 1)), "tetrahedron": ((2, 2, 1), (5, 2, 1))}  # fmt: skip
 slow = [pytest.param(*case, marks=pytest.mark.slow) for case in (("hexahedron", 1), ("tetrahedron", 2))]  # fmt: skip
-
-
-def largest(values) -> float:
-    return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
 
 
 def rubbed(cell, degree, ways=4, swapped=False, scale=1.0, size=(1.0, 3.0), far=0.8, cells=None, form=None, **options):  # fmt: skip

@@ -83,9 +83,14 @@ def test_every_array_is_checked(harm, scene, saved):
 def test_values_that_no_step_leaves_are_refused(scene, saved):
     """A status that is none, work below zero, and starts for the solver that fit no node."""
     path, file = saved
-    for name, wrong in (("contact0_status", 7), ("contact0_dissipation", -1.0), ("version", 99)):
+    for name, wrong in (
+        ("contact0_status", 7),
+        ("contact0_dissipation", -1.0),
+        ("version", 99),
+        ("version", -5),
+    ):
         rewritten(path, file | {name: np.full_like(file[name], wrong)})
-        with pytest.raises(ValueError, match="no step leaves|version 99"):
+        with pytest.raises(ValueError, match="no step leaves|version 99|version -5"):
             scene.problem.load(path)
     if "past" in file:
         for past in (file["past"][:, :1], file["past"][..., :-1]):

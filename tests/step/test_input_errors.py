@@ -427,3 +427,20 @@ def test_nothing_that_is_not_finite_becomes_a_result(place, bad):
     scene.force.value[0], scene.modulus.value = 0.0, 210e3
     scene.move_top(0, 0, -0.02)
     assert scene.problem.solve().error <= 1e-10
+
+
+def test_a_law_of_wear_that_is_refused_leaves_the_one_before():
+    """A field with negative values is a mistake: the contact keeps its law of wear, and a step wears as with it."""
+    found = []
+    for mistaken in (False, True):
+        scene = scenes.block(cells=(2, 2, 2), mu=0.3, p=None)
+        scene.contact.wear = law = dc.Wear(lambda x: 1e-7 + 0 * x[0])
+        if mistaken:
+            with pytest.raises(ValueError, match="must be >= 0"):
+                scene.contact.wear = dc.Wear(lambda x: -1.0 + 0 * x[0])
+        assert scene.contact.wear is law
+        for way in (0.0, 0.01):
+            scene.move_top(way, 0, -0.01)
+            scene.problem.solve()
+        found.append(np.sum(scene.contact.worn_volume()))
+    assert found[0] == found[1] > 0.0

@@ -19,6 +19,11 @@ from mechanics.two_blocks import pair
 E, NU = 210e3, 0.3
 
 
+def largest(values) -> float:
+    """Largest magnitude over all ranks."""
+    return max(COMM.allgather(float(np.abs(values).max(initial=0.0))))
+
+
 def moduli_of(domain, above, moduli):
     """Young's modulus by cells, its Lame parameter and shear modulus."""
     modulus = fem.Function(functionspace(domain, ("DG", 0)))
