@@ -107,8 +107,8 @@ class ContactProblem(Guarded):
 
     Attributes:
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number in the
-            step, largest error and ``Counts``.  For iterates of the condensed problem, the error is the residual over the largest
-            reaction; the errors of the body follow.
+            step, largest error and ``Counts``; far from ``tol`` the error of equilibrium alone.  For iterates of the condensed
+            problem, the error is the residual over the largest reaction; the errors of the body follow.
 
     ``logging.getLogger("dolfinx_contact")`` gets a line per step, of level INFO, on rank 0; ``logging.basicConfig(level=20, force=True)``
     prints them.

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion, stiffness_checks
-from dolfinx_contact.bodies.forms import digest_of
+from dolfinx_contact.bodies.forms import digest_of, same_values, values_of
 from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver, preconditioner
@@ -78,7 +78,8 @@ class ElasticBody(OverRanks):
         default = DIRECT if self.displacements.mixed else None  # a saddle point: no multigrid
         self.options = default if options is None else dict(options)
         self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
-        self._digest, self._load_digest = None, None
+        self._digest: bytes | None = None  # of the stiffness that is assembled
+        self._assembled_with, self._loaded_with = None, None  # values of both kinds of parameters
         self.assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
@@ -104,19 +105,24 @@ class ElasticBody(OverRanks):
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
         stiffness_checks.agree_on_values(given, self.comm)
-        # That of all ranks' parts: whether it is another one is the same on all.
-        digest = digest_of((), *self.comm.allgather(digest_of(self._parameters, self.fixed)))
-        if digest == self._digest:
+        fixed = self._digest is not None and np.array_equal(self.fixed, self._assembled_fixed)
+        if self._all_same(fixed and same_values(self._parameters, self._assembled_with)):
             return self.assemblies
         self._digest = None  # so that a failure below does not leave a stale matrix
+        self._assembled_with, self._assembled_fixed = values_of(self._parameters), self.fixed
         self._assemble()
         with raised_together(self.comm):
             stiffness_checks.check_diagonal(self.diagonal(), self.displacements)
         stiffness_checks.check_dilation(self)
         self._hold()
         self.soft, self.loose = rigid_motion.soft_motions(self)
-        self._digest = digest
+        own = digest_of(self._parameters, self.fixed)
+        self._digest = digest_of((), *self.comm.allgather(own))
         return self.assemblies
+
+    def _all_same(self, same: bool) -> bool:
+        """Whether values are the same as before on all ranks.  Collective."""
+        return self.comm.allreduce(bool(same), op=MPI.LAND)
 
     def _assemble(self) -> None:
         """The stiffness, nothing held yet.  Collective."""
@@ -223,10 +229,10 @@ class ElasticBody(OverRanks):
             (which ``b`` holds at fixed degrees of freedom), and the external forces alone.
         """
         lift = self.boundary_values()
-        digest = digest_of(self._load_parameters)
-        if self.comm.allreduce(digest != self._load_digest, op=MPI.LOR):
+        if not self._all_same(same_values(self._load_parameters, self._loaded_with)):
+            self._loaded_with = None
             self._external = -self.internal_force(np.zeros(self.size))
-            self._load_digest = digest
+            self._loaded_with = values_of(self._load_parameters)
         external = self._external.copy()
         b = external - self.carried(lift)
         stiffness_checks.check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)

@@ -92,6 +92,19 @@ def digest_of(parameters: Iterable[Any], *more: Any) -> bytes:
     return digest.digest()
 
 
+def values_of(parameters: Iterable[Any]) -> list[np.ndarray]:
+    """Copies of the values of constants and coefficients."""
+    return [np.array(each.x.array if hasattr(each, "x") else each.value) for each in parameters]
+
+
+def same_values(parameters: Iterable[Any], before: list[np.ndarray] | None) -> bool:
+    """Whether constants and coefficients have the values that ``values_of`` has returned, on this rank; None is no."""
+    if before is None:
+        return False
+    now = (each.x.array if hasattr(each, "x") else each.value for each in parameters)
+    return all(np.array_equal(here, there) for here, there in zip(now, before))
+
+
 def times_volume(of: Displacements, modes: np.ndarray) -> np.ndarray:
     """Integrals of displacements times each shape function over the body's volume, ``shape=(owned dofs, m)``.  Collective.
 

@@ -76,7 +76,7 @@ class Search:
         """Residual at ``x``, given the step's ``forces`` there; records the errors of ``x``."""
         residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol
-        self._errors.append(self.error)
+        self._errors.append(errors.balance)
         self.statuses.append([contact.status for contact in self.step.contacts])
         change = errors.change * self._contraction()
         within = self.error <= tol  # then the forward error counts, too
@@ -90,7 +90,7 @@ class Search:
             self._halved, self._since = self._smallest, self.iterations
         self._lost = not np.isfinite(self.error) or self.iterations - self._since > self._patience
         solved = errors.acts and max(self.error, change) <= tol
-        stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * self.error
+        stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * errors.balance
         rounded = stalled and errors.within(0.0)
         self.over = bool(solved or rounded or self._late())
         return residual

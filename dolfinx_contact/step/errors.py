@@ -53,6 +53,7 @@ class Errors(NamedTuple):
     acts: bool = True  # forces above rounding do
     scale: float = 0.0  # S, in the unit of force of the sums
     share: float = 1.0  # |r| / S, of the reactions in the forces that act
+    balance: float = np.inf  # of equilibrium alone
 
     @property
     def largest(self) -> float:
@@ -141,14 +142,15 @@ def contact_rounding(contact: ContactLike, stiffness: NodalStiffness, u: np.ndar
     return np.column_stack((stiff * tangential, stiffness.normal * normal))
 
 
-def as_errors(sums: np.ndarray) -> Errors:
+def as_errors(balance: np.ndarray, contacts: np.ndarray | None = None) -> Errors:
     """Errors from squares of norms, in any unit of force.
 
     Args:
-        sums: Of equilibrium, law, penetration, slip rule, reactions, external forces, supports, rounding of
-            the body, rounding at the contacts, and change of the reactions.
+        balance: Of equilibrium, reactions, external forces, supports, rounding of the body, and change of the reactions.
+        contacts: Of law, penetration, slip rule and rounding at the contacts; None where equilibrium alone is asked for.
     """
-    equilibrium, law, penetration, slip, r, f, R, body, contact, change = np.sqrt(sums)
+    equilibrium, r, f, R, body, change = np.sqrt(balance)
+    law, penetration, slip, contact = np.zeros(4) if contacts is None else np.sqrt(contacts)
     rounding, acting = max(body, contact), max(r, f, R)
     acts = bool(acting > ROUNDED * rounding)
     if not acts:
@@ -162,4 +164,5 @@ def as_errors(sums: np.ndarray) -> Errors:
     if np.isnan([equilibrium, law, penetration]).any():
         error = np.nan
     share = float(r / acting) if acts else 0.0
-    return Errors(error, slip_error, rounding, change, acts, float(acting), share)
+    balance = equilibrium / acting if acting > 0.0 else error
+    return Errors(error, slip_error, rounding, change, acts, float(acting), share, float(balance))

@@ -118,6 +118,7 @@ class LoadStep:
         self._starts, self.unit, self._monitor = starts, unit, monitor
         self.last = starts[0] if last is None else last
         self._before, self._told = None, 0  # reactions of the state judged before, states told
+        self._contact_rounding = np.inf  # the last one, in the unit of force; none is known yet
         self._judged: Judged | None = None  # the state judged last by F
 
     @property
@@ -206,9 +207,14 @@ class LoadStep:
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
-        best = min(guesses, key=lambda guess: self.residual(guess, maps)[1].largest)
+        best = min(guesses, key=lambda guess: self._imbalance(guess, maps))
         self._before = None
         return best
+
+    def _imbalance(self, x: np.ndarray, maps: Sequence[MapLike]) -> float:
+        """The error of equilibrium alone.  Collective."""
+        left = self.out_of_balance(x, maps)
+        return self._as_errors(x, self._balance(left, x, self.body.support_forces(x))).error
 
     # -- forces --------------------------------------------------------------------------------
 
@@ -292,15 +298,26 @@ class LoadStep:
     ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state.
 
-        The reactions that enter the predictor are those the body asks for, ``K x - b``.  Once the
-        errors fall below the tolerance they are measured again with F itself, assembled by DOLFINx.
+        The reactions that enter the predictor are those the body asks for, ``K x - b``.  Far from the tolerance the errors are
+        those of equilibrium alone, which costs no other call of the law.  Once they fall below the tolerance they are measured
+        again with F itself, assembled by DOLFINx.
         """
         left = self.out_of_balance(x, maps, forces)
-        self.errors = self._errors(left, x, self.body.support_forces(x))
-        if self.errors.within(self.tol):
-            self._judge(x, self.by_form(x), self.errors.change)
+        self._left = self._balance(left, x, self.body.support_forces(x))
+        self.errors = self._as_errors(x, self._left)
+        if not self._is_far(self.errors):
+            contacts = self._at_contacts(x)
+            self.errors = self._as_errors(x, self._left, contacts)
+            if self.errors.within(self.tol):
+                self._judge(x, self.by_form(x), contacts, self.errors.change)
         self._tell()
         return left, self.errors
+
+    def errors_in_full(self, x: np.ndarray) -> Errors:
+        """The errors of the displacement that ``residual`` was asked for last, those of the law included.  Collective."""
+        if self._is_far(self.errors):
+            self.errors = self._as_errors(x, self._left, self._at_contacts(x))
+        return self.errors
 
     def measure(self, x: np.ndarray) -> Errors:
         """Errors of a displacement by F itself; also takes its reactions, gaps and slips, see ``judged``."""
@@ -388,16 +405,24 @@ class LoadStep:
             contact.assemble_reaction(forces)
         return forces
 
-    def _judge(self, x: np.ndarray, forces: np.ndarray, change: float | None = None) -> None:
-        """Errors of the contacts' present state, ``forces = -F(x)``; with a ``change`` that is known."""
-        errors = self._errors(self.with_reactions(forces), x, -forces[self.body.fixed])
+    def _judge(
+        self,
+        x: np.ndarray,
+        forces: np.ndarray,
+        contacts: np.ndarray | None = None,
+        change: float | None = None,
+    ) -> None:
+        """Errors of the contacts' present state, ``forces = -F(x)``; with sums at the contacts and a change that are known."""
+        balance = self._balance(self.with_reactions(forces), x, -forces[self.body.fixed])
+        contacts = self._at_contacts(x) if contacts is None else contacts
+        errors = self._as_errors(x, balance, contacts)
         self.errors = errors if change is None else errors._replace(change=change)
         moved = None if self.surfaces is None else self.surfaces.moved
         states = [contact.present for contact in self.contacts]
         self._judged = Judged(x.copy(), forces, states, moved, self.errors)
 
-    def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
-        """Errors of the contacts' present state.
+    def _balance(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> np.ndarray:
+        """Sums of squares of what balances in the contacts' present state, ``shape=(6,)``, see ``as_errors``.  Collective.
 
         Args:
             left: Forces out of balance, ``f - F(u) + r``; at fixed degrees of freedom they do not count.
@@ -406,14 +431,9 @@ class LoadStep:
         """
         left, acting = self.free(left), np.abs(self.external)
         left += self.body.cancelling(self.missing(x))
-        columns = [[np.zeros(0)] for _ in range(5)]
-        for contact, stiffness in zip(self.contacts, self.stiffness):
+        for contact in self.contacts:
             contact.points.add_magnitudes(contact.reaction, acting)
-            rounding = contact_rounding(contact, stiffness, x)
-            parts = (*contact_defects(contact, stiffness), rounding, contact.reaction)
-            for column, part in zip(columns, parts):
-                column.append(part.ravel())
-        law, penetration, slip, rounding, reaction = map(np.concatenate, columns)
+        reaction = np.concatenate([np.zeros(0), *(c.reaction.ravel() for c in self.contacts)])
         # Where contacts share a node only the sum is the state's; how they share it may jump.
         acts = reaction if self._shared is None else self.free(self.with_reactions(0.0 * left))
         before, self._before = self._before, acts
@@ -424,8 +444,33 @@ class LoadStep:
             mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
             left = np.append(left, on_surfaces[mine])
             cancelling = np.append(cancelling, EPSILON * terms[mine])
-        parts = (left, law, penetration, slip, reaction, self.external, supports, cancelling, rounding, change)  # fmt: skip
-        errors = as_errors(self.total([np.square(part / self.unit).sum() for part in parts]))
+        return self._sums(left, reaction, self.external, supports, cancelling, change)
+
+    def _at_contacts(self, x: np.ndarray) -> np.ndarray:
+        """Sums of squares of what is left of the law in the contacts' present state, ``shape=(4,)``, see ``as_errors``.  Collective."""
+        columns = [[np.zeros(0)] for _ in range(4)]
+        for contact, stiffness in zip(self.contacts, self.stiffness):
+            parts = (*contact_defects(contact, stiffness), contact_rounding(contact, stiffness, x))
+            for column, part in zip(columns, parts):
+                column.append(part.ravel())
+        sums = self._sums(*map(np.concatenate, columns))
+        self._contact_rounding = float(np.sqrt(sums[-1]))
+        return sums
+
+    def _sums(self, *parts: np.ndarray) -> np.ndarray:
+        """Sums of squares over all ranks, in the unit of force.  Collective."""
+        return self.total([np.square(part / self.unit).sum() for part in parts])
+
+    def _is_far(self, errors: Errors) -> bool:
+        """Whether equilibrium alone tells that a state is no solution, whatever the law adds, known rounding at the contacts allowed for."""
+        known = self._contact_rounding / errors.scale if errors.scale > 0.0 else np.inf
+        return not errors._replace(rounding=max(errors.rounding, known)).within(self.tol)
+
+    def _as_errors(
+        self, x: np.ndarray, balance: np.ndarray, contacts: np.ndarray | None = None
+    ) -> Errors:
+        """Errors of a displacement from both kinds of sums; without those of the contacts they are smaller.  Collective."""
+        errors = as_errors(balance, contacts)
         lost = errors.blind and self.may_slide and self._is_lost(x, errors.acts)
         return errors._replace(error=np.inf) if lost else errors
 

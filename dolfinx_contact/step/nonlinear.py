@@ -50,8 +50,10 @@ class NonlinearStep(LoadStep):
         self._tell()
         return left, self.errors
 
-    def _errors(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> Errors:
-        errors = super()._errors(left, x, supports)
+    def _as_errors(
+        self, x: np.ndarray, balance: np.ndarray, contacts: np.ndarray | None = None
+    ) -> Errors:
+        errors = super()._as_errors(x, balance, contacts)
         return errors if self.held(x) else errors._replace(error=np.inf)
 
 

@@ -3,7 +3,7 @@
 import csv
 import json
 
-import dolfinx_contact  # noqa: F401  before DOLFINx, which one of its wheels needs
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
 # isort: split
 import pytest
@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("gmsh")
 from mpi4py import MPI
 
-from studies.punch import effectivity, fine
+from studies.punch import Parameters, Punch, effectivity, fine, programme
 from studies.punch.limits import Run, build, cycle, uniform
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="programs that one rank runs")
@@ -49,3 +49,30 @@ def test_effectivity_of_the_punch(monkeypatch, tmp_path):
         assert (
             0.5 < rows["dissipation"]["effectivity"] < 3 and 0.5 < rows["shear"]["effectivity"] < 3
         )
+
+
+class Counted:
+    """A law that counts how often it is called."""
+
+    def __init__(self, law, calls: list):
+        self._law, self._calls = law, calls
+
+    def __getattr__(self, name):
+        def called(*arguments):
+            self._calls.append(name)
+            return getattr(self._law, name)(*arguments)
+
+        return called
+
+
+def test_the_fixed_point_asks_the_law_once_an_iteration(monkeypatch):
+    """On the punch, case C, an iteration calls the kernel's laws 1.3 times, and a step eight times beside that, at most."""
+    calls: list = []
+    monkeypatch.setattr(dc.Contact, "law", property(lambda self: Counted(self._laws.kernel, calls)))
+    punch = Punch(Parameters(case="C", tol=1e-8), solver=dc.FixedPoint())
+    steps = []
+    for displacement in programme(punch.parameters):
+        punch.approach.value = -displacement
+        steps.append(punch.problem.solve())
+    iterations = sum(step.iterations for step in steps)
+    assert len(calls) <= 1.3 * iterations + 8 * len(steps), (len(calls), iterations)

@@ -145,7 +145,8 @@ class _Errors:
 
     def residual(self, x, maps, forces):
         error = self.errors[int(x[0])]
-        return x, SimpleNamespace(largest=error, change=0.0, acts=True, within=lambda tol: False)
+        errors = dict(largest=error, balance=error, change=0.0, acts=True)
+        return x, SimpleNamespace(**errors, within=lambda tol: False)
 
 
 def test_an_attempt_has_a_best_state_of_its_own():

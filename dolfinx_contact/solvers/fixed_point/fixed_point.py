@@ -235,6 +235,8 @@ class BoundFixedPoint:
             if not search.goes_on or search.error > limit * tangent:
                 return
             if search.left <= due or search.error < near:
+                search.error = step.errors_in_full(x).largest
+            if search.left <= due or search.error < near:
                 limit = growth if near == 0.0 else 1.0  # one at once has to help at once
                 due, near = search.left - every, 0.0
                 useless = search.error > USELESS * tangent
