@@ -26,6 +26,7 @@ ignore_missing_imports = true
 follow_imports = skip
 [mypy-dolfinx_contact.*]
 follow_imports = silent
+follow_imports_for_stubs = true
 """
 MISTAKES = {
     "dc.Fricton(0.3)": "attr-defined",
