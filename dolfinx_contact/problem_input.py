@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.solvers.base import Solver
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 STRAINED = 0.2  # mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth
@@ -81,7 +80,7 @@ def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
-def check_sides(contacts: Sequence[ContactLike]) -> None:
+def check_sides(contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` if a node that carries unknowns of one contact is opposite to another one's.  On this rank alone."""
     for contact in contacts:
         if not contact.surface.deformable:
@@ -98,7 +97,7 @@ def check_sides(contacts: Sequence[ContactLike]) -> None:
                 )
 
 
-def check_mesh(contact: ContactLike) -> None:
+def check_mesh(contact: Contact) -> None:
     """Raise a ``ValueError`` if the mesh is no longer where it was when the contact was made."""
     if contact.mesh_has_moved():
         raise ValueError(
@@ -177,7 +176,7 @@ def body_of(
     return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, form_options)
 
 
-def crowded(solver: Solver, body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
     unknowns = body.comm.allreduce(body.size)
     solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= TOO_LARGE[3]
@@ -232,7 +231,7 @@ def checked_options(name: str, options: Any) -> dict | None:
     return options
 
 
-def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3, told: float = 0) -> None:
+def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: float = 0) -> None:
     """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
 
     Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
@@ -272,7 +271,7 @@ def hold(contacts: Sequence[ContactLike], body: BodyLike, level: int = 3, told: 
     )
 
 
-def support(body: BodyLike, contacts: Sequence[ContactLike], bcs: Any) -> None:
+def support(body: ElasticBody, contacts: Sequence[Contact], bcs: Any) -> None:
     """Give a body other Dirichlet conditions, and let contacts know.  Collective.
 
     Raises:
@@ -291,7 +290,7 @@ def support(body: BodyLike, contacts: Sequence[ContactLike], bcs: Any) -> None:
         raise
 
 
-def _held_directions(contact: ContactLike, fixed: np.ndarray) -> tuple:
+def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
     """What boundary conditions fix, as ``ContactPoints.hold`` takes it."""
     left = contact.points.free_of(fixed)
     closed = left[:, -1] < 1e-12
@@ -314,7 +313,7 @@ def _held_directions(contact: ContactLike, fixed: np.ndarray) -> tuple:
 
 
 def follow(
-    contacts: Sequence[ContactLike], body: BodyLike, u: np.ndarray, start: np.ndarray, known: list
+    contacts: Sequence[Contact], body: ElasticBody, u: np.ndarray, start: np.ndarray, known: list
 ) -> bool:
     """Let frames and gaps of contacts follow their nodes and surfaces; whether frames changed.  Collective.
 
@@ -336,7 +335,7 @@ def follow(
     return bool(changed)
 
 
-def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
+def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
     """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
     for contact in contacts:
         if contact.surface.deformable:
@@ -357,7 +356,7 @@ def check_surfaces(contacts: Sequence[ContactLike], body: BodyLike) -> None:
         warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
 
 
-def _check_through(contact: ContactLike, body: BodyLike) -> None:
+def _check_through(contact: Contact, body: ElasticBody) -> None:
     """Refuse two sides of one part of the mesh that would be pressed together through it.  Collective."""
     part, parts = body.parts
     sides = contact.nodes, contact.placement.opposite
@@ -370,7 +369,7 @@ def _check_through(contact: ContactLike, body: BodyLike) -> None:
         )
 
 
-def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
+def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
     """Warn of a volume form that is multiplied by the radius while contacts have no weight, or one without its 2 pi.  Collective."""
     if not contacts or contacts[0].points.dim == 3:
         return
@@ -403,7 +402,7 @@ def check_weights(F: ufl.Form, contacts: Sequence[ContactLike]) -> None:
             )
 
 
-def _turns_alone(contact: ContactLike) -> bool:
+def _turns_alone(contact: Contact) -> bool:
     """Whether the weight of a contact is 2 pi, without the radius.  Collective."""
     alone = not contact.axial and np.allclose(contact.density, 2 * np.pi, rtol=1e-9)
     return all(contact.comm.allgather(bool(alone)))
@@ -430,7 +429,7 @@ def _radius(term: Any) -> tuple[int | None, float]:
     return min(which, default=None), float(size)
 
 
-def check_axial(contacts: Sequence[ContactLike]) -> None:
+def check_axial(contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
     for contact in contacts:
         if not contact.axial:
@@ -447,7 +446,7 @@ def check_axial(contacts: Sequence[ContactLike]) -> None:
             )
 
 
-def take_contacts(problem: ContactProblem, contacts: Sequence[ContactLike]) -> None:
+def take_contacts(problem: ContactProblem, contacts: Sequence[Contact]) -> None:
     """From now on a problem makes the history of its contacts; warns where another one has begun it."""
     begun = [contact for contact in contacts if contact.has_history]
     if begun:
@@ -460,7 +459,7 @@ def take_contacts(problem: ContactProblem, contacts: Sequence[ContactLike]) -> N
         contact.belong_to(problem)
 
 
-def check_alive(problem: ContactProblem, body: BodyLike, contacts: Sequence[ContactLike]) -> None:
+def check_alive(problem: ContactProblem, body: ElasticBody, contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` if a problem can no longer go on."""
     if body.closed:
         raise ValueError("this ContactProblem has been closed: make a new one.")
@@ -474,7 +473,7 @@ def check_alive(problem: ContactProblem, body: BodyLike, contacts: Sequence[Cont
             surface.driver.take(problem.number, next(NUMBERS))
 
 
-def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[ContactLike]) -> None:
+def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
     check_axial(contacts)
     for contact in contacts:
@@ -491,7 +490,7 @@ def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[ContactLike])
             driver.check()
 
 
-def check_size(body: BodyLike, x: np.ndarray, u: np.ndarray) -> bool:
+def check_size(body: ElasticBody, x: np.ndarray, u: np.ndarray) -> bool:
     """Warn of a displacement far larger than the body, or of strains that are not small; whether it did.  Collective.
 
     Args:

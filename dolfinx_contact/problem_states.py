@@ -15,8 +15,9 @@ from dolfinx_contact.solvers.base import KEPT
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.bodies.internal_variables import InternalVariables
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.contact.contact import Contact
 
 
 class Kept(NamedTuple):
@@ -45,7 +46,7 @@ class ProblemStates:
     """
 
     def __init__(
-        self, body: BodyLike, contacts: Sequence[ContactLike], variables: InternalVariables | None
+        self, body: ElasticBody, contacts: Sequence[Contact], variables: InternalVariables | None
     ) -> None:
         self._body, self._contacts, self._variables = body, contacts, variables
         self._parts: list[Any] = [*contacts, *filter(None, [variables])]  # what has a history

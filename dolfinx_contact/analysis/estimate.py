@@ -21,8 +21,8 @@ from dolfinx_contact.support.checks import finite, positive
 from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 
 class Estimated(NamedTuple):
@@ -185,7 +185,7 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
     return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
 
 
-def interpolated(contact: ContactLike, better: Any) -> np.ndarray:
+def interpolated(contact: Contact, better: Any) -> np.ndarray:
     """Nodal tractions of a contact at the nodes of another, local frame.  Collective.
 
     On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.

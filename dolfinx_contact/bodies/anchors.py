@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
 
 
 class Anchors:
@@ -31,7 +31,7 @@ class Anchors:
         solver: Its ``LinearSolver``.
     """
 
-    def __init__(self, body: BodyLike):
+    def __init__(self, body: ElasticBody):
         self._body, self.dofs = body, _pivots(body.soft, body.comm)
         self.count = body.soft.shape[1]
         diagonal = body.K.getDiagonal().array_r

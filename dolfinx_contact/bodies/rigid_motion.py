@@ -11,9 +11,9 @@ from mpi4py import MPI
 from dolfinx_contact import compat
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.bodies.loose import LooseMotions
     from dolfinx_contact.contact.displacements import Displacements
-    from dolfinx_contact.solvers.protocols import BodyLike
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
 ROUNDING = 1e-13
@@ -25,7 +25,7 @@ SOFT = 1e-4
 SAMPLED = 2000
 
 
-def soft_motions(body: BodyLike) -> tuple[np.ndarray, LooseMotions | None]:
+def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
     """Rigid motions of a part of the body, of its ``parts``, that cost next to no energy.
 
     Every connected part of the mesh is tried: a spring in F gives energy to the rigid motions that the boundary
@@ -95,7 +95,7 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
     return modes.reshape(gdim * n, modes.shape[2])
 
 
-def free_modes(body: BodyLike) -> np.ndarray:
+def free_modes(body: ElasticBody) -> np.ndarray:
     """Orthonormal rigid motions of each part of the body that vanish at fixed degrees of freedom.  Collective."""
     of, (part, parts) = body.displacements, body.parts
     x = of.x[: of.count, : of.dim]

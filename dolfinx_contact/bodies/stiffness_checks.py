@@ -16,8 +16,8 @@ from dolfinx_contact.support.collective import from_first, raised_together
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.displacements import Displacements
-    from dolfinx_contact.solvers.protocols import BodyLike
 
 
 def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
@@ -35,7 +35,7 @@ def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
         )
 
 
-def check_dilation(body: BodyLike) -> None:
+def check_dilation(body: ElasticBody) -> None:
     """Raise a ``ValueError`` if the body gains energy by growing, as with Poisson's ratio above 0.5.  Collective.
 
     Args:

@@ -32,7 +32,7 @@ from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
-from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.law.maps import BipotentialMap, ContactLaw, NodalLaw, NodalMap, ReturnMap
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, place, positive
 from dolfinx_contact.support.collective import agree, raised_together
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # before 0.6 it has another name
 
     from dolfinx_contact.law.wear import Wear
-    from dolfinx_contact.solvers.protocols import MapLike
 
 
 # Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
@@ -216,7 +215,7 @@ class Contact(Guarded):
         self._repeats = positive("repeats", count) if count != 0.0 else 0.0
 
     @property
-    def law(self):
+    def law(self) -> ContactLaw:
         """The kernel's law of this friction."""
         return self._laws.kernel
 
@@ -292,7 +291,7 @@ class Contact(Guarded):
             self._free_friction = found
         return self._free_friction
 
-    def law_of(self, law: Any, nodes: Any = slice(None)) -> Any:
+    def law_of(self, law: NodalLaw, nodes: Any = slice(None)) -> NodalLaw:
         """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
 
         Args:
@@ -538,7 +537,7 @@ class Contact(Guarded):
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         return BipotentialMap(self.rho) if name == "bipotential" else ReturnMap(self.rho, self.rho)
 
-    def respond(self, u: fem.Function | np.ndarray, map: MapLike) -> None:
+    def respond(self, u: fem.Function | np.ndarray, map: NodalMap) -> None:
         """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
         self.move(u)
         reaction, status = map(
@@ -547,7 +546,7 @@ class Contact(Guarded):
         self.take(reaction=reaction, status=status)
 
     def respond_with_derivatives(
-        self, u: fem.Function | np.ndarray, map: MapLike
+        self, u: fem.Function | np.ndarray, map: NodalMap
     ) -> tuple[np.ndarray, np.ndarray]:
         """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
 

@@ -20,7 +20,7 @@ from dolfinx_contact.support.collective import raised_together
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from dolfinx_contact.solvers.protocols import ContactLike
+    from dolfinx_contact.contact.contact import Contact
 
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
 ZERO = 1e-10
@@ -86,7 +86,7 @@ def areas(
     return _assembled(shape, V, facets, weight)
 
 
-def facing_areas(contact: ContactLike, weight: Any, turn: np.ndarray) -> np.ndarray:
+def facing_areas(contact: Contact, weight: Any, turn: np.ndarray) -> np.ndarray:
     r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
 
     On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that a uniform pressure p makes the

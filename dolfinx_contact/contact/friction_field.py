@@ -17,7 +17,7 @@ from dolfinx_contact.law.wear import Wear
 from dolfinx_contact.support.checks import finite, place
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import ContactLike
+    from dolfinx_contact.contact.contact import Contact
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -36,7 +36,7 @@ def followed(friction: Friction) -> list[str]:
 
 
 def on_nodes(
-    contact: ContactLike, friction: Friction, state: dict[str, np.ndarray], axes: Any = None
+    contact: Contact, friction: Friction, state: dict[str, np.ndarray], axes: Any = None
 ) -> Friction:
     """The law with coefficients and axes for each owned node of a contact, as its frames are at present.
 
@@ -93,7 +93,7 @@ def _arguments(given: Callable) -> list[str]:
         return []
 
 
-def _coefficients(contact: ContactLike, name: str, given: Any, state: dict[str, np.ndarray]):
+def _coefficients(contact: Contact, name: str, given: Any, state: dict[str, np.ndarray]):
     if not is_field(given):
         return given
     state = {key: state[key].copy() for key in _arguments(given) if key in state}
@@ -106,7 +106,7 @@ def _coefficients(contact: ContactLike, name: str, given: Any, state: dict[str, 
     return np.broadcast_to(values, (2, n)).T.copy()
 
 
-def wear_on_nodes(contact: ContactLike, wear: Wear | None) -> np.ndarray | None:
+def wear_on_nodes(contact: Contact, wear: Wear | None) -> np.ndarray | None:
     """Values of a wear law's field for each owned node of a contact, ``shape=(n, 2)``; None of numbers.
 
     Raises:
@@ -120,13 +120,13 @@ def wear_on_nodes(contact: ContactLike, wear: Wear | None) -> np.ndarray | None:
     return values
 
 
-def directions(contact: ContactLike, friction: Friction) -> np.ndarray:
+def directions(contact: Contact, friction: Friction) -> np.ndarray:
     """Directions of a field of axes at the reference positions of the nodes, ``shape=(n, 2)`` or ``(n, 3)``: the same in every state."""
     values = _values(contact, "axes", friction.given()["axes"], {})
     return (values / np.linalg.norm(values, axis=0)).T.copy()
 
 
-def _axes(contact: ContactLike, friction: Friction):
+def _axes(contact: Contact, friction: Friction):
     if not is_field(friction.given()["axes"]):
         return friction.given()["axes"]
     frame = contact.own_frame if friction.of == "surface" else contact.frame
@@ -134,7 +134,7 @@ def _axes(contact: ContactLike, friction: Friction):
 
 
 def axes_at(
-    contact: ContactLike,
+    contact: Contact,
     friction: Friction,
     at: np.ndarray,
     frame: np.ndarray,
@@ -173,7 +173,7 @@ def axes_at(
 
 
 def _values(
-    contact: ContactLike,
+    contact: Contact,
     name: str,
     given: Any,
     state: dict[str, np.ndarray],
@@ -202,7 +202,7 @@ def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> Non
         pass
 
 
-def _of_function(contact: ContactLike, name: str, function: fem.Function) -> np.ndarray:
+def _of_function(contact: Contact, name: str, function: fem.Function) -> np.ndarray:
     V = function.function_space
     if V.mesh is not contact.V.mesh or compat.lagrange_degree(V) is None:
         raise ValueError(

@@ -15,8 +15,8 @@ from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, i
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.law.wear import Wear
-    from dolfinx_contact.solvers.protocols import ContactLike
     from dolfinx_contact.surfaces.surface import Surface
 
 
@@ -46,7 +46,7 @@ class Laws:
         self._field: Friction | None = None  # the law given, if anything in it is a field
         self._rested: Friction | None = None  # a field's law in the last converged state
 
-    def assign(self, contact: ContactLike, friction: Friction | float, empty: bool = False) -> None:
+    def assign(self, contact: Contact, friction: Friction | float, empty: bool = False) -> None:
         """Take another law; fields as before anything has touched if ``empty``.  Collective where there are fields."""
         friction, field = as_friction(friction), None
         if getattr(friction, "field", False):
@@ -63,7 +63,7 @@ class Laws:
         self._take(contact, friction)
 
     def _evaluated(
-        self, contact: ContactLike, field: Friction, empty: bool = False, axes: Any = None
+        self, contact: Contact, field: Friction, empty: bool = False, axes: Any = None
     ) -> Friction:
         """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
@@ -75,7 +75,7 @@ class Laws:
             check_law(contact.surface, friction, gdim, _fields().directed(field, gdim))
         return at_most_rough(friction)
 
-    def _take(self, contact: ContactLike, friction: Friction) -> None:
+    def _take(self, contact: Contact, friction: Friction) -> None:
         self.friction, self.kernel = friction, friction.law(contact.V.mesh.geometry.dim)
 
     @property
@@ -94,7 +94,7 @@ class Laws:
         return self._axes_vary and self._field.of == "body"
 
     def turned(
-        self, contact: ContactLike, at: np.ndarray, frame: np.ndarray, points: Any = None
+        self, contact: Contact, at: np.ndarray, frame: np.ndarray, points: Any = None
     ) -> np.ndarray | float:
         """Radians by which axes at other positions differ from those in use, ``shape=(n,)``: of a texture of the surface, or of bodies.
 
@@ -123,7 +123,7 @@ class Laws:
         """Whether friction follows the pressure at the end of the step."""
         return self._field is not None and "pressure" in _fields().followed(self._field)
 
-    def renew(self, contact: ContactLike, begin: bool = False) -> None:
+    def renew(self, contact: Contact, begin: bool = False) -> None:
         """Let fields have their present values.  Collective.
 
         Args:
@@ -142,7 +142,7 @@ class Laws:
         if _fields().followed(self._field):
             self.begun = self.friction
 
-    def restore(self, contact: ContactLike) -> None:
+    def restore(self, contact: Contact) -> None:
         """Return to the last converged state."""
         if self._rested is not None:
             self._take(contact, self._rested)
@@ -161,7 +161,7 @@ class Laws:
             "wear": repr(self.wear),
         }
 
-    def save(self, contact: ContactLike) -> dict[str, np.ndarray]:
+    def save(self, contact: Contact) -> dict[str, np.ndarray]:
         """Coefficients, of a law that follows the state those without one, and axes of all nodes; surface and wear.
 
         Of a field of axes the directions that were given: those in the frames change with the state.
@@ -181,7 +181,7 @@ class Laws:
             "rigid_plane": np.concatenate(parts),
         } | texture
 
-    def check_saved(self, contact: ContactLike, saved: Mapping[str, np.ndarray]) -> None:
+    def check_saved(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if another law or surface was saved."""
         named = {"laws": "friction", "texture": "friction", "rigid_plane": "plane or wear"}
         for name, array in self.save(contact).items():
@@ -191,7 +191,7 @@ class Laws:
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
-    def load(self, contact: ContactLike, saved: Mapping[str, np.ndarray]) -> Friction:
+    def load(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> Friction:
         """Let fields have the values of the state that was saved; returns the law by which its last step was settled."""
         if self._field is not None:
             self._take(contact, self._evaluated(contact, self._field))

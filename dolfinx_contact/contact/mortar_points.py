@@ -37,8 +37,8 @@ from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import frames_along
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.displacements import Displacements
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
@@ -52,7 +52,7 @@ class MortarPlacement(Placement):
     else the last one for which ``geometry_error`` was too large, see ``step/geometry.py``.
     """
 
-    def __init__(self, contact: ContactLike, facets: np.ndarray, owned: tuple, extent: float):
+    def __init__(self, contact: Contact, facets: np.ndarray, owned: tuple, extent: float):
         of, nodes, comm = contact.displacements, contact.nodes, contact.comm
         self._slave = Skin(of, facets, comm, contact.density)
         self._master = Skin(of, contact.surface.facets, comm)

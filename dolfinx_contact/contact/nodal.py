@@ -11,15 +11,12 @@ contacts, moves the node by ``(sum F^T r - p) / spring``.  Semismooth Newton, an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.law.maps import NodalLaw, ReturnMap
 from dolfinx_contact.support.checks import EPSILON
-
-if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import LawLike
 
 # Newton's steps at most, those in which a residual has to halve, the same once it is within the tolerance; those that need not
 # help, and sweeps over the contacts in place of later ones that do not.
@@ -39,7 +36,7 @@ class Part(NamedTuple):
     """One of ``n`` contacts at ``k`` of ``m`` nodes."""
 
     slots: np.ndarray  # which nodes, (k,)
-    law: LawLike  # the kernel's, of these nodes
+    law: NodalLaw  # the kernel's, of these nodes
     spring: np.ndarray  # (k,)
     gap: np.ndarray  # (k,)
     slip: np.ndarray  # (k, gdim - 1)

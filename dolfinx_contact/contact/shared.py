@@ -19,8 +19,8 @@ from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part, times
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 # By which the product of two unit normals may miss one for them to be the same.
 ALIKE = 1e-12
@@ -30,7 +30,7 @@ KEPT = 2.0
 
 
 def shared_nodes(
-    contacts: Sequence[ContactLike], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
+    contacts: Sequence[Contact], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
 ) -> SharedNodes | None:
     """The nodes of this rank that belong to several contacts, None if there are none.
 
@@ -47,7 +47,7 @@ def shared_nodes(
     return SharedNodes(contacts, stiffness, fixed, nodes, alike, shares) if nodes.size else None
 
 
-def shares_of(contacts: Sequence[ContactLike], nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shares_of(contacts: Sequence[Contact], nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which contacts have the same normal at nodes, and the part of what presses there that each of those carries.  Collective.
 
     Two contacts on one face leave open how the reaction of a node of their common edge is shared; it is by area.
@@ -74,7 +74,7 @@ def shares_of(contacts: Sequence[ContactLike], nodes: np.ndarray) -> tuple[np.nd
     return alike & ~np.eye(n, dtype=bool), shares
 
 
-def mean_laws(laws: list[Friction], contacts: Sequence[ContactLike]) -> list[Friction]:
+def mean_laws(laws: list[Friction], contacts: Sequence[Contact]) -> list[Friction]:
     """Friction of each contact with, at nodes of several contacts with the same normal, the mean of theirs by shares.  Collective.
 
     That of the node as a whole, for solvers that do not know of shares: exact where it is isotropic, along principal directions else.
@@ -103,7 +103,7 @@ def mean_laws(laws: list[Friction], contacts: Sequence[ContactLike]) -> list[Fri
     return mixed
 
 
-def any_shared(contacts: Sequence[ContactLike]) -> bool:
+def any_shared(contacts: Sequence[Contact]) -> bool:
     """Whether any node of any rank belongs to several contacts.  Collective."""
     if len(contacts) < 2:
         return False
@@ -124,7 +124,7 @@ class SharedNodes:
 
     def __init__(
         self,
-        contacts: Sequence[ContactLike],
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         fixed: np.ndarray,
         nodes: np.ndarray,

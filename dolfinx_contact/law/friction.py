@@ -341,7 +341,7 @@ class Friction(Guarded):
         return np.column_stack((cos * x - sin * y, sin * x + cos * y))
 
     def law(self, dim: int):
-        """The compiled law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw``, see ``solvers/protocols.py``.
+        """The compiled law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw``, see ``law/maps.py``.
 
         Raises:
             ValueError: Friction is not isotropic and ``dim`` is 2, where there is only one

@@ -20,14 +20,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import LawLike
+    from dolfinx_contact.law.maps import NodalLaw
 
 # Relative rounding of directions and of kept friction.
 ROUNDED = 32 * np.finfo(float).eps
@@ -48,13 +48,13 @@ def across(friction: Friction, along: np.ndarray) -> np.ndarray:
 
 
 def supported(
-    law: Any,
+    law: NodalLaw,
     friction: Friction,
     nodes: np.ndarray,
     along: np.ndarray,
     known: np.ndarray,
     last: np.ndarray,
-):
+) -> NodalLaw:
     """The compiled law, or, if supports move, guide, or have moved a node, a ``SupportedLaw`` in its place.
 
     Args:
@@ -89,7 +89,7 @@ class SupportedLaw:
             last step's friction that is not along the ratio.
     """
 
-    law: LawLike
+    law: NodalLaw
     friction: Friction
     known: np.ndarray
     nodes: np.ndarray

@@ -19,7 +19,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies.elastic import FreeState
+from dolfinx_contact.bodies.elastic import ElasticBody, FreeState
 from dolfinx_contact.contact.state import OPPOSITE
 from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
@@ -27,7 +27,7 @@ from dolfinx_contact.support.numbering import original_cells, original_nodes
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.contact.contact import Contact
 
 # Of what is written.  Files of before 27 November 2026 have none.
 VERSION = 2
@@ -42,8 +42,8 @@ ANEW = "Take another one, or write it anew with problem.save."
 
 def save(
     path: str | PathLike[str],
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     states: Sequence[np.ndarray],
     past: Sequence[tuple],
     variables: InternalVariables | None,
@@ -88,7 +88,7 @@ def save(
 
 
 def _arrays(
-    body: BodyLike, contacts: Sequence[ContactLike], states: Sequence[np.ndarray]
+    body: ElasticBody, contacts: Sequence[Contact], states: Sequence[np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Displacements and histories of contacts by name; this rank's rows.  Collective."""
     mine = {name: body.displacements.rows(of) for name, of in zip(("u", "before"), states)}
@@ -108,7 +108,7 @@ def _arrays(
     return mine
 
 
-def _fixed(body: BodyLike) -> np.ndarray:
+def _fixed(body: ElasticBody) -> np.ndarray:
     """1 where displacements are given, else 0, ``shape=(nodes, dim)``."""
     fixed = np.zeros(body.size, dtype=np.uint8)
     fixed[body.fixed] = 1
@@ -138,8 +138,8 @@ def _write(path: str | PathLike[str], file: dict[str, np.ndarray]) -> None:
 
 def load(
     path: str | PathLike[str],
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     variables: InternalVariables | None,
 ) -> tuple[list[np.ndarray], list]:
     """Give contacts, body and internal variables the history in a file.  Collective.
@@ -196,7 +196,7 @@ def load(
     return [mine["u"].ravel(), mine["before"].ravel()], past
 
 
-def _of_body(mine: dict[str, np.ndarray], body: BodyLike, k: int, contact: ContactLike) -> dict:
+def _of_body(mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Contact) -> dict:
     """What a contact with a deformable surface has of other nodes than its own."""
     found = {}
     if f"{k}_placed" in mine:
@@ -246,7 +246,9 @@ def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: A
             raise ValueError(f"checkpoint {path} has {found} {name}, this problem {size}.")
 
 
-def _check_supports(path: str | PathLike[str], mine: dict[str, np.ndarray], body: BodyLike) -> None:
+def _check_supports(
+    path: str | PathLike[str], mine: dict[str, np.ndarray], body: ElasticBody
+) -> None:
     """Raise a ``ValueError`` if other displacements of this rank were given in the run that wrote the file."""
     here = _fixed(body)
     saved = mine.get("fixed", here)  # older checkpoints do not have it
@@ -335,7 +337,7 @@ def _past(path: str | PathLike[str], file: dict[str, np.ndarray], order: np.ndar
     return [(q, force, tied) for q, force in ordered]
 
 
-def _nodes(body: BodyLike, contacts: Sequence[ContactLike]) -> dict[str, np.ndarray]:
+def _nodes(body: ElasticBody, contacts: Sequence[Contact]) -> dict[str, np.ndarray]:
     """Original indices of this rank's nodes, of the body and of each contact.  Collective."""
     original = original_nodes(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
@@ -345,7 +347,7 @@ def _nodes(body: BodyLike, contacts: Sequence[ContactLike]) -> dict[str, np.ndar
     return {"nodes": original} | of_contacts
 
 
-def _by_cells(body: BodyLike, array: np.ndarray) -> np.ndarray:
+def _by_cells(body: ElasticBody, array: np.ndarray) -> np.ndarray:
     """All unknowns of a mixed space in their units, a row an owned cell.  Collective."""
     values = fem.Function(body.V)
     values.x.array[: body.size] = body.values(array)
@@ -353,14 +355,14 @@ def _by_cells(body: BodyLike, array: np.ndarray) -> np.ndarray:
     return values.x.array[_cells(body)]
 
 
-def _of_cells(body: BodyLike, rows: np.ndarray) -> np.ndarray:
+def _of_cells(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
     """Values of owned degrees of freedom from what ``_by_cells`` returned."""
     values = np.zeros_like(body.u.x.array)
     values[_cells(body)] = rows
     return body.taken(values)
 
 
-def _cells(body: BodyLike) -> np.ndarray:
+def _cells(body: ElasticBody) -> np.ndarray:
     """Degrees of freedom of each owned cell."""
     topology = body.V.mesh.topology
     return compat.cell_dofs(body.V)[: topology.index_map(topology.dim).size_local]

@@ -16,8 +16,8 @@ from dolfinx_contact.support.checks import a_problem
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 
 class History:
@@ -121,7 +121,7 @@ class History:
             raise ValueError(f"there is no column {name!r}; there are {', '.join(self.rows[0])}.")
         return np.array([row[name] for row in self.rows])
 
-    def _totals(self, contact: ContactLike):
+    def _totals(self, contact: Contact):
         for axis, force in zip("xyz", contact.force()):
             yield f"force_{axis}", float(force)
         tangential = np.linalg.norm(contact.reaction[:, :-1], axis=1).sum()

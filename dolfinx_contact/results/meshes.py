@@ -17,8 +17,8 @@ from dolfinx_contact.contact.state import Status
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.displacements import Displacements
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 # VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
 TYPES = {
@@ -169,7 +169,7 @@ class SurfaceMesh:
         contact: The contact.
     """
 
-    def __init__(self, contact: ContactLike) -> None:
+    def __init__(self, contact: Contact) -> None:
         self._contact, self._comm = contact, contact.comm
         displacements, V = contact.displacements, contact.displacements.V
         found: dict[int, list[np.ndarray]] = {}

@@ -20,8 +20,8 @@ from dolfinx_contact.support.checks import a_field, a_problem, finite
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 # Points per direction of the grid on which a rigid surface is drawn, by dimension, and how far it goes beyond the contact, over its size.
 POINTS, BEYOND = {2: 400, 3: 60}, 0.15
@@ -94,7 +94,7 @@ def _draw(path: Path, title: str, seen: dict[str, np.ndarray]) -> None:
 
 
 def _seen(
-    contacts: Sequence[ContactLike], body: Mesh, foot: list[Mesh], factor: float
+    contacts: Sequence[Contact], body: Mesh, foot: list[Mesh], factor: float
 ) -> dict[str, np.ndarray]:
     """What ``draw.py`` draws, arrays by name."""
     seen = {"x": _standing(body, factor), "view": np.zeros(0)}
@@ -128,7 +128,7 @@ def _standing(mesh: Mesh, factor: float) -> np.ndarray:
     return mesh.x + factor * mesh.at_nodes["displacement"]
 
 
-def _distances(contact: ContactLike, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
+def _distances(contact: Contact, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
     """A grid about positions, its lowest and highest corner and number of points, ``shape=(3, 3)``; distances from the surface there."""
     dim = contact.points.dim
     inside = np.arange(3) < dim

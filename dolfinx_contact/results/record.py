@@ -14,8 +14,9 @@ import numpy as np
 from dolfinx_contact.support.checks import ROUNDED, RoundingWarning
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.step.errors import Errors
 
 # Times the tolerance that errors over the reactions alone may have without a word.
@@ -133,15 +134,15 @@ class NotConverged(RuntimeError):
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
-def counts(body: BodyLike, contacts: Sequence[ContactLike]) -> Counts:
+def counts(body: ElasticBody, contacts: Sequence[Contact]) -> Counts:
     """Contact nodes open, sticking and slipping in the present state.  Collective."""
     here = sum(np.bincount(contact.status, minlength=3) for contact in contacts)
     return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
 
 
 def record(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     errors: Errors,
     found: SolverResult,
     seconds: float,
@@ -215,7 +216,7 @@ def warn_of_contact(step: Step, tol: float) -> None:
         )
 
 
-def warn_of_corners(body: BodyLike, contacts: Sequence[ContactLike]) -> bool:
+def warn_of_corners(body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Warn, in the name of who called ``solve``, of work that a turn of slip within the step leaves unknown; whether it did.  Collective."""
     may = [contact for contact in contacts if contact.may_turn]
     if not may:

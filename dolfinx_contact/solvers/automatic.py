@@ -13,9 +13,11 @@ from dolfinx_contact.contact.interface import components
 from dolfinx_contact.solvers.base import ASTRAY, SolverResult
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.base import Solver
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 # Largest number of multigrid solves for the condensed operator after the fixed point has failed: about a thousand cycles.
@@ -73,8 +75,8 @@ class Automatic:
 
     def bind(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         memory: dict[str, Any],
     ):
@@ -87,8 +89,8 @@ class BoundAutomatic:
 
     def __init__(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         memory: dict[str, Any],
     ):
@@ -152,7 +154,7 @@ class BoundAutomatic:
             return True
         return components(self._arguments[1]) == self._components
 
-    def solve(self, step: StepLike) -> SolverResult:
+    def solve(self, step: LoadStep) -> SolverResult:
         """See ``BoundSolver``."""
         iterations, smallest, best, start, ended = 0, np.inf, None, None, []
         solvers = self._solvers

@@ -16,8 +16,10 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 ASTRAY = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
 
@@ -65,7 +67,7 @@ class SolverResult(NamedTuple):
 class BoundSolver(Protocol):
     """A solver bound to a body and its contacts."""
 
-    def solve(self, step: StepLike) -> SolverResult:
+    def solve(self, step: LoadStep) -> SolverResult:
         """Search for a displacement whose errors are at most ``step.tol``; return the best one found.  Collective."""
 
     def destroy(self) -> None:
@@ -88,8 +90,8 @@ class Solver(Protocol):
 
     def bind(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         memory: dict[str, Any],
     ) -> BoundSolver:

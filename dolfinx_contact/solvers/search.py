@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import MapLike, StepLike
+    from dolfinx_contact.law.maps import NodalMap
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Iterations from which the convergence rate is estimated.
 WINDOW = 3
@@ -41,7 +42,7 @@ class Search:
         statuses: Statuses of each contact in the last iterates.
     """
 
-    def __init__(self, step: StepLike, x: np.ndarray, max_seconds: float):
+    def __init__(self, step: LoadStep, x: np.ndarray, max_seconds: float):
         self.step, self.best, self.nearest = step, x, x
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = self._attempt = (True, np.inf)
@@ -72,7 +73,7 @@ class Search:
         self.iterations += iterations
         self.left -= iterations
 
-    def residual(self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray) -> np.ndarray:
+    def residual(self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray) -> np.ndarray:
         """Residual at ``x``, given the step's ``forces`` there; records the errors of ``x``."""
         residual, errors = self.step.residual(x, maps, forces)
         self.error, tol = errors.largest, self.step.tol

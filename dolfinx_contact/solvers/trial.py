@@ -14,7 +14,9 @@ from dolfinx_contact.results.record import NO_SOLUTION
 from dolfinx_contact.solvers.base import SolverName, SolverResult
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Penetration over the largest displacement that three digits of it leave no doubt about.
 CERTAIN = 0.1
@@ -23,7 +25,7 @@ NOTHING = "nothing touches"
 
 
 def without_reactions(
-    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike
+    body: ElasticBody, contacts: Sequence[Contact], step: LoadStep
 ) -> SolverResult | None:
     """The displacement without reactions, if it is the solution of a ``LoadStep``.  Collective."""
     if step.surfaces is not None:
@@ -44,7 +46,7 @@ def without_reactions(
 
 
 def unmoved(
-    body: BodyLike, step: StepLike, last: np.ndarray, reason: str = NO_SOLUTION
+    body: ElasticBody, step: LoadStep, last: np.ndarray, reason: str = NO_SOLUTION
 ) -> SolverResult:
     """The last displacement with the present boundary values, judged as what it is: no solution."""
     x, fixed = last.copy(), body.fixed
@@ -54,7 +56,7 @@ def unmoved(
 
 
 def floating(
-    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, last: np.ndarray
+    body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, last: np.ndarray
 ) -> SolverResult | None:
     """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
 
@@ -68,19 +70,19 @@ def floating(
     return SolverResult(x, 0, 0.0, SolverName.NONE, reason=NOTHING)
 
 
-def presses(body: BodyLike, contacts: Sequence[ContactLike], trial: np.ndarray) -> bool:
+def presses(body: ElasticBody, contacts: Sequence[Contact], trial: np.ndarray) -> bool:
     """Whether a displacement without reactions known to three digits penetrates a plane for certain."""
     return _deepest(body, contacts, trial) > CERTAIN * body.farthest(trial)
 
 
-def may_touch(body: BodyLike, contacts: Sequence[ContactLike], trial: np.ndarray) -> bool:
+def may_touch(body: ElasticBody, contacts: Sequence[Contact], trial: np.ndarray) -> bool:
     """Whether a displacement without reactions penetrates a plane by more than rounding."""
     return _deepest(body, contacts, trial, lambda contact: contact.gap_rounding(trial)) > 1.0
 
 
 def _deepest(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     trial: np.ndarray,
     unit: Callable = lambda contact: 1.0,
 ) -> float:
@@ -92,7 +94,7 @@ def _deepest(
     return body.largest(np.concatenate(depths))
 
 
-def refined(body: BodyLike, step: StepLike, x: np.ndarray) -> np.ndarray:
+def refined(body: ElasticBody, step: LoadStep, x: np.ndarray) -> np.ndarray:
     """The displacement without reactions, with another digit where what is left of ``b`` counts."""
     errors = step.measure_open(x)
     if errors.largest <= step.tol:

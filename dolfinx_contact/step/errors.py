@@ -35,9 +35,9 @@ from dolfinx_contact.contact.state import State, Status
 from dolfinx_contact.support.checks import EPSILON, ROUNDED
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.law.friction import Friction
-    from dolfinx_contact.solvers.protocols import ContactLike
 
 # If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
 BLIND = 1e-3
@@ -75,7 +75,7 @@ class Errors(NamedTuple):
         return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
-def contact_defects(contact: ContactLike, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
+def contact_defects(contact: Contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
     """Residual of the projection equation, penetration and defect of the slip rule, as forces.
 
     Args:
@@ -107,7 +107,7 @@ def _felt(state: State, friction: Friction) -> np.ndarray:
     return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
 
 
-def at_rest(contact: ContactLike, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
+def at_rest(contact: Contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
     """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
 
     On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
@@ -125,7 +125,7 @@ def at_rest(contact: ContactLike, stiffness: NodalStiffness, unknown: float) -> 
     return slips & (made <= unknown) & (contact.friction.mu > 0.0).any(axis=-1)
 
 
-def contact_rounding(contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
+def contact_rounding(contact: Contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
     """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
 
     Args:

@@ -24,9 +24,10 @@ from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.placement import Placement
     from dolfinx_contact.contact.state import State
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.surfaces.surface import Surface
 
 # How often a step is repeated with the geometry of its end.
@@ -50,7 +51,7 @@ class Ends:
         most: How often a step is repeated.
     """
 
-    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
         renewed = any(c.surface.deformable and c.changes for c in contacts)
         self.most = RENEWED if renewed else REPEATED
         self._turning = surfaces_of(c for c in contacts if c.surface.spins)
@@ -78,8 +79,8 @@ class Ends:
 
 
 def geometry_error(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     stiffness: list[NodalStiffness],
     u: np.ndarray,
     S: float,
@@ -106,9 +107,7 @@ def geometry_error(
     return left / S if S > 0.0 else (np.inf if left > 0.0 else 0.0)
 
 
-def _missed(
-    contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def _missed(contact: Contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
     """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
     placement, r = contact.placement, contact.reaction
     surface, there = placement.ended_at(u)
@@ -127,7 +126,7 @@ def _missed(
 
 
 def _missed_by_rows(
-    contact: ContactLike, stiffness: NodalStiffness, u: np.ndarray, fixed: np.ndarray
+    contact: Contact, stiffness: NodalStiffness, u: np.ndarray, fixed: np.ndarray
 ) -> tuple:
     """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
     ended = contact.placement.ended(contact.present, u)
@@ -150,7 +149,7 @@ def _missed_by_rows(
 
 
 def _pressed(
-    contact: ContactLike, stiffness: NodalStiffness, exact: np.ndarray, closed: np.ndarray
+    contact: Contact, stiffness: NodalStiffness, exact: np.ndarray, closed: np.ndarray
 ) -> np.ndarray:
     """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
     presses = contact.reaction[:, -1] > 0.0
@@ -159,7 +158,7 @@ def _pressed(
     return stiffness.normal * off
 
 
-def _dragged(contact: ContactLike, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
+def _dragged(contact: Contact, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
     """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
     contact.points.without_held(missed)
     made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, missed), axis=1)
@@ -171,7 +170,7 @@ def _dragged(contact: ContactLike, stiffness: NodalStiffness, missed: np.ndarray
     return np.where(friction > 0.0, np.minimum(made, turns), 0.0)
 
 
-def _moments(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> list[float]:
+def _moments(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> list[float]:
     """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
     missed = []
     for surface in surfaces_of(c for c in contacts if c.surface.spins):
@@ -191,7 +190,7 @@ def _moments(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> 
     return missed
 
 
-def too_long(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> str:
+def too_long(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> str:
     """Where the way of a step cannot be followed, in words; empty where it can.  Collective.
 
     The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
@@ -239,7 +238,7 @@ def undivided(missed: float, tol: float, repeated: int) -> str:
     )
 
 
-def _turned_on_the_way(contact: ContactLike, u: np.ndarray) -> np.ndarray:
+def _turned_on_the_way(contact: Contact, u: np.ndarray) -> np.ndarray:
     """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
     placement = contact.placement
     surface, there = placement.ended_at(u)

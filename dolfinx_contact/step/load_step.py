@@ -12,7 +12,7 @@ import numpy as np
 
 from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.law.maps import NodalMap, ReturnMap
 from dolfinx_contact.results.record import WORSE, Counts, counts
 from dolfinx_contact.step.errors import (
     Errors,
@@ -23,17 +23,17 @@ from dolfinx_contact.step.errors import (
 )
 from dolfinx_contact.support.checks import EPSILON, ROUNDED
 from dolfinx_contact.support.collective import raised_together
-from dolfinx_contact.surfaces.surface import driven_surfaces
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.step.statics import Statics
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 
 def nodal_stiffness(
-    body: BodyLike, contacts: Sequence[ContactLike]
+    body: ElasticBody, contacts: Sequence[Contact]
 ) -> tuple[list[NodalStiffness], float]:
     """Stiffness at the nodes of each contact, and a unit of force; contacts take their ``rho``.  Collective."""
     stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
@@ -45,7 +45,7 @@ def nodal_stiffness(
 
 
 def _shared_nodes(
-    contacts: Sequence[ContactLike], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
+    contacts: Sequence[Contact], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
 ):
     """The ``SharedNodes``, None where no node belongs to several contacts.  Collective."""
     if len(contacts) < 2:
@@ -53,6 +53,15 @@ def _shared_nodes(
     from dolfinx_contact.contact.shared import shared_nodes
 
     return shared_nodes(contacts, stiffness, fixed)
+
+
+def driven_surfaces(body: ElasticBody, contacts: Sequence[Contact]) -> DrivenSurfaces | None:
+    """The ``DrivenSurfaces`` of some contacts, None where force drives none.  Collective."""
+    if not any(contact.surface.motions for contact in contacts):
+        return None
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
+
+    return DrivenSurfaces(body, contacts)
 
 
 class Judged(NamedTuple):
@@ -98,8 +107,8 @@ class LoadStep:
 
     def __init__(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         b: np.ndarray,
         external: np.ndarray,
@@ -243,7 +252,7 @@ class LoadStep:
         return self.body.norm(self.free(forces))
 
     def out_of_balance(
-        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
     ) -> np.ndarray:
         """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``.
 
@@ -257,7 +266,7 @@ class LoadStep:
         return self.with_reactions(forces)
 
     def derivatives(
-        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
     ) -> list[tuple]:
         """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``."""
         forces = self.free(self.forces(x) if forces is None else forces)
@@ -294,7 +303,7 @@ class LoadStep:
                 contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
 
     def residual(
-        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
     ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state.
 
@@ -386,11 +395,13 @@ class LoadStep:
                 self._shared.give(k)
             yield contact
 
-    def _balance_surfaces(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> None:
+    def _balance_surfaces(
+        self, x: np.ndarray, forces: np.ndarray, maps: Sequence[NodalMap]
+    ) -> None:
         if self.surfaces is not None:
             self.surfaces.balance(x, maps, lambda: self._asked(x, forces))
 
-    def _respond(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[MapLike]) -> None:
+    def _respond(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[NodalMap]) -> None:
         """Give contacts the reactions that maps make of those which balance the forces."""
         self._balance_surfaces(x, forces, maps)
         for contact, map in zip(self._asked(x, forces), maps):

@@ -5,16 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.law.maps import NodalMap, ReturnMap
 from dolfinx_contact.step.errors import Errors
 from dolfinx_contact.step.load_step import LoadStep
-
-if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import MapLike
 
 
 class NonlinearStep(LoadStep):
@@ -41,7 +37,7 @@ class NonlinearStep(LoadStep):
         return self.by_form(x)
 
     def residual(
-        self, x: np.ndarray, maps: Sequence[MapLike], forces: np.ndarray | None = None
+        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
     ) -> tuple[np.ndarray, Errors]:
         """``out_of_balance`` and the errors of the state."""
         forces = self.forces(x) if forces is None else forces

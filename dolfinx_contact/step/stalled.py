@@ -14,7 +14,8 @@ from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolverError
 from dolfinx_contact.support.checks import place
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
 
 # Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
 # where few do, it is not that.
@@ -28,8 +29,8 @@ MANY = 60
 
 
 def stalled(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
+    body: ElasticBody,
+    contacts: Sequence[Contact],
     statuses: Iterable[Sequence[np.ndarray]],
     wrong: Sequence[np.ndarray],
 ) -> list[str]:
@@ -58,7 +59,7 @@ def stalled(
     return said + tall(body, contacts) if changed > MANY_CHANGE * nodes else said
 
 
-def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> list[str]:
+def tall(body: ElasticBody, contacts: Sequence[Contact]) -> list[str]:
     """That elements at the surface are tall, in the mean, and what to do; nothing if they are not.  Collective."""
     ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
@@ -70,7 +71,7 @@ def tall(body: BodyLike, contacts: Sequence[ContactLike]) -> list[str]:
     ]
 
 
-def slow(body: BodyLike, forces: np.ndarray) -> str:
+def slow(body: ElasticBody, forces: np.ndarray) -> str:
     """That the body alone is hard for its preconditioner, and what to do; empty if it is not, or if solves are exact.  Collective."""
     if body.exact:
         return ""
@@ -87,7 +88,7 @@ def slow(body: BodyLike, forces: np.ndarray) -> str:
     )
 
 
-def _ratios(contact: ContactLike) -> np.ndarray:
+def _ratios(contact: Contact) -> np.ndarray:
     """Height over width of this rank's cells that have a facet of contact nodes."""
     V, dim = contact.displacements.V, contact.points.dim
     nodes, x = compat.cell_nodes(V), V.tabulate_dof_coordinates()[:, :dim]

@@ -21,7 +21,9 @@ from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
@@ -68,7 +70,7 @@ class Statics:
     """
 
     def __init__(
-        self, body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, last: np.ndarray
+        self, body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, last: np.ndarray
     ):
         self._body, self._contacts, self._modes = body, contacts, body.loose.modes
         m, self._dim = self._modes.shape[1], body.V.mesh.geometry.dim
@@ -239,7 +241,7 @@ class Statics:
         sums = self._body.total(self._modes.T @ forces)
         return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
 
-    def _free_motions(self, step: StepLike, x: np.ndarray, unfelt: float) -> np.ndarray:
+    def _free_motions(self, step: LoadStep, x: np.ndarray, unfelt: float) -> np.ndarray:
         """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
 
         Args:
@@ -266,7 +268,7 @@ class Statics:
         small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
         return vectors[small].T / np.sqrt(self._felt)[:, None]
 
-    def slides(self, step: StepLike) -> bool:
+    def slides(self, step: LoadStep) -> bool:
         """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
         motions = self._free_motions(step, self.last, SLIDING)
         left, sizes = self._left()
@@ -320,7 +322,7 @@ class Statics:
         """Present normal reactions of all contacts."""
         return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
 
-    def hidden(self, step: StepLike) -> str:
+    def hidden(self, step: LoadStep) -> str:
         """Whether rounding in gaps and slips makes forces as large as the loads, in words.  Collective."""
         total, unit = self._body.total, step.unit
         rounding = [np.zeros(0)]
@@ -356,7 +358,7 @@ class Statics:
         )
         return sums + self.loads, sizes + np.abs(self.loads)
 
-    def settled(self, step: StepLike, x: np.ndarray, choice: str) -> np.ndarray:
+    def settled(self, step: LoadStep, x: np.ndarray, choice: str) -> np.ndarray:
         """A solution whose undetermined motions are those nearest to the last displacement, by volume.  Collective.
 
         Args:

@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 def landing(
-    body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, x: np.ndarray, tol: float
+    body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, x: np.ndarray, tol: float
 ) -> float:
     """Let slip of nodes that land count from where they touch, where that matters; how much it does.  Collective.
 
@@ -52,16 +54,16 @@ def landing(
     return late
 
 
-def _opened(contact: ContactLike, x: np.ndarray) -> np.ndarray:
+def _opened(contact: Contact, x: np.ndarray) -> np.ndarray:
     """Nodes that were open at the start of a step, ``shape=(n,)``, booleans: what is left of gaps under reactions is none."""
     last = contact.last
     return (last.gap > contact.gap_rounding(x)) & (last.reaction[:, -1] == 0.0)
 
 
 def _felt(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
-    step: StepLike,
+    body: ElasticBody,
+    contacts: Sequence[Contact],
+    step: LoadStep,
     slips: Sequence[np.ndarray],
     at: Sequence[np.ndarray],
     tol: float,
@@ -79,9 +81,9 @@ def _felt(
 
 
 def _without(
-    body: BodyLike,
-    contacts: Sequence[ContactLike],
-    step: StepLike,
+    body: ElasticBody,
+    contacts: Sequence[Contact],
+    step: LoadStep,
     x: np.ndarray,
     nodes: Sequence[np.ndarray],
 ) -> np.ndarray | None:
@@ -99,7 +101,7 @@ def _without(
     return x - body.solve(forces)
 
 
-def opening(body: BodyLike, contacts: Sequence[ContactLike], step: StepLike, tol: float) -> None:
+def opening(body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, tol: float) -> None:
     """Let the slip of nodes that have opened in the step end where they did.  Collective.
 
     Args:

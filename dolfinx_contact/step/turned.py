@@ -16,10 +16,12 @@ import numpy as np
 from scipy import sparse
 
 from dolfinx_contact.bodies.rigid_motion import rigid_modes
-from dolfinx_contact.surfaces.surface import cross, driven_surfaces, rotation_less_one
+from dolfinx_contact.step.load_step import driven_surfaces
+from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
 
 # About how many nodes of a rank are asked how the body turns.
 SAMPLED = 2000
@@ -35,7 +37,7 @@ class Turn:
         body: The body, with its ``parts``.
     """
 
-    def __init__(self, body: BodyLike):
+    def __init__(self, body: ElasticBody):
         self._body, of = body, body.displacements
         self._part, self._count = body.parts
         nodes = np.arange(of.count)[:: of.count // SAMPLED + 1]
@@ -58,7 +60,7 @@ class Turn:
         """Rotation vector of each part, ``shape=(parts, 3)``, in 2-D ``(parts, 1)``, by least squares over its nodes.  Collective."""
         return self._body.total(self._fit @ u).reshape(self._count, -1)
 
-    def share(self, contacts: Sequence[ContactLike], u: np.ndarray, angles: np.ndarray) -> float:
+    def share(self, contacts: Sequence[Contact], u: np.ndarray, angles: np.ndarray) -> float:
         """What contact and supports do not let the body grow, over that by which they deform it; 0 where it grows freely.  Collective.
 
         Both are motions along normals of the nodes that touch, or would if the body had not grown, and of supports, but for what rigid
@@ -105,9 +107,7 @@ class Turn:
         return np.column_stack([of.vectors(columns), *map(of.vectors, modes)])
 
 
-def _moved(
-    contact: ContactLike, u: np.ndarray, motions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _moved(contact: Contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
     if not contact.surface.curved or contact.surface.deformable:
         return contact.points.motion(motions), contact.present.gap
@@ -117,7 +117,7 @@ def _moved(
     return frames @ motions[contact.points.dofs], surface.distance(y) + contact.opening
 
 
-def _left(body: BodyLike, rows: np.ndarray) -> np.ndarray:
+def _left(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
     """Squares of the first two columns less what all others account for, ``shape=(2,)``.  Collective."""
     left, rest = rows[:, :2].copy(), rows[:, 2:]
     size = np.sqrt(body.total((rest**2).sum(axis=0)))

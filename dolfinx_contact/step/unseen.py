@@ -26,8 +26,9 @@ from dolfinx_contact.support.collective import raised_together
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.facets import Facets
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 LOG = logging.getLogger("dolfinx_contact")
 
@@ -92,13 +93,13 @@ class Missed(NamedTuple):
         return max(self, Missed(float(lengths[k]), tuple(where[k].tolist()), *map(float, columns)))
 
 
-def _has_between(contact: ContactLike) -> bool:
+def _has_between(contact: Contact) -> bool:
     """Whether anything rigid may stand between nodes of facets."""
     surface = contact.surface
     return (surface.varies or contact.displacements.degree > 1) and not surface.deformable
 
 
-def _facets(contact: ContactLike) -> list[Facets]:
+def _facets(contact: Contact) -> list[Facets]:
     from dolfinx_contact.contact.facets import facets_of
 
     return facets_of(contact.displacements, contact.facets)
@@ -113,7 +114,7 @@ class Unseen:
         contacts: The contacts.
     """
 
-    def __init__(self, contacts: Sequence[ContactLike]):
+    def __init__(self, contacts: Sequence[Contact]):
         between = [contact for contact in contacts if _has_between(contact)]
         self._facets = {contact: _facets(contact) for contact in between}
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
@@ -130,8 +131,8 @@ class Unseen:
 
     def check(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: list[NodalStiffness],
         u: np.ndarray,
         counts: Counts,
@@ -168,7 +169,7 @@ class Unseen:
         if not self._apart and not large:
             self._far = [contact for contact in self._far if not _tell_far(body, contact)]
 
-    def _check_facets(self, u: np.ndarray, stiffness: dict[ContactLike, NodalStiffness]) -> None:
+    def _check_facets(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
         for looked_at, look in ((self._straight, self._off_straight), (self._between, _between)):
             for contact in looked_at:
@@ -185,7 +186,7 @@ class Unseen:
                     warnings.warn(said(contact, missed, pushed), stacklevel=4)
                     break
 
-    def _check_wear(self, contacts: Sequence[ContactLike], stiffness: list[NodalStiffness]) -> None:
+    def _check_wear(self, contacts: Sequence[Contact], stiffness: list[NodalStiffness]) -> None:
         """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
         for contact, of in zip(contacts, stiffness):
             if (
@@ -207,8 +208,8 @@ class Unseen:
 
     def _check_turn(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: list[NodalStiffness],
         u: np.ndarray,
     ) -> None:
@@ -242,7 +243,7 @@ class Unseen:
                 stacklevel=4,
             )
 
-    def _is_straight(self, contact: ContactLike) -> bool:
+    def _is_straight(self, contact: Contact) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
         most = 0.0
         for facets in self._facets[contact]:
@@ -253,7 +254,7 @@ class Unseen:
         return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
 
     def _off_straight(
-        self, contact: ContactLike, of: list[Facets], u: np.ndarray, pushed: float, _worn: Any
+        self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, _worn: Any
     ) -> Missed:
         """How far nodes amid straight edges stand off a round body, where it touches."""
         missed = Missed()
@@ -270,7 +271,7 @@ class Unseen:
         return missed
 
 
-def _spread(body: BodyLike, u: np.ndarray) -> float:
+def _spread(body: ElasticBody, u: np.ndarray) -> float:
     """Half of the largest difference of displacements, at most.  Collective."""
     rows = body.displacements.rows(u)
     ends = np.concatenate([of.max(axis=0, initial=-np.inf) for of in (rows, -rows)])
@@ -278,7 +279,7 @@ def _spread(body: BodyLike, u: np.ndarray) -> float:
     return float(np.linalg.norm(ends.reshape(2, -1).sum(axis=0))) / 2
 
 
-def _check_side(contact: ContactLike) -> bool:
+def _check_side(contact: Contact) -> bool:
     """Log, as soon as nodes press, that the other side would be the better slave; whether they do.  Collective."""
     found = contact.placement.sides(contact.present)
     if found is None:
@@ -294,7 +295,7 @@ def _check_side(contact: ContactLike) -> bool:
     return True
 
 
-def _check_axes(contact: ContactLike, u: np.ndarray) -> bool:
+def _check_axes(contact: Contact, u: np.ndarray) -> bool:
     """Warn of a body that has turned on a rigid surface, which carries no axes of a body; whether it has.  Collective."""
     dim = contact.points.dim
     x = contact.x[:, :dim]
@@ -311,7 +312,7 @@ def _check_axes(contact: ContactLike, u: np.ndarray) -> bool:
     return True
 
 
-def _check_held(body: BodyLike, contact: ContactLike) -> bool:
+def _check_held(body: ElasticBody, contact: Contact) -> bool:
     """Warn of nodes that have no friction because supports hold them along a deformable surface; whether any node presses.  Collective."""
     force = contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
     without = contact.placement.clamped(body.fixed)
@@ -325,7 +326,7 @@ def _check_held(body: BodyLike, contact: ContactLike) -> bool:
     return all > 0.0
 
 
-def _check_strayed(contact: ContactLike) -> bool:
+def _check_strayed(contact: Contact) -> bool:
     """Warn of a node that has slid too far along a deformable surface; whether one has.  Collective."""
     slid, most = max(contact.comm.allgather(contact.placement.strayed(contact.present)))
     if slid <= most:
@@ -338,7 +339,7 @@ def _check_strayed(contact: ContactLike) -> bool:
     return True
 
 
-def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
+def _check_slopes(body: ElasticBody, contact: Contact, u: np.ndarray) -> bool:
     """Warn of a wavy face that is steep where nodes press on it, whose reactions are along the plane's normal; whether it is.  Collective."""
     step, force = ALONG * body.extent, contact.reaction[:, -1]
     (_, x), squares = contact.placement.ended_at(u), np.zeros(len(force))
@@ -360,7 +361,7 @@ def _check_slopes(body: BodyLike, contact: ContactLike, u: np.ndarray) -> bool:
     return True
 
 
-def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) -> bool:
+def _check_apart(body: ElasticBody, contacts: Sequence[Contact], smallest: float) -> bool:
     """Warn, where no node has touched yet, of gaps and normals with which none is likely to; whether it did.  Collective."""
     if smallest > FAR * body.extent:
         warnings.warn(
@@ -391,7 +392,7 @@ def _check_apart(body: BodyLike, contacts: Sequence[ContactLike], smallest: floa
     return True
 
 
-def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) -> bool:
+def _tell_gap(body: ElasticBody, contacts: Sequence[Contact], smallest: float) -> bool:
     """Log by how much the nearest node misses its surface: on the way there no mistake, and no warning; whether it does.  Collective."""
     if body.total(sum(contact.covered.sum() for contact in contacts)) == 0.0:
         if contacts[0].comm.rank == 0:
@@ -410,7 +411,7 @@ def _tell_gap(body: BodyLike, contacts: Sequence[ContactLike], smallest: float) 
     return True
 
 
-def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
+def _tell_far(body: ElasticBody, contact: Contact) -> bool:
     """Log that one surface of several is nowhere near; whether that is said, or it is touched.  Collective."""
     if body.largest(contact.reaction[:, -1]) > 0.0:
         return True
@@ -427,7 +428,7 @@ def _tell_far(body: BodyLike, contact: ContactLike) -> bool:
 
 
 def _between(
-    contact: ContactLike, of: list[Facets], u: np.ndarray, _pushed: Any, worn: np.ndarray
+    contact: Contact, of: list[Facets], u: np.ndarray, _pushed: Any, worn: np.ndarray
 ) -> Missed:
     """How far the surface goes into facets between nodes, or recedes between nodes that touch."""
     missed = Missed()
@@ -443,7 +444,7 @@ def _between(
 
 
 def _within(
-    contact: ContactLike,
+    contact: Contact,
     facets: Facets,
     x: np.ndarray,
     gaps: np.ndarray,
@@ -481,7 +482,7 @@ def _within(
     return missed
 
 
-def _of_between(contact: ContactLike, missed: Missed, pushed: float) -> str:
+def _of_between(contact: Contact, missed: Missed, pushed: float) -> str:
     near = f"near {_said(missed.where)}"
     if missed.hollow:
         does = f"recedes by {missed.length:.2g} between nodes that touch, {near}"
@@ -495,7 +496,7 @@ def _of_between(contact: ContactLike, missed: Missed, pushed: float) -> str:
     )
 
 
-def _of_straight(contact: ContactLike, missed: Missed, pushed: float) -> str:
+def _of_straight(contact: Contact, missed: Missed, pushed: float) -> str:
     felt = f"more than reactions push nodes in, {pushed:.2g}" if pushed else "where nothing touches"
     return (
         f"displacements of second order on straight-sided cells of a round surface: near {_said(missed.where)} nodes between "
@@ -510,6 +511,6 @@ def _said(where: ArrayLike) -> str:
     return f"({', '.join(f'{x:.3g}' for x in where)})"
 
 
-def _positions(contact: ContactLike, facets: Facets, u: np.ndarray) -> np.ndarray:
+def _positions(contact: Contact, facets: Facets, u: np.ndarray) -> np.ndarray:
     """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)

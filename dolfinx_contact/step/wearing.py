@@ -25,8 +25,9 @@ import numpy as np
 from dolfinx_contact.support.anderson import Anderson
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
 
 # Stiffness with which depths follow, over the node's own.
 STIFF = 2.0
@@ -61,8 +62,8 @@ class Wearing:
 
     def __init__(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         tol: float,
     ):
@@ -120,7 +121,7 @@ class Wearing:
             first += contact.nodes.size
 
 
-def _shares(contacts: Sequence[ContactLike]) -> np.ndarray:
+def _shares(contacts: Sequence[Contact]) -> np.ndarray:
     """Part of its node that each node of each contact has, by area, ``shape=(n,)``: contacts of one face share their common edge.  Collective."""
     nodes, area = (np.concatenate([getattr(c, name) for c in contacts]) for name in ("nodes", "area"))  # fmt: skip
     _, at = np.unique(nodes, return_inverse=True)

@@ -13,7 +13,8 @@ from mpi4py import MPI
 from dolfinx_contact.support.line_search import halves
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, MapLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.law.maps import NodalMap
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Steps of Newton's method, and lengths of one that are tried.
@@ -49,9 +50,9 @@ class SurfaceBalance:
     def __init__(
         self,
         surfaces: DrivenSurfaces,
-        body: BodyLike,
+        body: ElasticBody,
         x: np.ndarray,
-        maps: Sequence[MapLike],
+        maps: Sequence[NodalMap],
         asked: Callable,
     ):
         self._surfaces, self._body, self._x, self._maps, self._asked = (

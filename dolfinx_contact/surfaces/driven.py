@@ -20,7 +20,9 @@ from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.law.maps import NodalMap
 
 # Part of a motion that has to be along normals for these to resist it.
 RESISTING = 1e-8
@@ -32,7 +34,7 @@ STIFFEST = 1e10
 APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
 
-def approach(body: BodyLike, contacts: Sequence[ContactLike], u: np.ndarray) -> None:
+def approach(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> None:
     """Move curved surfaces that force drives and no node touches to the body.  Collective.
 
     Args:
@@ -63,7 +65,7 @@ class DrivenSurfaces:
         pressing: Which motions the normal reactions resist most, ``shape=(m,)``.
     """
 
-    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
         self._body, self._contacts = body, contacts
         self.surfaces = surfaces_of(c for c in contacts if c.surface.motions)
         self._home = [surface.displacement for surface in self.surfaces]
@@ -82,7 +84,7 @@ class DrivenSurfaces:
         if not self.plain:
             self.pressing = self._resisted()
 
-    def _axes(self, contact: ContactLike) -> np.ndarray:
+    def _axes(self, contact: Contact) -> np.ndarray:
         points, surface = contact.points, contact.surface
         axes = np.zeros((points.count, points.dim, self.count))
         for one, part, motions in zip(self.surfaces, self.parts, self._motions):
@@ -121,7 +123,7 @@ class DrivenSurfaces:
         self._loose = smooth & (along <= RESISTING**2 * (along + across)) & (self.springs == 0.0)
         return (along > across) | (smooth & ~self._loose)
 
-    def _loaded(self, contact: ContactLike) -> np.ndarray:
+    def _loaded(self, contact: Contact) -> np.ndarray:
         """Normal reactions of the last step; where there are none, one at the nodes that were nearest.  Collective."""
         pressing = contact.last.reaction[:, -1]
         if self._body.largest(pressing) > 0.0:
@@ -292,7 +294,7 @@ class DrivenSurfaces:
         columns[:, self._body.fixed] = 0.0
         return columns.T
 
-    def balance(self, x: np.ndarray, maps: Sequence[MapLike], asked: Callable) -> None:
+    def balance(self, x: np.ndarray, maps: Sequence[NodalMap], asked: Callable) -> None:
         """Move the planes until the reactions that maps make are in balance, as far as they can.  Collective.
 
         Args:

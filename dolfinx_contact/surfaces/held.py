@@ -20,7 +20,8 @@ from dolfinx_contact.support.checks import STILL, place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.surfaces.drive import Motion
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -31,13 +32,13 @@ ALONG = 1e-8
 class Holding(NamedTuple):
     """Nodes of a contact that hold a plane."""
 
-    contact: ContactLike
+    contact: Contact
     rows: np.ndarray  # (k,)
     axes: np.ndarray  # what the plane's motions move there, tangential components, (k, T, m)
 
 
 def held_surfaces(
-    body: BodyLike, contacts: Sequence[ContactLike], last: np.ndarray, b: np.ndarray
+    body: ElasticBody, contacts: Sequence[Contact], last: np.ndarray, b: np.ndarray
 ) -> HeldSurfaces | None:
     """The planes that held nodes hold, None if there are none; from now on these motions are not free.  Collective.
 
@@ -60,7 +61,7 @@ def held_surfaces(
 
 
 def _held_surface(
-    body: BodyLike, contacts: Sequence[ContactLike], surface: Surface, u: np.ndarray
+    body: ElasticBody, contacts: Sequence[Contact], surface: Surface, u: np.ndarray
 ) -> HeldSurface | None:
     """The plane with the motions that nodes hold.  Collective."""
     motions, on = surface.motions, [c for c in contacts if c.surface is surface]
@@ -103,7 +104,7 @@ def _held_surface(
 class HeldSurfaces:
     """All planes that held nodes hold."""
 
-    def __init__(self, body: BodyLike, surfaces: list):
+    def __init__(self, body: ElasticBody, surfaces: list):
         self._body, self._surfaces, self._beyond = body, surfaces, False
 
     def share(self) -> None:
@@ -135,11 +136,11 @@ class HeldSurface:
 
     def __init__(
         self,
-        body: BodyLike,
+        body: ElasticBody,
         surface: Surface,
         motions: list[Motion],
         holding: list[Holding],
-        contacts: Sequence[ContactLike],
+        contacts: Sequence[Contact],
     ):
         self._body, self._surface, self._motions = body, surface, motions
         self._holding, self._contacts = holding, contacts

@@ -11,8 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.law.friction import Friction
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.step.statics import Statics
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.surface import Surface
@@ -25,7 +26,7 @@ MARGIN = 1e-9
 
 
 def slides_away(
-    surfaces: DrivenSurfaces, body: BodyLike, contacts: Sequence[ContactLike], given: bool
+    surfaces: DrivenSurfaces, body: ElasticBody, contacts: Sequence[Contact], given: bool
 ) -> str:
     """Which of the ``DrivenSurfaces`` slides away, tips or spins, in words; none is the empty string.  Collective.
 
@@ -49,7 +50,7 @@ def slides_away(
 
 
 def lost_far_away(
-    body: BodyLike,
+    body: ElasticBody,
     statics: Statics | None,
     surfaces: DrivenSurfaces | None,
     x: np.ndarray,
@@ -75,7 +76,7 @@ def lost_far_away(
     return not acts or max(body.farthest(x), moved.max(initial=0.0)) > body.extent
 
 
-def nothing_holds(contacts: Sequence[ContactLike]) -> str:
+def nothing_holds(contacts: Sequence[Contact]) -> str:
     """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
     surfaces = [contact.surface for contact in contacts]
     if any(
@@ -97,8 +98,8 @@ class _Driven:
         surfaces: DrivenSurfaces,
         part: Any,
         driving: Any,
-        contacts: Sequence[tuple[ContactLike, np.ndarray]],
-        body: BodyLike,
+        contacts: Sequence[tuple[Contact, np.ndarray]],
+        body: ElasticBody,
     ):
         self._surface, self._driving, self._contacts, self._body = surface, driving, contacts, body
         self._springs, self._turns = surfaces.springs[part], surfaces.turns[part]
@@ -190,9 +191,9 @@ class _Limit:
 
     def __init__(
         self,
-        contacts: Sequence[tuple[ContactLike, np.ndarray]],
+        contacts: Sequence[tuple[Contact, np.ndarray]],
         motions: np.ndarray,
-        body: BodyLike,
+        body: ElasticBody,
         weight: float | None = None,
     ):
         self._body, self._weight = body, weight

@@ -14,7 +14,6 @@ from dolfinx_contact.support.attributes import Guarded, frozen, whole
 from dolfinx_contact.support.checks import finite, place, vector
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
     from dolfinx_contact.surfaces.drive import Drive, Motion
 
 # Two vectors are parallel if the part of one across the other is below this.
@@ -362,12 +361,3 @@ def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
     if angle.size == 1:
         return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
     return np.cross(angle, arms)
-
-
-def driven_surfaces(body: BodyLike, contacts: Sequence[ContactLike]):
-    """The ``DrivenSurfaces`` of some contacts, None where force drives none.  Collective."""
-    if not any(contact.surface.motions for contact in contacts):
-        return None
-    from dolfinx_contact.surfaces.driven import DrivenSurfaces
-
-    return DrivenSurfaces(body, contacts)

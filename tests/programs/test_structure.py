@@ -1,17 +1,25 @@
-"""What programs keep to: short functions, no path of their own making, no import circle."""
+"""What programs keep to: short functions, no path of their own making, no import circle, few interfaces."""
 
 import ast
 import subprocess
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
+
+from docs.extension.runs import blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("dolfinx_contact", "demos", "benchmarks", "studies", "mechanics")
 PROGRAMS = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
 TREES = {file: ast.parse(file.read_text()) for file in PROGRAMS}
+PACKAGE = {file: tree for file, tree in TREES.items() if ROOT / "dolfinx_contact" in file.parents}
+PUBLIC = ("dolfinx_contact.compat", "dolfinx_contact.extend")  # beside the package itself
 LINES = 60  # of a function
+CIRCLE = 7  # files that import each other, in a circle, some for type checkers alone
+INTERFACES, MEMBERS = 8, 12
 
 
 def name(file: Path) -> str:
@@ -28,9 +36,7 @@ def test_functions_are_short(file):
     assert not long
 
 
-@pytest.mark.parametrize(
-    "file", [f for f in PROGRAMS if "dolfinx_contact" in f.parts[len(ROOT.parts) :]], ids=name
-)
+@pytest.mark.parametrize("file", PACKAGE, ids=name)
 def test_parameters_have_types(file):
     """Every parameter of the package says what it is."""
     functions = [n for n in ast.walk(TREES[file]) if isinstance(n, ast.FunctionDef)]
@@ -58,16 +64,19 @@ def test_no_program_changes_the_path():
 
 def imports(tree) -> set[str]:
     """Modules that are imported anywhere, in functions, too, but for type checkers alone."""
-    found = set()
     for_types = {
         id(node)
         for branch in ast.walk(tree)
         if isinstance(branch, ast.If) and ast.unparse(branch.test) == "TYPE_CHECKING"
         for node in ast.walk(branch)
     }
-    for node in ast.walk(tree):
-        if id(node) in for_types:
-            continue
+    return imported(node for node in ast.walk(tree) if id(node) not in for_types)
+
+
+def imported(nodes) -> set[str]:
+    """Modules that these nodes import themselves, and names that may be modules."""
+    found = set()
+    for node in nodes:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -75,13 +84,43 @@ def imports(tree) -> set[str]:
     return found
 
 
-def test_demos_import_public_names_only():
-    """What a demo imports of the package users may import: its own names, and what differs between DOLFINx releases."""
+def outside_functions(node):
+    """Nodes that are run when a module is imported, or are for type checkers."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.FunctionDef):
+            yield child
+            yield from outside_functions(child)
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Largest groups of which each member leads to each other one."""
+    names = sorted(graph)
+    edges = np.array([[other in graph[one] for other in names] for one in names])
+    count, group = connected_components(edges, connection="strong")
+    return [[names[k] for k in np.flatnonzero(group == of)] for of in range(count)]
+
+
+DEMOS = {file: TREES[file] for file in (ROOT / "demos").glob("*.py")}
+PAGES = {
+    file: ast.parse("".join(blocks(file.read_text())))
+    for file in (ROOT / "docs").rglob("*.md")
+    if "gallery" not in file.parts
+}
+
+
+def test_demos_and_pages_import_public_names_only():
+    """What users read imports of the package its own names, what differs between DOLFINx releases, and what extensions need."""
     package = "dolfinx_contact"
-    for file in (ROOT / "demos").glob("*.py"):
-        ours = {n for n in imports(TREES[file]) if n.split(".")[0] == package} - {package}
-        assert all(n.startswith(f"{package}.compat") for n in ours), file
+    for file, tree in (DEMOS | PAGES).items():
+        ours = {n for n in imports(tree) if n.split(".")[0] == package} - {package}
+        assert all(n.startswith(PUBLIC) for n in ours), file
         assert not [n for n in ours if "._" in n], file
+    assert "dolfinx_contact.extend" in imports(PAGES[ROOT / "docs" / "extending.md"])
+
+
+def test_package_does_not_import_what_extensions_need():
+    """The module from which extensions import is imported by nothing in the package."""
+    assert not [file for file, tree in PACKAGE.items() if PUBLIC[1] in imported(ast.walk(tree))]
 
 
 def test_there_is_no_import_circle():
@@ -108,6 +147,30 @@ def test_no_two_folders_import_each_other():
                 pairs.add((ends[0][1], ends[1][1]))
     assert ("step", "contact") in pairs
     assert not [pair for pair in pairs if pair[::-1] in pairs]
+
+
+def test_circles_of_types_are_small():
+    """At most seven files of the package import each other in a circle, imports for type checkers counted, those in functions not."""
+    assert circles({"a": {"b"}, "b": {"a"}, "c": {"a"}}) == [["a", "b"], ["c"]]
+    graph = {name(file): imported(outside_functions(tree)) for file, tree in PACKAGE.items()}
+    assert "dolfinx_contact.step.load_step" in graph["dolfinx_contact.solvers.base"]
+    large = [" ".join(circle) for circle in circles(graph) if len(circle) > CIRCLE]
+    assert not large, "\n".join(large)
+
+
+def test_interfaces_are_few_and_small():
+    """The package has at most eight protocols and abstract classes, none of more than twelve members."""
+    members: dict[str, set[str]] = {}
+    for tree in PACKAGE.values():
+        for of in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+            bases = {ast.unparse(base).split("[")[0].split(".")[-1] for base in of.bases}
+            if bases & {"Protocol", "ABC"}:
+                own = {getattr(node, "name", None) or ast.unparse(node.target) for node in of.body
+                       if isinstance(node, (ast.FunctionDef, ast.AnnAssign))}  # fmt: skip
+                members[of.name] = own.union(*(members.get(base, ()) for base in bases))
+    assert {"Solver", "BoundSolver", "NodalMap"} <= set(members) and len(members) <= INTERFACES
+    assert "return_map" in members["ContactLaw"]  # of its base
+    assert not {of: names for of, names in members.items() if len(names) > MEMBERS}
 
 
 def test_the_repository_is_light():

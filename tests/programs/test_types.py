@@ -48,26 +48,23 @@ KNOWN = {
     "dc.__version__": "str",
 }
 
-# What parts of a step ask of each other, and the classes that have it.
+# Interfaces, and the classes of the package that fit them.
 PARTS = """
-from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.nonlinear import NonlinearBody
-from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+import dolfinx_contact as dc
+from dolfinx_contact import _kernel, extend
 from dolfinx_contact.law.supported import SupportedLaw
-from dolfinx_contact.solvers import protocols
-from dolfinx_contact.step.load_step import LoadStep
 
 
-def fits(body: ElasticBody, rubber: NonlinearBody, contact: Contact, step: LoadStep) -> None:
-    bodies: list[protocols.BodyLike] = [body, rubber]
-    tangent: protocols.NonlinearBodyLike = rubber
-    parts: tuple[protocols.ContactLike, protocols.StepLike] = contact, step
+solvers: list[extend.Solver] = [dc.CondensedNewton(), dc.FixedPoint(), dc.SparseNewton(), dc.SNES()]
 
 
-def maps(one: BipotentialMap, other: ReturnMap, law: SupportedLaw) -> None:
-    both: list[protocols.MapLike] = [one, other]
-    laws: list[protocols.LawLike] = [law]
+def maps(one: extend.BipotentialMap, other: extend.ReturnMap) -> list[extend.NodalMap]:
+    return [one, other]
+
+
+def laws(plane: _kernel.Law2D, solid: _kernel.Law3D, held: SupportedLaw) -> list[extend.NodalLaw]:
+    whole: list[extend.ContactLaw] = [plane, solid]
+    return [*whole, held]
 """
 
 
@@ -103,14 +100,12 @@ def test_a_users_script_is_well_typed(tmp_path):
         assert kind in by_line[k][0] and '"Any"' not in by_line[k][0], by_line[k]
 
 
-def test_parts_of_a_step_have_what_others_ask_of_them(tmp_path):
-    """Bodies, contacts, steps, maps and laws fit the protocols by which parameters are typed; one that lacks a member does not."""
+def test_classes_fit_their_interfaces(tmp_path):
+    """Solvers, maps and laws fit the interfaces by which parameters are typed; one that lacks a member does not."""
     assert checked(tmp_path, PARTS) == []
-    wrong = PARTS.replace(
-        "list[protocols.BodyLike] = [body, rubber]", "list[protocols.BodyLike] = [contact]"
-    )
+    wrong = PARTS.replace("[plane, solid]", "[plane, held]")
     (said,) = [line for line in checked(tmp_path, wrong) if "error" in line]
-    assert "BodyLike" in said
+    assert "ContactLaw" in said
 
 
 def test_a_users_script_runs(tmp_path):

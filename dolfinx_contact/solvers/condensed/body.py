@@ -34,9 +34,11 @@ from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Iterations for a loose body that seems to slide away, and for any other.
 FEW, MANY = 3000, 6000
@@ -73,8 +75,8 @@ class BoundCondensedNewton:
     def __init__(
         self,
         options: CondensedNewton,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
         memory: dict[str, Any],
     ):
@@ -136,12 +138,12 @@ class BoundCondensedNewton:
 
         return CondensedSurfaces(self._body, self._contacts, self._turns, normal)
 
-    def _move_surfaces(self, step: StepLike, force: np.ndarray) -> None:
+    def _move_surfaces(self, step: LoadStep, force: np.ndarray) -> None:
         """Let surfaces that force drives be where forces of all rows have them."""
         if self._surfaces is not None:
             self._surfaces.move(step, force)
 
-    def _driving(self, step: StepLike) -> np.ndarray:
+    def _driving(self, step: LoadStep) -> np.ndarray:
         """Forces that drive the surfaces of the tied rows at present."""
         return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step)
 
@@ -187,7 +189,7 @@ class BoundCondensedNewton:
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
         return True
 
-    def _begin(self, step: StepLike) -> np.ndarray:
+    def _begin(self, step: LoadStep) -> np.ndarray:
         """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
         if self._surfaces is not None:
@@ -202,7 +204,7 @@ class BoundCondensedNewton:
                     self._surfaces.begin(step, free)
         return free
 
-    def solve(self, step: StepLike, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:  # fmt: skip
+    def solve(self, step: LoadStep, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:  # fmt: skip
         """One load step by Newton's method on the condensed problem.
 
         Args:
@@ -262,7 +264,7 @@ class BoundCondensedNewton:
             self.past.append((rows, force, self._tied))
         return SolverResult(x, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried)
 
-    def _limited(self, step: StepLike) -> dict:
+    def _limited(self, step: LoadStep) -> dict:
         """Limits of the search for a loose body.  Collective."""
         most = FEW if step.statics.slides(step) else MANY
         return {"max_iterations": min(most, self._options.max_iterations or most)}
@@ -278,7 +280,7 @@ class BoundCondensedNewton:
             of += contact.points.count
 
     def _placed(
-        self, step: StepLike, free: np.ndarray, starts: Sequence[np.ndarray]
+        self, step: LoadStep, free: np.ndarray, starts: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, list]:
         """Of a loose body: q where it stands at first, the forces of all rows that hold it there, and starts moved there."""
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
@@ -348,7 +350,7 @@ class BoundCondensedNewton:
         sums = sparse.csr_matrix(rows, (dofs.size, whole))
         return Rows(self.comm, sparse.eye(dofs.size, format="csr"), sums, first, size)
 
-    def _motion(self, step: StepLike, displacement: np.ndarray) -> np.ndarray:
+    def _motion(self, step: LoadStep, displacement: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
         for contact, moved in zip(self._contacts, self._moved):
@@ -376,7 +378,7 @@ class BoundCondensedNewton:
 
     def _reactions(
         self,
-        step: StepLike,
+        step: LoadStep,
         q: np.ndarray,
         tol: float,
         starts: Sequence[np.ndarray],
@@ -436,12 +438,12 @@ class BoundCondensedNewton:
         return gathered
 
 
-def _searches(step: StepLike, fallbacks: bool) -> tuple[dict, ...]:
+def _searches(step: LoadStep, fallbacks: bool) -> tuple[dict, ...]:
     """Options of one search after another: where something may slide Newton's method alone first."""
     return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
 
 
-def moved_across(contact: ContactLike) -> np.ndarray:
+def moved_across(contact: Contact) -> np.ndarray:
     """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
     points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
     rows = points.supported
@@ -449,7 +451,7 @@ def moved_across(contact: ContactLike) -> np.ndarray:
     return moved
 
 
-def acting(contact: ContactLike, moved: np.ndarray) -> Friction:
+def acting(contact: Contact, moved: np.ndarray) -> Friction:
     """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
     free, whole = contact.free_friction, contact.friction
     if free is whole or not moved.any():
@@ -459,7 +461,7 @@ def acting(contact: ContactLike, moved: np.ndarray) -> Friction:
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
 
 
-def _next_change(step: StepLike, x: np.ndarray) -> float:
+def _next_change(step: LoadStep, x: np.ndarray) -> float:
     from dolfinx_contact.solvers.newton.contact_tangent import next_change
 
     return next_change(step, x)

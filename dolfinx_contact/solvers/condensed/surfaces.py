@@ -12,7 +12,9 @@ import numpy as np
 from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 class CondensedSurfaces:
@@ -33,8 +35,8 @@ class CondensedSurfaces:
 
     def __init__(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         turns: np.ndarray,
         stiffness: np.ndarray,
     ):
@@ -63,7 +65,7 @@ class CondensedSurfaces:
         bordered[size:, size:] = -np.diag(self._springs[loose])
         return bordered
 
-    def begin(self, step: StepLike, free: np.ndarray) -> None:
+    def begin(self, step: LoadStep, free: np.ndarray) -> None:
         """Planes begin where they were; where springs are not stretched if these are eliminated; all near the body.
 
         Args:
@@ -74,7 +76,7 @@ class CondensedSurfaces:
         step.surfaces.touch(free)
         self._at_first = step.surfaces.moved
 
-    def move(self, step: StepLike, force: np.ndarray) -> None:
+    def move(self, step: LoadStep, force: np.ndarray) -> None:
         """Move the planes where forces of all rows have them, the tied rows' last."""
         moved, stiff = np.zeros(step.surfaces.count), self._stiff
         moved[~stiff] = force[len(force) - self.tied :]
@@ -89,7 +91,7 @@ class CondensedSurfaces:
         apart[:, -self.tied :] *= np.abs(lengths).max() / largest
         return apart.max(axis=1)
 
-    def driving(self, step: StepLike) -> np.ndarray:
+    def driving(self, step: LoadStep) -> np.ndarray:
         """Forces that drive the planes of the tied rows at present."""
         return step.surfaces.driving()[~self._stiff]
 
@@ -99,7 +101,7 @@ def _turned(turns: np.ndarray, axes: np.ndarray) -> np.ndarray:
     return rows.reshape(-1, rows.shape[2])
 
 
-def _past_held(contact: ContactLike, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _past_held(contact: Contact, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``D``, and what of it the reactions without those along held directions pull by: friction there goes with the normal one."""
     if contact.dragged is None:
         return axes, axes

@@ -11,10 +11,11 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import block_diag
 
-from dolfinx_contact.surfaces.surface import driven_surfaces
+from dolfinx_contact.step.load_step import driven_surfaces
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
 STEPS, LEFT = 50, 1e-6
@@ -42,8 +43,8 @@ class Border:
 
     def __init__(
         self,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         A: PETSc.Mat,
         stiffened: Any,
         springs: Any,
@@ -82,7 +83,7 @@ class _Preconditioner:
         y.array_w[:] = self._stiffened.apply(x.array_r)
 
 
-def _solved(body: BodyLike, A: PETSc.Mat, stiffened: Any, C: np.ndarray) -> np.ndarray:
+def _solved(body: ElasticBody, A: PETSc.Mat, stiffened: Any, C: np.ndarray) -> np.ndarray:
     """A^-1 C, ``shape=(owned dofs, m)``, by conjugate gradients with a preconditioner."""
     ksp = PETSc.KSP().create(body.comm)
     ksp.setOperators(A)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
+from dolfinx_contact.law.maps import BipotentialMap, NodalMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
@@ -17,8 +17,10 @@ from dolfinx_contact.support.anderson import Anderson
 from dolfinx_contact.support.checks import positive
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike, StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
@@ -95,7 +97,7 @@ class FixedPoint:
         return BoundFixedPoint(self, body, contacts, stiffness)
 
 
-def _slides(step: StepLike, x: np.ndarray, tried: bool = False) -> bool:
+def _slides(step: LoadStep, x: np.ndarray, tried: bool = False) -> bool:
     """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
     if step.surfaces is None and not (tried and step.statics is not None):
         return False
@@ -109,8 +111,8 @@ class BoundFixedPoint:
     def __init__(
         self,
         options: FixedPoint,
-        body: BodyLike,
-        contacts: Sequence[ContactLike],
+        body: ElasticBody,
+        contacts: Sequence[Contact],
         stiffness: Sequence[NodalStiffness],
     ):
         self._options, self._body, self._contacts = options, body, contacts
@@ -135,7 +137,7 @@ class BoundFixedPoint:
         self._stiffness = stiffness
         return self.preconditioner is not None and not self.preconditioner.followed
 
-    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 
         Args:
@@ -219,7 +221,7 @@ class BoundFixedPoint:
     def _accelerate(
         self,
         search: Search,
-        maps: Sequence[MapLike],
+        maps: Sequence[NodalMap],
         x: np.ndarray,
         every: int,
         near: float,

@@ -17,7 +17,9 @@ from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patc
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.law.maps import NodalMap
 
 
 class ContactPreconditioner:
@@ -35,7 +37,7 @@ class ContactPreconditioner:
         followed: Whether motions of surfaces or anchors follow the body.
     """
 
-    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike], maps: Sequence[MapLike]):
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], maps: Sequence[NodalMap]):
         self._body, self._contacts, self._maps = body, contacts, maps
         self._spring_rates = self._rates()
         self._layer, self.linearised = None, False

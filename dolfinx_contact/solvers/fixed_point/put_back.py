@@ -11,10 +11,10 @@ import numpy as np
 from dolfinx_contact.step.errors import contact_defects
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 
-def wrong(step: StepLike, x: np.ndarray) -> list[np.ndarray]:
+def wrong(step: LoadStep, x: np.ndarray) -> list[np.ndarray]:
     """Forces by which the nodes of each contact miss the law at a displacement, ``shape=(n,)``.  Collective."""
     step.measure(x)
     found = []
@@ -24,7 +24,7 @@ def wrong(step: StepLike, x: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def put_back(step: StepLike, x: np.ndarray, part: float) -> np.ndarray:
+def put_back(step: LoadStep, x: np.ndarray, part: float) -> np.ndarray:
     """A displacement whose nodes that miss the law by more than a part of the most do not slip.  Collective."""
     amounts, found, fixed = wrong(step, x), x.copy(), step.body.fixed
     largest = step.body.largest(np.concatenate([np.zeros(0), *amounts]))

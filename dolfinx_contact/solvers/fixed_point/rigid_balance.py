@@ -14,7 +14,10 @@ from dolfinx_contact.support.line_search import halves
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, MapLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.law.maps import NodalMap
+    from dolfinx_contact.step.load_step import LoadStep
 
 # A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
 # (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
@@ -54,7 +57,7 @@ class RigidBalance:
     """
 
     def __init__(
-        self, body: BodyLike, contacts: Sequence[ContactLike], A: PETSc.Mat, modes: np.ndarray
+        self, body: ElasticBody, contacts: Sequence[Contact], A: PETSc.Mat, modes: np.ndarray
     ):
         self._body, self._contacts = body, contacts
         forces = np.array([body.multiply(z) for z in modes.T]).T
@@ -80,7 +83,7 @@ class RigidBalance:
         return len(self._energy)
 
     def balanced(
-        self, x: np.ndarray, step: StepLike, maps: Sequence[MapLike]
+        self, x: np.ndarray, step: LoadStep, maps: Sequence[NodalMap]
     ) -> tuple[np.ndarray, np.ndarray]:
         """``x``, moved along the soft motions, or as it was if there is no way down; and the step's ``forces`` there.
 
@@ -116,8 +119,8 @@ class RigidBalance:
         start: tuple[np.ndarray, np.ndarray],
         left: np.ndarray,
         slope: np.ndarray,
-        step: StepLike,
-        maps: Sequence[MapLike],
+        step: LoadStep,
+        maps: Sequence[NodalMap],
     ) -> tuple:
         """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
 
@@ -154,7 +157,7 @@ class RigidBalance:
         )
 
     def left(
-        self, x: np.ndarray, forces: np.ndarray, step: StepLike, maps: Sequence[MapLike]
+        self, x: np.ndarray, forces: np.ndarray, step: LoadStep, maps: Sequence[NodalMap]
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
 
@@ -181,7 +184,7 @@ class RigidBalance:
         return sums[:n], self._energy + sums[n:-1].reshape(n, n), np.sqrt(sums[-1])
 
 
-def patch_motions(body: BodyLike, contacts: Sequence[ContactLike]) -> np.ndarray:
+def patch_motions(body: ElasticBody, contacts: Sequence[Contact]) -> np.ndarray:
     """What the body gives way to forces and moments on each of its contacts, ``shape=(owned dofs, m)``.
 
     The bending of a slender body is among them.  One solve with the stiffness for each.  Collective.

@@ -13,10 +13,11 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 from dolfinx_contact.solvers.newton.contact_tangent import change_of
-from dolfinx_contact.surfaces.surface import driven_surfaces
+from dolfinx_contact.step.load_step import driven_surfaces
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
@@ -38,7 +39,7 @@ class SurfaceLayer:
         dofs: Owned free degrees of freedom of the layers.
     """
 
-    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike], prefix: str):
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], prefix: str):
         self._body, self._contacts, self._prefix = body, contacts, prefix
         self.dofs = _near(body, contacts)
         first, last = body.K.getOwnershipRange()
@@ -111,7 +112,7 @@ class SurfaceLayer:
         return product
 
 
-def _near(body: BodyLike, contacts: Sequence[ContactLike]) -> np.ndarray:
+def _near(body: ElasticBody, contacts: Sequence[Contact]) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
     of = body.displacements
     gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)

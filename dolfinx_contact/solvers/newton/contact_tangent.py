@@ -15,7 +15,9 @@ from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import BodyLike, ContactLike, StepLike
+    from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 class ContactTangent:
@@ -29,7 +31,7 @@ class ContactTangent:
         contacts: Its contacts.
     """
 
-    def __init__(self, body: BodyLike, contacts: Sequence[ContactLike]):
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
         self._body, self._points = body, [contact.points for contact in contacts]
         self._A = self._solver = None
         self._free = np.ones(body.size)
@@ -139,7 +141,7 @@ def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> P
     return change
 
 
-def next_change(step: StepLike, x: np.ndarray) -> float:
+def next_change(step: LoadStep, x: np.ndarray) -> float:
     """How much Newton's next step would still change the sums of reactions at nodes, over the forces that act.  Collective.
 
     Args:
@@ -165,7 +167,7 @@ def next_change(step: StepLike, x: np.ndarray) -> float:
 class OnTangent:
     """A solver on the tangent of one body, bound; keeps its ordering."""
 
-    def __init__(self, options: Any, body: BodyLike, contacts: Sequence[ContactLike]):
+    def __init__(self, options: Any, body: ElasticBody, contacts: Sequence[Contact]):
         if any(contact.surface.motions for contact in contacts):
             raise ValueError(
                 f"{type(options).__name__}() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "

@@ -13,13 +13,14 @@ import numpy as np
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.fixed_point.fixed_point import FixedPoint
-from dolfinx_contact.step.load_step import Judged
+from dolfinx_contact.step.load_step import Judged, LoadStep
 from dolfinx_contact.step.nonlinear import LinearisedStep
 from dolfinx_contact.support.line_search import halves
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.nonlinear import NonlinearBody
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.protocols import ContactLike, NonlinearBodyLike, StepLike
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
 # largest of the last BEFORE ones.
@@ -52,8 +53,8 @@ class BoundLinearised:
     def __init__(
         self,
         solver: Solver,
-        body: NonlinearBodyLike,
-        contacts: Sequence[ContactLike],
+        body: NonlinearBody,
+        contacts: Sequence[Contact],
         memory: dict[str, Any],
     ):
         self._solver, self._body, self._contacts, self._memory = solver, body, contacts, memory
@@ -65,7 +66,7 @@ class BoundLinearised:
         """See ``BoundSolver``."""
         return True
 
-    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
         """Linearise until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
@@ -98,7 +99,7 @@ class BoundLinearised:
         return SolverResult(best, iterations, forward, solver, reason=said)
 
     def _linear_step(
-        self, step: StepLike, x: np.ndarray, forces: np.ndarray, error: float
+        self, step: LoadStep, x: np.ndarray, forces: np.ndarray, error: float
     ) -> SolverResult:
         """The contact step of the body linearised at ``x``, whose forces ``-F(x)`` and error are known."""
         body = self._body
@@ -127,7 +128,7 @@ class BoundLinearised:
         except ValueError:
             return FixedPoint().bind(*arguments)
 
-    def _part(self, step: StepLike, x: np.ndarray, to: np.ndarray, most: float) -> Judged | None:
+    def _part(self, step: LoadStep, x: np.ndarray, to: np.ndarray, most: float) -> Judged | None:
         """The iterate at a part of the way, judged; None if no part helps."""
         for length in halves(SHORTEST):
             judged = step.judged(to if length == 1.0 else x + length * (to - x))

@@ -21,7 +21,7 @@ from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
 from dolfinx_contact.solvers.search import Search
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 DEFAULT = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
 MOST = 10_000  # iterations, far more than snes_max_it
@@ -65,7 +65,7 @@ class SNES:
 class BoundSNES(OnTangent):
     """SNES for one body."""
 
-    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
         """Let SNES iterate until the errors are at most the tolerance, or it gives up.
 
         Args:
@@ -91,7 +91,7 @@ class BoundSNES(OnTangent):
         )
 
     def _supports_moved(
-        self, step: StepLike, x: np.ndarray, maps: Sequence[ReturnMap], search: Search, stands: bool
+        self, step: LoadStep, x: np.ndarray, maps: Sequence[ReturnMap], search: Search, stands: bool
     ) -> np.ndarray:
         """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""
         descent, forces, length = Descent(step, self._tangent, stands), step.forces(x), 1.0
@@ -138,7 +138,7 @@ class _Equations:
     """
 
     def __init__(
-        self, step: StepLike, tangent: ContactTangent, maps: Sequence[ReturnMap], search: Search
+        self, step: LoadStep, tangent: ContactTangent, maps: Sequence[ReturnMap], search: Search
     ):
         self.search, self.failure = search, None
         self._step, self._tangent, self._maps = step, tangent, maps

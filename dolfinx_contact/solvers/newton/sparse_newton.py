@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.law.maps import ReturnMap
+from dolfinx_contact.law.maps import NodalLaw, ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
@@ -22,7 +22,7 @@ from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.line_search import enough, halves
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.protocols import LawLike, StepLike
+    from dolfinx_contact.step.load_step import LoadStep
 
 NAME = "SparseNewton"
 
@@ -71,7 +71,7 @@ class SparseNewton:
 class BoundSparseNewton(OnTangent):
     """The method for one body."""
 
-    def solve(self, step: StepLike, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
@@ -123,7 +123,7 @@ class Descent:
     residual, and a step of length t leaves ``1 - t`` of it.
     """
 
-    def __init__(self, step: StepLike, tangent: ContactTangent, stands: bool):
+    def __init__(self, step: LoadStep, tangent: ContactTangent, stands: bool):
         self._step, self._body, self._tangent = step, step.body, tangent
         self._stands = stands  # the body's tangent is good enough
 
@@ -195,5 +195,5 @@ class _Closing(NamedTuple):
     map: ReturnMap
     depth: float  # length
 
-    def linearised(self, law: LawLike, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
+    def linearised(self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return self.map.linearised(law, reaction, gap - self.depth, slip)
