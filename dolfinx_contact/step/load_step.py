@@ -220,7 +220,7 @@ class LoadStep:
         self._before = None
         return best
 
-    def _imbalance(self, x: np.ndarray, maps: Sequence[MapLike]) -> float:
+    def _imbalance(self, x: np.ndarray, maps: Sequence[NodalMap]) -> float:
         """The error of equilibrium alone.  Collective."""
         left = self.out_of_balance(x, maps)
         return self._as_errors(x, self._balance(left, x, self.body.support_forces(x))).error
