@@ -56,26 +56,22 @@ from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.trial import floating, unmoved, without_reactions
 from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
 from dolfinx_contact.step.unseen import Unseen
-from dolfinx_contact.support.attributes import Guarded, surfaces_of
+from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together, uninterrupted
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
-    from dolfinx_contact.step.geometry import Ends
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
-
-# How often friction is made to follow the pressure, and the largest factor by which its changes are taken to fall.
-MOST, SLOWEST = 50, 0.9
 
 # How many times as far as supports move bodies may be expected to move in a step; and the part of that within which they are expected
 # to go on as in the step before.
 FARTHER, STEADY = 2.0, 0.05
 
-# Tolerance of a solution on the way: at most ROUGH, and this part of the last change of the reactions.
-ROUGH, PART = 1e-3, 0.03
+# Tolerance of a solution on the way to the geometry of the end, over that of the geometry.
+PART = 0.03
 
 
 class ContactProblem(Guarded):
@@ -321,10 +317,8 @@ class ContactProblem(Guarded):
     def _step(self, start: float) -> tuple[Step, SolverResult]:
         """Record and displacement of a step that has converged, shown and given to internal variables."""
         self._check_input()
-        step, found = self._search()
-        missed, said = 0.0, ""
-        if any(contact.changes for contact in self.contacts) or self._may_land():
-            step, found, missed, said = self._at_its_end(step, found)
+        step, found, changes, said = self._staggered()
+        missed = changes.get("EndGeometry", 0.0)  # over the reactions
         step.rest()
         done = record(self.body, self.contacts, step.errors, found, perf_counter() - start, missed)
         if said or not converged(step.errors, done, self.tol):
@@ -342,7 +336,7 @@ class ContactProblem(Guarded):
         for contact in self.contacts:
             contact.renew_gaps(found.x)
         if self.body.comm.allreduce(any(c.opens.any() for c in self.contacts), op=MPI.LOR):
-            from dolfinx_contact.step.touching import opening
+            from dolfinx_contact.lagged.landing import opening
 
             opening(self.body, self.contacts, step, self.geometry_tol)
         self.body.put(found.x)
@@ -450,132 +444,57 @@ class ContactProblem(Guarded):
             self._bound_to = self.solver
         return self._bound
 
-    def _search(self) -> tuple[LoadStep, SolverResult]:
-        """The step that has judged what the solver takes for the solution, and that; once more with planes that held nodes let slide."""
-        step, found = self._worn(self._roughly(self.load_step()))
-        if step.holding is not None and step.errors.within(step.tol) and step.holding.slide():
-            for contact in self.contacts:
-                contact.restore()
-            step = self.load_step(step.holding)
-            if step.holding.beyond:
-                return step, unmoved(self.body, step, self._states.last)
-            step, found = self._worn(step)
-        return step, found
+    def _staggered(self) -> tuple[LoadStep, SolverResult, dict, str]:
+        """The step solved with all that it takes for known, which is that of the state found: see ``Staggered``.  Collective."""
+        step = self.load_step()
+        goal, levels = step.tol, self._levels(step)
+        if self._digits_later():
+            step = step.within(max(goal, PART * self.geometry_tol))
+        if not levels:
+            return *self._found(step), {}, ""
+        from dolfinx_contact.step.staggered import solve_staggered
 
-    def _at_its_end(
-        self, step: LoadStep, found: SolverResult
-    ) -> tuple[LoadStep, SolverResult, float, str]:
-        """The step repeated with the geometry of its end and slip from touching on, what is missed, and why it is refused.  Collective."""
-        from dolfinx_contact.step.geometry import Ends, undivided
-        from dolfinx_contact.step.touching import landing
+        known = None
 
-        said, missed, known = "", 0.0, self._keep_one_start(None)
-        ends, repeated = Ends(self.body, self.contacts), 0
-        while step.errors.within(step.tol):
-            missed, said = self._geometry(step, found, repeated)
-            if said:
-                break
-            late = landing(self.body, self.contacts, step, found.x, self.geometry_tol)
-            settled = max(missed, late) <= self.geometry_tol
-            if settled and step.tol <= self.tol:
-                break
-            if settled:  # with all digits
-                step, again = self._worn(step.finer(self.tol, found.x))
-            elif repeated == ends.most:
-                said = undivided(max(missed, late), self.geometry_tol, repeated)
-                break
-            else:
-                step, again = self._repeated(step, ends, found.x)
-                repeated += 1
+        def search(step: LoadStep) -> tuple[LoadStep, SolverResult]:
+            nonlocal known
+            step, found = self._found(step)
             known = self._keep_one_start(known)
-            found = again._replace(iterations=found.iterations + again.iterations)
-        return step, found, missed, said
+            return step, found
 
-    def _roughly(self, step: LoadStep) -> LoadStep:
-        """The step to as many digits as its geometry needs, where all digits would take cycles of multigrid."""
+        return solve_staggered(step, levels, search, goal)
+
+    def _levels(self, step: LoadStep) -> list:
+        """What the step takes for known, level by level, the fastest first; imported where there is any.  Collective."""
+        body, contacts, levels = self.body, self.contacts, []
+        if any(contact.follows_pressure for contact in contacts):
+            from dolfinx_contact.lagged.pressure import PressureFriction
+
+            levels.append([PressureFriction(self._renew_laws)])
+        if any(contact.wears_within for contact in contacts):
+            from dolfinx_contact.lagged.wear import WearOfStep
+
+            levels.append([WearOfStep(body, step, self.geometry_tol)])
+        if step.holding is not None:
+            from dolfinx_contact.lagged.held import HeldPlanes
+
+            levels.append([HeldPlanes(contacts, self._step_again)])
+        if any(contact.changes for contact in contacts) or self._may_land():
+            from dolfinx_contact.lagged.end_geometry import EndGeometry
+            from dolfinx_contact.lagged.landing import SlipBeforeLanding
+
+            end = EndGeometry(body, contacts, self.geometry_tol, self._step_again)
+            levels.append([end, SlipBeforeLanding(body, contacts, self.geometry_tol)])
+        return levels
+
+    def _step_again(self, step: LoadStep, at: np.ndarray | None = None) -> LoadStep:
+        """The step anew, with planes held as they are, and frames of a displacement.  Collective."""
+        return self.load_step(step.holding, at)
+
+    def _digits_later(self) -> bool:
+        """Whether the step is solved to as many digits as its geometry needs first: all digits take cycles of multigrid."""
         renewed = any(c.surface.deformable and c.changes for c in self.contacts)
-        rough = renewed and not (self.body.exact or self.body.nonlinear)
-        return step.within(max(self.tol, PART * self.geometry_tol)) if rough else step
-
-    def _geometry(self, step: LoadStep, found: SolverResult, repeated: int) -> tuple[float, str]:
-        """The error of the geometry, and whether the way of the step is too long, in words.  Collective."""
-        from dolfinx_contact.step.geometry import geometry_error, too_long
-
-        both = [two for two in zip(self.contacts, step.stiffness) if two[0].changes]
-        if not both:
-            return 0.0, ""
-        contacts, stiffness = map(list, zip(*both))
-        said = "" if repeated else too_long(self.body, contacts, found.x)
-        acting = step.carried(self.geometry_tol)
-        return geometry_error(self.body, contacts, stiffness, found.x, acting), said
-
-    def _repeated(self, step: LoadStep, ends: Ends, x: np.ndarray) -> tuple[LoadStep, SolverResult]:
-        """The step with the geometry of its end, after it has ended at a displacement.  Collective."""
-        for surface in surfaces_of(self.contacts):
-            surface.end_step()
-        placed = [contact.placement.now for contact in self.contacts]
-        for contact in self.contacts:
-            contact.restore()
-        step = self._roughly(self.load_step(step.holding, ends.after(x)))
-        for contact, before in zip(self.contacts, placed):
-            contact.placement.count_as(before)
-        return self._worn(step)
-
-    def _worn(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
-        """What is found with the depths that the step itself wears.  Collective."""
-        worn = [both for both in zip(self.contacts, step.stiffness) if both[0].wears_within]
-        if not worn:
-            return self._with_friction(step)
-        from dolfinx_contact.step import wearing
-
-        contacts, stiffness = map(list, zip(*worn))
-        depths = wearing.Wearing(self.body, contacts, stiffness, self.geometry_tol)
-        rounds, iterations, known = 0, 0, None
-        while True:
-            step, found = self._with_friction(step)
-            known = self._keep_one_start(known)
-            rounds, iterations = rounds + 1, iterations + found.iterations
-            if not step.errors.within(step.tol) or depths.settled(step.carried(self.geometry_tol)):
-                break
-            if rounds == wearing.MOST:
-                found = found._replace(forward_error=np.inf)
-                break
-            step = step.with_laws_of(found.x)
-        if rounds > 1:
-            said = f"{rounds} times with the depth that the step wears"
-            reason = f"{found.reason}; {said}" if found.reason else said
-            found = found._replace(iterations=iterations, reason=reason)
-        return step, found
-
-    def _with_friction(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
-        """What is found with friction that belongs to the state found.  Collective.
-
-        A fixed point: the step is solved, laws that follow the pressure become those of the pressures found, and the errors are
-        measured with these.  They are what the step is judged by; while they are too large the step is solved again.
-        """
-        if not any(contact.follows_pressure for contact in self.contacts):
-            return self._found(step)
-        goal, tol, last, known = step.tol, max(step.tol, ROUGH), np.inf, None
-        rounds = iterations = 0
-        while rounds < MOST:
-            step, found = self._found(step.within(tol))
-            known = self._keep_one_start(known)
-            rounds, iterations = rounds + 1, iterations + found.iterations
-            if not step.errors.within(tol):
-                break  # no state with these laws
-            self._renew_laws()
-            step = step.with_laws_of(found.x)
-            change = step.measure(found.x).change
-            rate = min(change / last, SLOWEST) if 0.0 < last < np.inf else 0.5
-            forward = max(found.forward_error, change * rate / (1 - rate))
-            found = found._replace(forward_error=forward)
-            settled = forward <= goal and step.errors.within(goal)
-            if settled or step.errors.within(0.0):
-                break
-            last, tol = change, max(goal, min(ROUGH, PART * change))
-        said = f"{rounds} times with friction that follows the pressure"
-        reason = f"{found.reason}; {said}" if found.reason else said
-        return step.within(goal), found._replace(iterations=iterations, reason=reason)
+        return renewed and not (self.body.exact or self.body.nonlinear)
 
     def _keep_one_start(self, before: Any):
         """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""
@@ -586,6 +505,8 @@ class ContactProblem(Guarded):
 
     def _found(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
         """What is found with the laws as they are, whatever holds the body.  Collective."""
+        if step.holding is not None and step.holding.beyond:
+            return step, unmoved(self.body, step, self._states.last)
         if step.surfaces is not None:
             step.surfaces.check()
             if step.surfaces.beyond(given=True):

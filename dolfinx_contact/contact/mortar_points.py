@@ -49,7 +49,7 @@ class MortarPlacement(Placement):
     """Frames, gaps and motions of the slave nodes of a contact relative to the opposite mesh.
 
     In a step they are linear in the displacement, with the coefficients of one state: the undeformed one if sliding is small;
-    else the last one for which ``geometry_error`` was too large, see ``step/geometry.py``.
+    else the last one for which ``geometry_error`` was too large, see ``lagged/end_geometry.py``.
     """
 
     def __init__(self, contact: Contact, facets: np.ndarray, owned: tuple, extent: float):

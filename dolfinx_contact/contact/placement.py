@@ -6,7 +6,7 @@ A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose mater
 in components of its frame ``F``.  On planes gaps are linear in this motion.  On other surfaces frame and gap are taken
 for the surface as it stands in the step and a position of the node, and in the step the surface is its tangent plane
 there.  That position is where the last step has left the node, and then, while it matters, where this one takes it, see
-``step/geometry.py``.
+``lagged/end_geometry.py``.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from way_scenes import COMM, ring, slab
 
 import dolfinx_contact as dc
 from dolfinx_contact.contact.placement import _round
-from dolfinx_contact.step.geometry import REPEATED
+from dolfinx_contact.lagged.end_geometry import REPEATED
 
 pytestmark = pytest.mark.ranks
 TOL = 1e-3  # the default geometry_tol
@@ -372,7 +372,7 @@ def test_what_stays_different_is_refused():
 @pytest.mark.parametrize("driven", [False, True])
 def test_flat_planes_have_no_geometry_error(driven, monkeypatch):
     """Exactly zero, and nothing is looked at."""
-    monkeypatch.delattr(dc.ContactProblem, "_at_its_end")
+    monkeypatch.delattr("dolfinx_contact.lagged.end_geometry.EndGeometry")
     plane = dc.RigidPlane((0, 0), (0, 1))
     scene = slab([-0.5, 0], [0.5, 0.5], [4, 2], plane, 0.3)
     if driven:

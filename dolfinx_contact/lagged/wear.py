@@ -22,18 +22,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.step.staggered import Change, Lagged
 from dolfinx_contact.support.anderson import Anderson
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.interface import NodalStiffness
+    from dolfinx_contact.solvers.base import SolverResult
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Stiffness with which depths follow, over the node's own.
 STIFF = 2.0
 
-# Differences that Anderson's method keeps, and how often depths are mixed at most.
-KEPT, MOST = 20, 200
+# Differences that Anderson's method keeps.
+MIXED_DEPTHS = 20
 
 # What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open, close and stick, and twice
 # as many rounds do without.
@@ -50,35 +52,53 @@ JUMP = 0.4
 PART = 0.1
 
 
-class Wearing:
+class WearOfStep(Lagged):
     """Depths that a step wears at the nodes of its contacts; begins with the slip of the last step under its pressure.
 
     Args:
         body: The body.
-        contacts: Those that wear within the step.
-        stiffness: ``NodalStiffness`` of each.
-        tol: By how much forces may differ for depths that are off, over the reactions.
+        step: The step.
+        tol: By how much forces may differ for depths that are off, over the reactions: a part of the geometry's.
     """
 
-    def __init__(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        tol: float,
-    ):
-        self._body, self._contacts, self._tol = body, contacts, PART * tol
-        self._kappa = STIFF * _shares(contacts) * np.concatenate([of.normal for of in stiffness])
-        self._anderson = Anderson(self._kappa.size, KEPT, body.total)
+    limit = 200
+
+    def __init__(self, body: ElasticBody, step: LoadStep, tol: float):
+        self._body, self._tol, self._geometry_tol = body, PART * tol, tol
+        self._contacts = [contact for contact in step.contacts if contact.wears_within]
+        self._share = STIFF * _shares(self._contacts)
+        self._anderson = Anderson(self._share.size, MIXED_DEPTHS, body.total)
         self._best, self._stale = np.inf, 0
-        self._take(self._worn("last", [contact.last.reaction[:, -1] for contact in contacts])[0])
+        self._take_stiffness(step)
+        forces = [contact.last.reaction[:, -1] for contact in self._contacts]
+        self._take(self._worn("last", forces)[0])
 
-    def settled(self, scale: float) -> bool:
-        """Whether the depths are those that the present state wears; if not, takes others to solve the step with.  Collective.
+    def _take_stiffness(self, step: LoadStep) -> None:
+        """With which nodes resist to depths: between bodies it follows the rows."""
+        both = zip(step.contacts, step.stiffness)
+        normal = [stiffness.normal for contact, stiffness in both if contact.wears_within]
+        self._kappa = self._share * np.concatenate(normal)
 
-        Args:
-            scale: Reactions, see ``LoadStep.carried``.
-        """
+    def restart(self) -> None:
+        self._anderson.restart()
+        self._best, self._stale = np.inf, 0
+        self._take(self._depth)
+
+    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
+        """Whether the depths are those that the state found wears; if not, takes others to solve the step with.  Collective."""
+        self._take_stiffness(step)
+        return Change(self._settled(step.carried(self._geometry_tol)), step)
+
+    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
+        return step.with_laws_of(found.x)
+
+    def not_settled(self, change: Change) -> str:
+        return f"the depth that the step wears still changes after {self.limit} solutions"
+
+    def said(self, solutions: int) -> str:
+        return f"{solutions} times with the depth that the step wears" if solutions > 1 else ""
+
+    def _settled(self, scale: float) -> bool:
         kappa, depth = self._kappa, self._depth
         forces = [contact.reaction[:, -1] for contact in self._contacts]
         gap = np.concatenate([contact.present.gap for contact in self._contacts])

@@ -15,13 +15,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.step.staggered import Change, Lagged
+
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep
 
 
-def landing(
+class SlipBeforeLanding(Lagged):
+    """Slip of nodes that land, which counts from where they touch; renewed together with the geometry."""
+
+    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], tol: float):
+        self._body, self._contacts, self._tol = body, contacts, tol
+
+    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
+        late = _landing(self._body, self._contacts, step, found.x, self._tol)
+        return Change(late <= self._tol, step, late)
+
+    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
+        return step
+
+
+def _landing(
     body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, x: np.ndarray, tol: float
 ) -> float:
     """Let slip of nodes that land count from where they touch, where that matters; how much it does.  Collective.

@@ -10,13 +10,14 @@ bodies that those of the end would make.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.placement import LONGEST
+from dolfinx_contact.step.staggered import Change, Lagged
 from dolfinx_contact.support.anderson import Anderson
 from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.placement import Placement
     from dolfinx_contact.contact.state import State
+    from dolfinx_contact.solvers.base import SolverResult
+    from dolfinx_contact.step.load_step import LoadStep
     from dolfinx_contact.surfaces.surface import Surface
 
 # How often a step is repeated with the geometry of its end.
@@ -38,6 +41,53 @@ RENEWED, MIXED = 24, 5
 
 # Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
 TURNED, PLACES = 0.5, 32
+
+
+class EndGeometry(Lagged):
+    """Frames, gaps and ways: those of the displacement at which the step has ended.
+
+    Args:
+        body: The body.
+        contacts: All contacts.
+        tol: Largest error of the geometry.
+        step_at: The step with frames of a displacement, from the step before.
+    """
+
+    def __init__(
+        self,
+        body: ElasticBody,
+        contacts: Sequence[Contact],
+        tol: float,
+        step_at: Callable[[LoadStep, np.ndarray], LoadStep],
+    ):
+        self._body, self._contacts, self._tol, self._step_at = body, contacts, tol, step_at
+        self._ends, self._repeated = Ends(body, contacts), 0
+        self.limit = self._ends.most
+
+    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
+        both = [two for two in zip(self._contacts, step.stiffness) if two[0].changes]
+        if not both:
+            return Change(True, step)
+        contacts, stiffness = map(list, zip(*both))
+        refused = "" if self._repeated else too_long(self._body, contacts, found.x)
+        acting = step.carried(self._tol)
+        missed = geometry_error(self._body, contacts, stiffness, found.x, acting)
+        return Change(missed <= self._tol, step, missed, refused=refused)
+
+    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
+        self._repeated += 1
+        for surface in surfaces_of(self._contacts):
+            surface.end_step()
+        placed = [contact.placement.now for contact in self._contacts]
+        for contact in self._contacts:
+            contact.restore()
+        step = self._step_at(step, self._ends.after(found.x))
+        for contact, before in zip(self._contacts, placed):
+            contact.placement.count_as(before)
+        return step
+
+    def not_settled(self, change: Change) -> str:
+        return undivided(change.size, self._tol, self._repeated)
 
 
 class Ends:
