@@ -57,10 +57,8 @@ test-wheel-ranks: .venv-wheel/ready
 test-all:
 	tools/test-all
 
-format: .venv/ready
-	clang-format -i $$(git ls-files 'cpp/*.h' 'cpp/*.cpp')
-	.venv/bin/ruff format .
-	.venv/bin/ruff check --fix .
+format:
+	tools/lint || tools/lint # the second time nothing is left to format
 
 stubs: .venv/ready
 	tools/stubs

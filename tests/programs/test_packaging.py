@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,7 +17,8 @@ from mpi4py import MPI
 
 from dolfinx_contact import _kernel
 
-PROBE = Path(__file__).parents[2] / "tools" / "probe.py"
+ROOT = Path(__file__).parents[2]
+PROBE = ROOT / "tools" / "probe.py"
 
 pytestmark = pytest.mark.skipif(
     MPI.COMM_WORLD.size > 1, reason="starts interpreters, which MPI forbids to several ranks"
@@ -34,6 +36,32 @@ def run(*arguments, cwd=None, **environment):
     return subprocess.run(
         [sys.executable, *arguments], cwd=cwd, env=clean_environment() | environment, capture_output=True, text=True
     )  # fmt: skip
+
+
+def test_the_version_has_one_source():
+    """Package, conda recipe and changelog have the version of pyproject.toml, and no other file states one."""
+    (version,) = re.findall(
+        r'^version = "(.+?)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE
+    )
+    assert dolfinx_contact.__version__ == version
+    assert f'version: "{version}"' in (ROOT / "recipe.yaml").read_text()
+    assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
+    others = ("CITATION.cff", "CMakeLists.txt", "docs/conf.py", "dolfinx_contact/__init__.py")
+    assert not [name for name in others if version in (ROOT / name).read_text()]
+
+
+def test_checks_are_pinned_once():
+    """What formats and checks has its version in .pre-commit-config.yaml alone; CI and `make format` run these hooks."""
+    pinned = re.findall(r"([\w-]+)==", (ROOT / ".pre-commit-config.yaml").read_text())
+    assert len(pinned) == len(set(pinned)) and {"ruff", "clang-format"} <= set(pinned)
+    files = [*(ROOT / "tools").iterdir(), *(ROOT / ".github").rglob("*.yml")]
+    files += [ROOT / name for name in ("pyproject.toml", "Makefile", ".ci/run", "recipe.yaml")]
+    texts = {file: file.read_text() for file in files if file.is_file()}
+    assert not [
+        file for file, text in texts.items() for name in pinned if re.search(rf"{name}==\d", text)
+    ]
+    for name in (".ci/run", "Makefile"):
+        assert re.search(r"^\s*tools/lint\b", texts[ROOT / name], re.MULTILINE), name
 
 
 def test_import_needs_no_extras():

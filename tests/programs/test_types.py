@@ -17,17 +17,8 @@ pytestmark = [
     pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts programs of its own"),
 ]
 SCRIPT = Path(__file__).parents[1] / "support" / "user_script.py"
+CONFIG = Path(__file__).parents[2] / "pyproject.toml"
 
-# What DOLFINx and others lack is theirs; an editable install is found by its path, as source that is not checked.
-CONFIG = """[mypy]
-strict = true
-[mypy-dolfinx.*,ufl.*,petsc4py.*,mpi4py.*,scipy.*]
-ignore_missing_imports = true
-follow_imports = skip
-[mypy-dolfinx_contact.*]
-follow_imports = silent
-follow_imports_for_stubs = true
-"""
 MISTAKES = {
     "dc.Fricton(0.3)": "attr-defined",
     "dc.Friction('0.3', k='associated')": "arg-type",
@@ -69,11 +60,17 @@ def laws(plane: _kernel.Law2D, solid: _kernel.Law3D, held: SupportedLaw) -> list
 
 
 def checked(folder, text):
-    """What ``mypy --strict`` says of a script, a list of lines."""
-    (folder / "mypy.ini").write_text(CONFIG)
+    """What mypy says of a script by the settings of pyproject.toml, which are strict; a list of lines."""
     (folder / "script.py").write_text(text)
     result = subprocess.run(
-        [sys.executable, "-m", "mypy", "--no-error-summary", "script.py"],
+        [
+            sys.executable,
+            "-m",
+            "mypy",
+            f"--config-file={CONFIG}",
+            "--no-error-summary",
+            "script.py",
+        ],
         cwd=folder,
         env={"MYPYPATH": str(Path(dc.__file__).parents[1]), "PATH": "/usr/bin:/bin"},
         capture_output=True,
