@@ -1,4 +1,4 @@
-"""Today's DOLFINx names on yesterday's releases, 0.5 to 0.11.
+"""Today's DOLFINx names on yesterday's releases: ``docs/index.md`` lists those that are supported.
 
 The only file of this project that knows which release is installed.  Package, demos and tests
 import from here what moved between releases, and read as present-day DOLFINx everywhere else.

@@ -64,6 +64,23 @@ def test_checks_are_pinned_once():
         assert re.search(r"^\s*tools/lint\b", texts[ROOT / name], re.MULTILINE), name
 
 
+def test_workflows_run_scripts_of_ours():
+    """Jobs run make and scripts of tools/ and .ci, which run without the service, too; else they only install git."""
+    commands = [
+        line
+        for file in (ROOT / ".github" / "workflows").glob("*.yml")
+        for line in re.findall(r"^ +- run: (.+)$", file.read_text(), re.MULTILINE)
+    ]
+    ours = [line for line in commands if not re.match("apt-get|git config", line)]
+    assert len(ours) >= 4
+    for line in ours:
+        program, *words = line.split()
+        if program == "make":
+            assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), line
+        else:
+            assert (ROOT / (words[0] if program == "bash" else program)).is_file(), line
+
+
 def test_import_needs_no_extras():
     """No public name imports any of the packages that only demos and tests need."""
     extras = ["gmsh", "matplotlib", "tqdm", "pytest", "hypothesis", "mpmath"]
