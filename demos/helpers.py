@@ -27,12 +27,12 @@ def picture(draw, *data) -> None:
         return
     from matplotlib import pyplot
 
-    figure = pyplot.figure(figsize=(9, 4.5), layout="constrained")
+    figure = pyplot.figure(figsize=(6, 3.2), layout="constrained")
     draw(figure, *data)
     if inside:
         pyplot.show()
     else:
-        figure.savefig(sys.argv[1], dpi=110)
+        figure.savefig(sys.argv[1], dpi=165)
 
 
 def everywhere(*arrays) -> list[np.ndarray]:

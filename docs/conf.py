@@ -4,12 +4,15 @@ Its source directory is the root of the clone, so that links on its pages lead t
 """
 
 from importlib.metadata import version as installed
+from pathlib import Path
+from urllib.request import urlopen
 
 project = "dolfinx_contact"
 copyright = "the dolfinx_contact authors, MIT licence"
 version = release = installed("dolfinx_contact")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.intersphinx"]
+extensions += ["sphinx_copybutton", "sphinx_codeautolink"]
 extensions += [
     f"docs.extension.{name}"
     for name in ("runs", "gallery", "docstrings", "headers", "formulas", "links", "together")
@@ -22,7 +25,35 @@ exclude_patterns = [".*", "build", "results", "cpp", "tests", "demos", "studies"
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block"]
 myst_heading_anchors = 3
 nitpicky = False
-suppress_warnings = ["myst.header"]  # pages of notes begin where it suits them
+# Pages of notes begin where it suits them; examples whose HTML has no flags of doctest get no links.
+suppress_warnings = ["myst.header", "codeautolink.match_block"]
+
+codeautolink_concat_default = True  # the blocks of a page are one script
+
+# Pages of others to which names lead. Their lists of names are fetched once; without network such names lead nowhere.
+OTHERS = {
+    "dolfinx": "https://docs.fenicsproject.org/dolfinx/main/python/",
+    "ufl": "https://docs.fenicsproject.org/ufl/main/",
+    "basix": "https://docs.fenicsproject.org/basix/main/python/",
+    "petsc4py": "https://petsc.org/release/petsc4py/",
+}
+
+
+def inventory(name: str) -> str | None:
+    """The file with a project's names, fetched if it is not there yet; None if it cannot be."""
+    file = Path(__file__).parents[1] / "build" / "docs" / "inventories" / f"{name}.inv"
+    if not file.exists():
+        try:
+            with urlopen(f"{OTHERS[name]}objects.inv", timeout=5) as found:
+                names = found.read()
+        except OSError:
+            return None
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(names)
+    return str(file)
+
+
+intersphinx_mapping = {name: (OTHERS[name], file) for name in OTHERS if (file := inventory(name))}
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"  # beside the name; units and shapes in the text

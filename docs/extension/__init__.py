@@ -1,1 +1,1 @@
-"""What the site needs beyond Sphinx: pages whose code is run, the gallery of demos, docstrings, formulas as MathML."""
+"""What the site needs beyond Sphinx and well-kept extensions; each module says in its second sentence why it is none of these."""

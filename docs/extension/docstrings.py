@@ -1,4 +1,7 @@
-"""Docstrings in the reference: pages that they name are links, and several attributes may share a line."""
+"""Docstrings in the reference: pages that they name are links, and several attributes may share a line.
+
+Why not napoleon or numpydoc alone: both take the second of two names for a type.
+"""
 
 import re
 

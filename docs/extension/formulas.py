@@ -1,4 +1,7 @@
-"""Formulas as MathML, which browsers draw themselves: no script, nothing is fetched."""
+"""Formulas as MathML, which browsers draw themselves: no script, nothing is fetched.
+
+Why not sphinx.ext.mathjax or sphinxcontrib-katex: both need a script from elsewhere; sphinx.ext.imgmath needs LaTeX.
+"""
 
 import re
 

@@ -1,4 +1,8 @@
-"""A page for each demo, run at the build, and an index with thumbnails; written to docs/gallery."""
+"""A page for each demo, run at the build, and an index with thumbnails; written to docs/gallery.
+
+Why not sphinx-gallery: it reads text of demos as reStructuredText, not as the Markdown of notebooks, runs all demos in one
+process with one MPI, and does not run them again when the package has changed.
+"""
 
 import ast
 import re

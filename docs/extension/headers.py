@@ -1,5 +1,7 @@
 """The C++ reference: declarations of a header with the comments above them, as the header has them.
 
+Why not breathe: it needs Doxygen, which pip cannot install, and shows declarations in an order of its own.
+
 ```{cpp-header} law/friction.h
 ```
 """

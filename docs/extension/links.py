@@ -1,4 +1,7 @@
-"""Every link and picture of every page leads to a file of the site, and to an anchor that is there; pages are opened, not saved."""
+"""Every link and picture of every page leads to a file of the site, and to an anchor that is there; pages are opened, not saved.
+
+Why not Sphinx's linkcheck: it asks addresses of other sites, and takes links within this one for granted.
+"""
 
 import re
 from html.parser import HTMLParser

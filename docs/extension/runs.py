@@ -1,5 +1,7 @@
 """The Python blocks of a page are one script.  It is run, and what each block prints and draws is shown below it.
 
+Why not myst-nb: on the pages of a repository its cells are no Python, and it keeps what they printed when the package has changed.
+
 The same script is what ``tests/programs/test_docs.py`` runs.  A run is kept in ``build/docs`` until the script or the
 package changes.
 """
@@ -11,6 +13,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,8 +86,13 @@ def kept(folder: Path, key: str, make):
         if found["key"] == key:
             return found["result"]
     folder.mkdir(parents=True, exist_ok=True)
+    start = time.perf_counter()
+    print(f"  {folder.relative_to(KEPT)} ...", end=" ", flush=True)
     result = make()
-    file.write_text(json.dumps({"key": key, "result": result}))
+    print(f"{time.perf_counter() - start:.0f} s", flush=True)
+    written = file.with_suffix(".new")  # an interruption leaves no half of a file
+    written.write_text(json.dumps({"key": key, "result": result}))
+    written.replace(file)
     return result
 
 

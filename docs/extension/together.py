@@ -1,4 +1,7 @@
-"""A number and its unit stay on one line, and so do the two sides of "n = 4" and of "1 ± 2"."""
+"""A number and its unit stay on one line, and so do the two sides of "n = 4" and of "1 ± 2".
+
+Why not smartquotes or typographic replacements of MyST: they know quotes and dashes, no spaces.
+"""
 
 import re
 

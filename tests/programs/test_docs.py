@@ -22,7 +22,7 @@ import dolfinx_contact as dc
 from docs.extension.gallery import THEMES, cells
 from docs.extension.headers import HEADERS, declarations, without_bodies
 from docs.extension.links import dead_links, opened
-from docs.extension.runs import APART, blocks, run
+from docs.extension.runs import APART, blocks, kept, run
 from docs.extension.together import together
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -324,6 +324,25 @@ def test_every_displayed_formula_can_be_drawn():
     ]
     formulas = [found for text in texts for found in re.findall(r"\$\$(.+?)\$\$", text, re.DOTALL)]
     assert len(formulas) > 50 and all(tex2mathml(grouped(found), as_block=True) for found in formulas)  # fmt: skip
+
+
+def test_extensions_say_why_they_are_our_own():
+    """Each module of docs/extension says which well-kept extension it stands in for, and why."""
+    for file in (DOCS / "extension").glob("[!_]*.py"):
+        assert "\nWhy not " in file.read_text().split('"""')[1], file
+
+
+def test_an_interruption_leaves_no_half_of_a_result(tmp_path, monkeypatch):
+    """What is kept of a script is whole, or not there: the next build runs it again."""
+    monkeypatch.setattr("docs.extension.runs.KEPT", tmp_path)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as now, pytest.raises(KeyboardInterrupt):
+        now.setattr(Path, "replace", interrupted)
+        kept(tmp_path / "a", "key", lambda: 1)
+    assert kept(tmp_path / "a", "key", lambda: 2) == kept(tmp_path / "a", "key", lambda: 3) == 2
 
 
 def test_cells_of_demos():
