@@ -81,6 +81,16 @@ def test_workflows_run_scripts_of_ours():
             assert (ROOT / (words[0] if program == "bash" else program)).is_file(), line
 
 
+def test_the_paper_is_short_and_complete():
+    """The paper for JOSS has at most 1,100 words; what it cites is in its bibliography and nothing else; its figures exist."""
+    text, bib = ((ROOT / "paper" / f"paper.{end}").read_text() for end in ("md", "bib"))
+    body = text.split("\n# Summary\n")[1]
+    assert 750 <= len(body.split()) <= 1100
+    assert set(re.findall(r"@(\w+)", body)) == set(re.findall(r"^@\w+\{(\w+),", bib, re.MULTILINE))
+    figures = re.findall(r"\]\((\S+)\)", body)
+    assert figures and all((ROOT / "paper" / name).exists() for name in figures)
+
+
 def test_import_needs_no_extras():
     """No public name imports any of the packages that only demos and tests need."""
     extras = ["gmsh", "matplotlib", "tqdm", "pytest", "hypothesis", "mpmath"]
