@@ -40,7 +40,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, hooke, picture, say
+from helpers import COMM, hooke, picture, picture_of_body, say
 
 E, NU, MU, PRESSURE = 1e3, 0.3, 0.2, 1.0
 EDGES = np.array([1.0, 1.0, 0.5])
@@ -110,6 +110,7 @@ def main():
     up, down = np.array(table)[:2, 1], np.array(table)[:2:-1, 1]
     assert (down > up).all()
     say(f"frictional work {work:.3e} N mm")
+    picture_of_body(problem)
     return (np.array(table),)
 
 

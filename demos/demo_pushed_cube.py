@@ -39,7 +39,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
 
 E, NU, MU = 210e3, 0.3, 0.3
 LENGTH, WEIGHT = 100.0, 77.0  # a cube of steel
@@ -95,6 +95,7 @@ def main():
         said = str(refused)
     assert "a translation along (1, 0, 0)" in said and np.array_equal(problem.u.x.array, kept)
     say(said[said.index("The loads") :])
+    picture_of_body(problem)
     return x, r
 
 

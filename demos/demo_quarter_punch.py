@@ -41,7 +41,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
 
 RADIUS, HEIGHT, E, NU = 10.0, 10.0, 210e3, 0.3
 MU, P = (0.30, 0.15), (0.05, 0.20)  # case C of [dSFMH07, Table 1]
@@ -92,6 +92,7 @@ def run(quarter: bool) -> list[dict]:
         order = np.lexsort(np.round(x / RADIUS, 9).T)
         totals = np.array([contact.force()[2], work.sum()])
         results.append({"x": x[order], "r": r[order], "totals": totals, "counts": step.counts})
+    picture_of_body(problem)
     return results
 
 

@@ -167,7 +167,7 @@ def draw(figure, found) -> None:
     pressed = reaction > 0
     where = np.concatenate((at[pressed, 0], -at[pressed, 0]))
     shape.vlines(where, height, height + 40 * np.tile(reaction[pressed], 2), color="#ee6677")
-    shape.set(aspect="equal", title="friction 0.3: before, pressed, reactions")
+    shape.set(aspect="equal", title="friction 0.3")
     for name, label in (("smooth", "no friction"), ("rough", "friction 0.3")):
         force.plot(found["depths"], found[name]["force"], ".-", label=label)
     force.set(xlabel="displacement of the plate", ylabel="force of a quarter")

@@ -165,8 +165,8 @@ def draw(figure, traces) -> None:
         p = P if "non" in names[0] else MU
         axes.plot(*np.transpose([closed_form(a, p) for a in path()]), "kx", label="closed form")
         for name in names:
-            axes.plot(*traces[name].T, ".-", label=name)
-        axes.set(xlabel="force along x / normal", ylabel="along y")
+            axes.plot(*traces[name].T, ".-", label=name.split(", ")[1])
+        axes.set(xlabel="force along x / normal", ylabel="along y", title=names[0].split(", ")[0])
         axes.set(aspect="equal", ylim=(-0.2, 0.32))
         axes.legend(fontsize=8, loc="upper center")
 

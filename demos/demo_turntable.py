@@ -41,7 +41,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
 
 E, NU, MU = 210e3, 0.0, 0.2
 INNER, WIDTH, HEIGHT = 1.0, 2.0, 0.2  # the foot is INNER < x < INNER + WIDTH, |y| < WIDTH / 2
@@ -111,6 +111,7 @@ def main(turns: int = 5):
         before = work
     say(f"torque {torque:.4f} N mm, mu N r {expected:.4f}; friction differs from the motion of the plate by {off:.0e} at most; "
         f"dissipated {work:.5f} N mm in {turns * TURN:.2f} rad")  # fmt: skip
+    picture_of_body(problem)
     return x, force
 
 

@@ -44,7 +44,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
 
 E, NU, MU = 1e3, 0.3, 0.25
 RADIUS, WEIGHT, SLOPE = 10.0, 20.0, np.pi / 4
@@ -144,6 +144,7 @@ def main():
         f"closed form: N_1 = {expected[0]:.4f}, N_2 = {expected[1]:.4f}, T_max = {largest:.4f} N mm per mm"
     )
     say(said[said.index("The loads") :])
+    picture_of_body(problem)
     return np.array(table), expected / WEIGHT
 
 

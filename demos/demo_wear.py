@@ -108,12 +108,14 @@ def draw(figure, faces) -> None:
     """Pressure and depth along the face, from light to dark."""
     above, below = figure.subplots(2, 1, sharex=True)
     for k, (cycle, x, pressure, depth) in enumerate(faces):
-        style = dict(color=str(0.85 * (1 - (k + 1) / len(faces))), label=f"{cycle}")
+        style = dict(
+            color=str(0.85 * (1 - (k + 1) / len(faces))), label=None if k % 4 else f"{cycle}"
+        )
         above.plot(x, pressure, **style)
         below.plot(x, depth, **style)
     above.set(ylabel="pressure [MPa]")
     below.set(xlabel="x [mm]", ylabel="worn depth [mm]")
-    above.legend(title="cycles", fontsize="x-small", ncols=3)
+    above.legend(title="cycles", fontsize="x-small", ncols=2)
 
 
 if __name__ == "__main__":

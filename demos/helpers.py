@@ -1,8 +1,10 @@
 """What the demos share: where they print and draw, Hooke's law, a body with a rounded face, a quarter of a block."""
 
 import sys
+from importlib.util import find_spec
+from pathlib import Path
 
-import dolfinx_contact as dc  # noqa: F401  before DOLFINx, which one of its wheels needs
+import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace, second_order
 
 # isort: split
@@ -33,6 +35,12 @@ def picture(draw, *data) -> None:
         pyplot.show()
     else:
         figure.savefig(sys.argv[1], dpi=165)
+
+
+def picture_of_body(problem) -> None:
+    """Beside the picture that a script writes, ``body.png``: body, contact nodes and surfaces in space, with PyVista."""
+    if sys.argv[1:] and sys.argv[1].endswith(".png") and find_spec("pyvista"):
+        dc.plot(problem, Path(sys.argv[1]).with_name("body.png"))
 
 
 def everywhere(*arrays) -> list[np.ndarray]:

@@ -47,7 +47,7 @@ def cells(text: str) -> list[tuple[bool, str]]:
 
 
 def run(name: str, folder: Path) -> dict:
-    """What a demo prints, and the name of its picture."""
+    """What a demo prints, and the names of its pictures, the one of the body first."""
     arguments, drawn = COMMANDS.get(
         name, ([f"demos/{name}.py", "{folder}/picture.png"], "picture.png")
     )
@@ -59,18 +59,20 @@ def run(name: str, folder: Path) -> dict:
 
         raise ExtensionError(f"{name} failed: {done.stdout[-500:]}\n{done.stderr[-3000:]}")
     printed = re.sub(r"^(numbers|ParaView|picture) .*\n?", "", done.stdout, flags=re.MULTILINE)
-    drawn = drawn if drawn and (folder / drawn).exists() else None
-    return {"printed": printed.strip("\n"), "picture": drawn}
+    drawn = [name for name in ("body.png", drawn) if name and (folder / name).exists()]
+    return {"printed": printed.strip("\n"), "pictures": drawn}
 
 
 def page(name: str, text: str, result: dict) -> str:
-    """The page of a demo: picture, text and code, output."""
+    """The page of a demo: pictures, text and code, output."""
     found = cells(text)
     title, _, opening = found[0][1].partition("\n")
-    drawn = result["picture"]
-    picture = f"![Picture of {name}](/build/docs/gallery/{name}/{drawn})\n" if drawn else ""
+    pictures = "\n".join(
+        f"![Picture of {name}](/build/docs/gallery/{name}/{drawn})\n"
+        for drawn in result["pictures"]
+    )
     source = f"Source: [{name}.py](../../demos/{name}.py), run when this page was built."
-    parts = [title, picture, opening.strip(), source]
+    parts = [title, pictures, opening.strip(), source]
     parts += [
         body if prose else f"```{{code-block}} python\n{body}\n```" for prose, body in found[1:]
     ]
@@ -80,11 +82,11 @@ def page(name: str, text: str, result: dict) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def card(name: str, text: str, drawn: str | None) -> str:
+def card(name: str, text: str, drawn: list[str]) -> str:
     """A thumbnail with the title and the first sentences."""
     title, _, rest = cells(text)[0][1].partition("\n")
     first = " ".join(rest.split("##")[0].split()).split(". ")[0].rstrip(".") + "."
-    image = f"![](/build/docs/gallery/{name}/{drawn})" if drawn else ""
+    image = f"![](/build/docs/gallery/{name}/{drawn[0]})" if drawn else ""
     return (
         f":::{{container}} card\n{image}\n\n**[{title.lstrip('# ')}]({name}.md)**\n\n{first}\n:::\n"
     )
@@ -100,7 +102,7 @@ def write_pages(app) -> None:
         folder = KEPT / "gallery" / name
         result = kept(folder, fingerprint(text, helpers), lambda: run(name, folder))  # noqa: B023
         (PAGES / f"{name}.md").write_text(page(name, text, result))
-        cards[name] = card(name, text, result["picture"])
+        cards[name] = card(name, text, result["pictures"])
     tree = "\n".join(["```{toctree}", ":hidden:", "", *names, "```"])
     says = "Each demo is a script in `demos`. It states its problem, solves it, and asserts what it claims."
     parts = [f"# Gallery\n\n{says}"]
