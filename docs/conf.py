@@ -39,21 +39,26 @@ OTHERS = {
 }
 
 
-def inventory(name: str) -> str | None:
-    """The file with a project's names, fetched if it is not there yet; None if it cannot be."""
+def fetched(address: str, file: Path) -> bool:
+    """Whether a project's list of names could be fetched into a file."""
+    try:
+        with urlopen(f"{address}objects.inv", timeout=5) as found:
+            names = found.read()
+    except OSError:
+        return False
+    if not names.startswith(b"# Sphinx inventory"):
+        return False
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(names)
+    return True
+
+
+intersphinx_mapping = {}
+for name, address in OTHERS.items():
     file = Path(__file__).parents[1] / "build" / "docs" / "inventories" / f"{name}.inv"
-    if not file.exists():
-        try:
-            with urlopen(f"{OTHERS[name]}objects.inv", timeout=5) as found:
-                names = found.read()
-        except OSError:
-            return None
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(names)
-    return str(file)
-
-
-intersphinx_mapping = {name: (OTHERS[name], file) for name in OTHERS if (file := inventory(name))}
+    if not file.exists() and not fetched(address, file):
+        break  # no network: no second time-out
+    intersphinx_mapping[name] = (address, str(file))
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"  # beside the name; units and shapes in the text
