@@ -29,6 +29,10 @@ nitpicky = False
 suppress_warnings = ["myst.header", "codeautolink.match_block"]
 
 codeautolink_concat_default = True  # the blocks of a page are one script
+codeautolink_inventory_map = {  # where DOLFINx has its classes, and where its reference
+    f"dolfinx.fem.function.{name}": f"dolfinx.fem.{name}"
+    for name in ("Constant", "Function", "FunctionSpace")
+}
 
 # Pages of others to which names lead. Their lists of names are fetched once; without network such names lead nowhere.
 OTHERS = {
