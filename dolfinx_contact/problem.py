@@ -45,7 +45,6 @@ from dolfinx_contact.results.record import (
     NotConverged,
     Step,
     converged,
-    counts,
     named,
     record,
     warn_of_contact,
@@ -54,7 +53,7 @@ from dolfinx_contact.results.record import (
 )
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverResult
 from dolfinx_contact.solvers.trial import floating, unmoved, without_reactions
-from dolfinx_contact.step.load_step import LoadStep, nodal_stiffness
+from dolfinx_contact.step.load_step import LoadStep, Monitor, Stamps, StepState, new_stamp
 from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
@@ -62,6 +61,7 @@ from dolfinx_contact.support.collective import agree, raised_together, uninterru
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -180,7 +180,7 @@ class ContactProblem(Guarded):
         self._large = False  # whether a displacement was, and the user told
         self._turned = False  # the same of slip that turns
         self._bound = self._bound_to = None
-        self._assembled = 0
+        self._stamps, self._stiffness, self._unit = Stamps(), [], 1.0
         self._laws, self._freedom = self._present_laws(), self._present_freedom()
         take_contacts(self, self.contacts)
         self._states = ProblemStates(self.body, self.contacts, self._variables)
@@ -282,8 +282,9 @@ class ContactProblem(Guarded):
             with raised_together(self.body.comm):  # whatever happens on one rank alone
                 done, found = self._step(start)
                 with uninterrupted():
-                    self._states.advance(found.x)
-                    self._large = self._large or check_size(self.body, found.x, self.u.x.array)
+                    self._accept(found)
+                    x = found.state.x
+                    self._large = self._large or check_size(self.body, x, self.u.x.array)
                     now = self.u.x.array, done.counts, self._large
                     self._unseen.check(self.body, self.contacts, self._stiffness, *now)
                     warn_of_rounding(done, self.tol)
@@ -317,32 +318,41 @@ class ContactProblem(Guarded):
     def _step(self, start: float) -> tuple[Step, SolverResult]:
         """Record and displacement of a step that has converged, shown and given to internal variables."""
         self._check_input()
-        step, found, changes, said = self._staggered()
+        found, changes, said = self._staggered()
+        state = found.state.step.with_small_slip_as_stick(found.state)
         missed = changes.get("EndGeometry", 0.0)  # over the reactions
-        step.rest()
-        done = record(self.body, self.contacts, step.errors, found, perf_counter() - start, missed)
-        if said or not converged(step.errors, done, self.tol):
+        done = record(state, found, perf_counter() - start, missed)
+        if said or not converged(state.errors, done, self.tol):
             if not said:
                 tried = f"{done}, tol {self.tol:.1e}, by {named(done)}"
                 if done.reason in (NO_SOLUTION, UNHELD):  # untried: errors are of the last state
                     tried = done.reason
-                said = f"not converged: {tried}. {step.refusal()}"
-            raise NotConverged(
-                f"{said}.",
-                done,
-                self.body.values(found.x),
-                [contact.reaction for contact in self.contacts],
-            )
-        for contact in self.contacts:
-            contact.renew_gaps(found.x)
-        if self.body.comm.allreduce(any(c.opens.any() for c in self.contacts), op=MPI.LOR):
-            from dolfinx_contact.lagged.landing import opening
-
-            opening(self.body, self.contacts, step, self.geometry_tol)
-        self.body.put(found.x)
+                said = f"not converged: {tried}. {state.step.refusal(state)}"
+            reactions = [nodes.reaction for nodes in state.nodes]
+            raise NotConverged(f"{said}.", done, self.body.values(state.x), reactions)
+        found = found._replace(state=self._finished(state))
+        self.body.put(state.x)
         if self._variables is not None:
             self._variables.move_on(self.u)
         return done, found
+
+    def _finished(self, state: StepState) -> StepState:
+        """A converged state with what only its end tells: gaps of open nodes, slip of those that have left or opened.  Collective."""
+        both, nodes = zip(state.step.contacts, state.nodes), []
+        for contact, one in both:
+            one = contact.given.with_slip_past_edges(one, state.x)
+            nodes.append(contact.given.with_own_gaps(contact, one, state.x))
+        opens = any(c.opened(one).any() for c, one in zip(state.step.contacts, nodes))
+        if self.body.comm.allreduce(opens, op=MPI.LOR):
+            from dolfinx_contact.lagged.landing import slip_up_to_opening
+
+            nodes = slip_up_to_opening(state, nodes, self.geometry_tol)
+        return state.with_nodes(nodes)
+
+    def _accept(self, found: SolverResult) -> None:
+        """Let what was found be the last converged state.  Collective."""
+        found.state.step.place_surfaces(found.state)
+        self._states.accept(found.state, found.start)
 
     def load_step(
         self, holding: HeldSurfaces | None = None, at: np.ndarray | None = None
@@ -369,30 +379,70 @@ class ContactProblem(Guarded):
         if at is None:
             here = self._predicted(b)
         turned = follow(self.contacts, body, here, self._states.last, self._points)
-        if turned or assembled != self._assembled:
-            again = at is not None and assembled == self._assembled  # rows nearly as before
-            self._assembled = assembled
-            self._stiffness, self._unit = nodal_stiffness(body, self.contacts)
-            renew = getattr(self._bound, "renew_rows", None) if again else None
-            # of a nonlinear body the stiffness is new in every iteration
-            if (turned or not body.nonlinear) and not (renew and renew(self._stiffness)):
-                self._unbind()
-        self._renew_laws(begin=True)  # in the frames of this step
+        self._stamp(assembled, turned, begins=at is None and holding is None)
+        given = dict(b=b, external=external, tol=self.tol, unit=self._unit, last=self._states.last)
         last, before = self._states.last, self._states.before
-        starts = [body.taken(self.u.x.array), 2 * last - before] if at is None else [at]
+        starts = (body.taken(self.u.x.array), 2 * last - before) if at is None else (at,)
+        contacts = self._in_step()
         if holding is None and driven:
             from dolfinx_contact.surfaces.held import held_surfaces
 
-            holding = held_surfaces(body, self.contacts, last, b)
-        freedom = self._present_freedom()
-        if freedom != self._freedom:
-            self._unbind()
-            self._freedom = freedom
+            holding = held_surfaces(body, contacts, last, b)
+            contacts = self._in_step()  # planes have gone with the nodes that hold them
+        given |= self._parts(contacts, holding)
         kind = LoadStep
         if body.nonlinear:
             from dolfinx_contact.step.nonlinear import NonlinearStep as kind
-        given = self._stiffness, b, external, starts, self.tol, self._unit, self.monitor
-        return kind(body, self.contacts, *given, holding, last)
+        monitor = None if self.monitor is None else Monitor(self.monitor, body.comm)
+        return kind(body, starts=starts, stamps=self._stamps, monitor=monitor, **given)
+
+    def _stamp(self, assembled: int, turned: bool, begins: bool) -> None:
+        """Take note of what is another one than in the last step: stiffness, rows, laws.  Collective."""
+        old = self._stamps
+        if turned or assembled != old.stiffness:
+            self._stiffness = [contact.nodal_stiffness(self.body.K) for contact in self.contacts]
+            size = self.body.largest(np.abs(self.body.displacements.x))
+            # Any unit that keeps squares within the range of double precision.
+            unit = self.body.largest(self.body.cancelling(np.full(self.body.size, size)))
+            self._unit = unit or 1.0
+        for contact in self.contacts:
+            contact.renew_friction()  # in the frames of this step
+        laws = self._present_laws()
+        changed = any(one is not other for one, other in zip(laws, self._laws))
+        changed = self.body.comm.allreduce(changed, op=MPI.LOR)
+        self._laws = laws
+        self._stamps = Stamps(
+            assembled,
+            new_stamp() if turned else old.rows,
+            new_stamp() if changed else old.law,
+            old.parts,
+            new_stamp() if begins else old.step,
+        )
+
+    def _in_step(self) -> list[ContactStep]:
+        """The contacts where surfaces stand."""
+        return [contact.in_step(k) for contact, k in zip(self.contacts, self._stiffness)]
+
+    def _parts(self, contacts: Sequence[ContactStep], holding: HeldSurfaces | None) -> dict:
+        """Contacts and optional parts of a step, by their names there.  Collective."""
+        parts: dict[str, Any] = {"holding": holding}
+        if holding is not None and holding.dragged:
+            dragged = holding.dragged
+            contacts = [c.but(dragged=dragged.get(k)) for k, c in enumerate(contacts)]
+        if any(contact.surface.motions for contact in contacts):
+            from dolfinx_contact.surfaces.driven import DrivenSurfaces
+
+            parts["surfaces"] = surfaces = DrivenSurfaces(self.body, contacts)
+            contacts = surfaces.with_columns(contacts)
+        if len(contacts) > 1:
+            from dolfinx_contact.contact.shared import shared_nodes
+
+            parts["shared"] = shared_nodes(contacts, self.body.fixed)
+        freedom = [*self._present_freedom(), holding is not None and sorted(holding.dragged)]
+        if freedom != self._freedom:
+            self._freedom = freedom
+            self._stamps = self._stamps._replace(parts=new_stamp())
+        return parts | {"contacts": tuple(contacts)}
 
     def _predicted(self, b: np.ndarray) -> np.ndarray:
         """Where a step is likely to end, for rows between bodies that slide: under the new loads, with the last reactions.  Collective.
@@ -429,8 +479,9 @@ class ContactProblem(Guarded):
         may = [contact.may_land(self._states.last) for contact in self.contacts]
         return self.body.comm.allreduce(any(may), op=MPI.LOR)
 
-    def bound(self) -> BoundSolver:
-        """The solver, bound to the body as it is now, see ``solvers/base.py``.  Collective."""
+    def bound(self, step: LoadStep | None = None) -> BoundSolver:
+        """The solver, bound to steps like this one, see ``solvers/base.py``; None is the next step.  Collective."""
+        step = self.load_step() if step is None else step
         if self._bound_to != self.solver:
             self._unbind()
             solver = self.solver
@@ -438,57 +489,64 @@ class ContactProblem(Guarded):
                 from dolfinx_contact.solvers.newton.linearised import Linearised
 
                 solver = Linearised(solver)
-            self._bound = solver.bind(
-                self.body, self.contacts, self._stiffness, self._states.memory
-            )
-            self._bound_to = self.solver
+            self._bound, self._bound_to = solver.bind(step), self.solver
+            return self._bound
+        try:
+            self._bound.update(step)
+        except BaseException:
+            self._unbind()
+            raise
         return self._bound
 
-    def _staggered(self) -> tuple[LoadStep, SolverResult, dict, str]:
-        """The step solved with all that it takes for known, which is that of the state found: see ``Staggered``.  Collective."""
-        step = self.load_step()
+    def _staggered(self) -> tuple[SolverResult, dict, str]:
+        """What is found with all that the step takes for known, which is that of the state found: see ``Staggered``.  Collective."""
+        step, own = self.load_step(), ()
         goal, levels = step.tol, self._levels(step)
         if self._digits_later():
-            step = step.within(max(goal, PART * self.geometry_tol))
+            step = step.but(tol=max(goal, PART * self.geometry_tol))
         if not levels:
-            return *self._found(step), {}, ""
+            return self._found(step, self._states.starts), {}, ""
         from dolfinx_contact.step.staggered import solve_staggered
 
-        known = None
-
-        def search(step: LoadStep) -> tuple[LoadStep, SolverResult]:
-            nonlocal known
-            step, found = self._found(step)
-            known = self._keep_one_start(known)
-            return step, found
+        def search(step: LoadStep) -> SolverResult:
+            nonlocal own  # of the starts found within a step the last one alone
+            found = self._found(step, (*self._states.starts, *own))
+            own = own if found.start is None else (found.start,)
+            return found._replace(start=own[0] if own else None)
 
         return solve_staggered(step, levels, search, goal)
 
     def _levels(self, step: LoadStep) -> list:
         """What the step takes for known, level by level, the fastest first; imported where there is any.  Collective."""
-        body, contacts, levels = self.body, self.contacts, []
+        contacts, levels = self.contacts, []
         if any(contact.follows_pressure for contact in contacts):
             from dolfinx_contact.lagged.pressure import PressureFriction
 
-            levels.append([PressureFriction(self._renew_laws)])
+            levels.append([PressureFriction()])
         if any(contact.wears_within for contact in contacts):
             from dolfinx_contact.lagged.wear import WearOfStep
 
-            levels.append([WearOfStep(body, step, self.geometry_tol)])
+            levels.append([WearOfStep(step, self.geometry_tol)])
         if step.holding is not None:
             from dolfinx_contact.lagged.held import HeldPlanes
 
-            levels.append([HeldPlanes(contacts, self._step_again)])
+            levels.append([HeldPlanes(self._with_planes)])
         if any(contact.changes for contact in contacts) or self._may_land():
             from dolfinx_contact.lagged.end_geometry import EndGeometry
             from dolfinx_contact.lagged.landing import SlipBeforeLanding
 
-            end = EndGeometry(body, contacts, self.geometry_tol, self._step_again)
-            levels.append([end, SlipBeforeLanding(body, contacts, self.geometry_tol)])
+            end = EndGeometry(step, self.geometry_tol, self._step_at)
+            levels.append([end, SlipBeforeLanding(self.geometry_tol)])
         return levels
 
-    def _step_again(self, step: LoadStep, at: np.ndarray | None = None) -> LoadStep:
-        """The step anew, with planes held as they are, and frames of a displacement.  Collective."""
+    def _with_planes(self, holding: HeldSurfaces) -> LoadStep:
+        """The step anew, with other planes held.  Collective."""
+        for contact in self.contacts:
+            contact.restore()
+        return self.load_step(holding)
+
+    def _step_at(self, step: LoadStep, at: np.ndarray) -> LoadStep:
+        """The step anew, with frames of a displacement.  Collective."""
         return self.load_step(step.holding, at)
 
     def _digits_later(self) -> bool:
@@ -496,28 +554,21 @@ class ContactProblem(Guarded):
         renewed = any(c.surface.deformable and c.changes for c in self.contacts)
         return renewed and not (self.body.exact or self.body.nonlinear)
 
-    def _keep_one_start(self, before: Any):
-        """Of the solver's starts for later steps keep one of this step, the last; others were on the way.  Returns it."""
-        past = self._states.memory["past"]
-        if before is not None and len(past) > 1 and past[-2] is before:
-            del past[-2]
-        return past[-1] if past else None
-
-    def _found(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+    def _found(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
         """What is found with the laws as they are, whatever holds the body.  Collective."""
         if step.holding is not None and step.holding.beyond:
-            return step, unmoved(self.body, step, self._states.last)
+            return unmoved(step)
         if step.surfaces is not None:
-            step.surfaces.check()
-            if step.surfaces.beyond(given=True):
-                return step, unmoved(self.body, step, self._states.last)
+            step.surfaces.check(step.contacts)
+            last = [contact.last for contact in step.contacts]
+            if step.surfaces.beyond(step.contacts, last, step.no_motions, given=True):
+                return unmoved(step)
         if self.body.loose is not None:
-            return self._held_by_contact(step)
-        linear = not self.body.nonlinear
-        found = without_reactions(self.body, self.contacts, step) if linear else None
-        return step, found or self._solved(step)
+            return self._held_by_contact(step, starts)
+        found = None if self.body.nonlinear else without_reactions(step)
+        return found or self._solved(step, starts)
 
-    def _held_by_contact(self, step: LoadStep) -> tuple[LoadStep, SolverResult]:
+    def _held_by_contact(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
         """What is found of a body that contact alone holds.  Collective.
 
         Raises:
@@ -525,36 +576,34 @@ class ContactProblem(Guarded):
         """
         from dolfinx_contact.step.statics import Statics
 
-        body, last, found = self.body, self._states.last, None
-        statics = Statics(body, self.contacts, step, last)
-        step = step.held_by(statics)
+        found, statics = None, Statics(step, self._states.last)
+        step = step.but(statics=statics)
         if statics.said:
-            return step, unmoved(body, step, last, statics.reason)
+            return unmoved(step, statics.reason)
         if not statics.loads.any():
-            found = floating(body, self.contacts, step, last)
-        pressed = np.concatenate([contact.last.reaction[:, -1] for contact in self.contacts])
-        if not body.largest(pressed) > 0.0:
+            found = floating(step)
+        pressed = np.concatenate([contact.last.reaction[:, -1] for contact in step.contacts])
+        if not self.body.largest(pressed) > 0.0:
             statics.place()
         else:
             statics.follow()
-        found = found or self._solved(step)
-        if not step.errors.within(step.tol):
-            return step, found
-        if not statics.balanced():
-            return step, unmoved(body, step, last)
-        return step, found._replace(x=statics.settled(step, found.x, self.undetermined))
+        found = found or self._solved(step, starts)
+        if not found.state.within:
+            return found
+        if not statics.balanced(found.state):
+            return unmoved(step)
+        return found._replace(state=statics.settled(found.state, self.undetermined))
 
-    def _solved(self, step: LoadStep) -> SolverResult:
-        """What the solver finds; contacts and ``step.errors`` are those of it then.  Collective."""
+    def _solved(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
+        """What the solver finds, judged by F itself.  Collective."""
         with stage("contact: iterations"):
-            found = self.bound().solve(step)
-        step.measure(found.x)
-        return found
+            found = self.bound(step).solve(step, starts)
+        return found._replace(state=found.state.judged)
 
     def _unbind(self) -> None:
         """Forget what was set up for a stiffness that has changed.  Collective."""
         if self._bound is not None:
-            self._bound.destroy()
+            self._bound.close()
         self._bound = self._bound_to = None
 
     # -- converged states ----------------------------------------------------------------------
@@ -629,18 +678,6 @@ class ContactProblem(Guarded):
         """Raise a ``ValueError`` on all ranks if what may change between steps differs between them.  Collective."""
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, monitor=self.monitor is not None)  # fmt: skip
 
-    def _renew_laws(self, begin: bool = False) -> None:
-        """Let friction follow the present state, at the ``begin`` of a step too, and the solver know of what changed.  Collective."""
-        for contact in self.contacts:
-            contact.renew_friction(begin)
-        laws = self._present_laws()
-        changed = any(one is not other for one, other in zip(laws, self._laws))
-        if self.body.comm.allreduce(changed, op=MPI.LOR):
-            renew = getattr(self._bound, "renew_law", None)
-            if renew is None or not renew():
-                self._unbind()
-            self._laws = laws
-
     def _present_laws(self) -> list:
         return [contact.friction for contact in self.contacts]
 
@@ -654,5 +691,6 @@ class ContactProblem(Guarded):
             LOG.info(line())
 
     def counts(self) -> Counts:
-        """Contact nodes open, sticking and slipping in the present state.  Collective."""
-        return counts(self.body, self.contacts)
+        """Contact nodes open, sticking and slipping in the last converged state.  Collective."""
+        here = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
+        return Counts(*(int(count) for count in self.body.total(here + np.zeros(3))))

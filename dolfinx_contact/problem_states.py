@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.bodies.internal_variables import InternalVariables
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import StepState
 
 
 class Kept(NamedTuple):
@@ -42,7 +42,7 @@ class ProblemStates:
     Attributes:
         last: The last displacement, owned degrees of freedom.
         before: The one before.
-        memory: Of solvers, see ``Solver.bind``.
+        starts: What solvers want to begin with in later steps, see ``BoundSolver.solve``.
     """
 
     def __init__(
@@ -50,14 +50,14 @@ class ProblemStates:
     ) -> None:
         self._body, self._contacts, self._variables = body, contacts, variables
         self._parts: list[Any] = [*contacts, *filter(None, [variables])]  # what has a history
-        self._stood, self.memory, self._mine = self.places(), {}, object()
+        self._stood, self._mine = self.places(), object()
         self._begin()
 
     def _begin(self) -> None:
         """No history.  ``u`` is left: it is the guess of the first step."""
         self.last = self.before = np.zeros(self._body.size)
         self._body.known = None
-        self._remember(())
+        self.starts: tuple = ()
         for part in self._parts:
             part.reset()
         self._keep(None)
@@ -65,17 +65,10 @@ class ProblemStates:
     def _keep(self, before: Kept | None) -> None:
         """Keep the present state to go back to, and the one before, if there is one."""
         histories = [part.history() for part in self._parts]
-        displacements, past = (self.last, self.before), tuple(self.memory["past"])
-        self._kept = Kept(
-            displacements, histories, self.places(), self._body.known, past, self._mine
-        )
+        places, displacements = self.places(), (self.last, self.before)
+        known = self._body.known
+        self._kept = Kept(displacements, histories, places, known, self.starts, self._mine)
         self._before = before
-
-    def _remember(self, past: Sequence[tuple]) -> None:
-        """Starts for the condensed solver, which has the same deque."""
-        kept = self.memory.setdefault("past", deque(maxlen=KEPT))
-        kept.clear()
-        kept.extend(past)
 
     def places(self) -> list[tuple]:
         """Displacement and rotation of each contact's surface, and the rotation of its guides."""
@@ -92,11 +85,15 @@ class ProblemStates:
         if self._variables is not None:
             self._variables.advance()
 
-    def advance(self, x: np.ndarray) -> None:
-        """The contacts' present state and this displacement are the last converged ones."""
-        self.last, self.before = x, self.last
-        for part in self._parts:
-            part.advance()
+    def accept(self, state: StepState, start: Any) -> None:
+        """Let a state be the last converged one, and keep a start for later steps.  Collective."""
+        self.last, self.before = state.x, self.last
+        for contact, nodes in zip(state.step.contacts, state.nodes):
+            contact.given.accept(contact, nodes)
+        if self._variables is not None:
+            self._variables.advance()
+        if start is not None:
+            self.starts = (*self.starts, start)[-KEPT:]
         for contact in self._contacts:
             contact.surface.end_step()
         self._keep(self._kept)
@@ -149,7 +146,7 @@ class ProblemStates:
 
     def _take(self, past: Sequence[tuple]) -> None:
         """Go on from a state that was put in place, with starts for the condensed solver."""
-        self._remember(past)
+        self.starts = tuple(past)
         self.restore()
         self._keep(None)
 
@@ -163,8 +160,9 @@ class ProblemStates:
         """Write a checkpoint, see ``ContactProblem.save``.  Collective."""
         from dolfinx_contact.results import checkpoint
 
-        displacements, past = [self.last, self.before], self.memory["past"]
-        checkpoint.save(path, self._body, self._contacts, displacements, past, self._variables)
+        displacements = [self.last, self.before]
+        given = self._body, self._contacts, displacements, self.starts, self._variables
+        checkpoint.save(path, *given)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint, see ``ContactProblem.load``.  Collective."""

@@ -131,13 +131,16 @@ class Given:
 
     answer = None
 
-    def bind(self, body, contacts, stiffness, memory):
+    def bind(self, step):
         return self
 
-    def solve(self, step):
-        return SolverResult(self.answer, 0, 0.0, "given")
+    def update(self, step):
+        pass
 
-    def destroy(self):
+    def solve(self, step, starts):
+        return SolverResult(step.measure(self.answer), 0, 0.0, "given")
+
+    def close(self):
         pass
 
 
@@ -204,7 +207,7 @@ def condensed_problems() -> dict:
         for displacement in programme(punch.parameters):
             punch.press(displacement)
         bound = punch.problem.bound()
-        q, r, _ = zip(*bound.past)
+        q, r, _ = zip(*punch.problem.snapshot().past)
         q, r = (np.reshape(part, (len(part), -1, 3)) for part in (q, r))
         problems |= {f"{case}q": q, f"{case}r": r, f"{case}law": np.array([law["mu"], law["p"]])}
         problems.setdefault("W", bound.compliance())

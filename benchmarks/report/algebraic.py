@@ -57,27 +57,24 @@ class Sampled:
     def __init__(self, solver):
         self.solver, self.samples = solver, []
 
-    def bind(self, *arguments):
-        self._bound = self.solver.bind(*arguments)
+    def bind(self, step):
+        self._bound = self.solver.bind(step)
         return self
 
-    def destroy(self):
-        self._bound.destroy()
+    def update(self, step):
+        self._bound.update(step)
 
-    def solve(self, step):
-        residual, self.samples, start = step.residual, [], process_time()
+    def close(self):
+        self._bound.close()
 
-        def noted(*arguments):
-            found = residual(*arguments)
-            self.samples.append((process_time() - start, found[1].largest))
-            return found
+    def tell(self, error, _):
+        self.samples.append((process_time() - self._start, error))
 
-        step.residual = noted
-        try:
-            return self._bound.solve(step)
-        finally:
-            self.seconds = process_time() - start
-            del step.residual
+    def solve(self, step, starts):
+        self.samples, self._start = [], process_time()
+        found = self._bound.solve(step.but(monitor=self), starts)
+        self.seconds = process_time() - self._start
+        return found
 
 
 def scene(name: str, repeat: int, mesh: dict) -> dict:

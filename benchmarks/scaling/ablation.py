@@ -26,7 +26,7 @@ from benchmarks.stress import matrix
 from benchmarks.stress.scenes import scenes
 from benchmarks.tables import chosen, table
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
-from dolfinx_contact.solvers import fixed_point, preconditioner, rigid_balance
+from dolfinx_contact.solvers.fixed_point import fixed_point, preconditioner, rigid_balance
 from dolfinx_contact.support.anderson import Anderson
 from studies.punch import Parameters, Punch, programme
 

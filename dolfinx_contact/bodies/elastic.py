@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
@@ -14,7 +14,6 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion, stiffness_checks
 from dolfinx_contact.bodies.forms import digest_of, same_values, values_of
-from dolfinx_contact.bodies.free_state import FreeState
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver, preconditioner
 from dolfinx_contact.support.collective import OverRanks, raised_together
@@ -26,6 +25,44 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.loose import LooseMotions
 
 _instances = count()
+
+
+class FreeState(NamedTuple):
+    """The displacement without contact under a load, arrays of owned degrees of freedom."""
+
+    digest: np.ndarray  # of the stiffness
+    load: np.ndarray
+    displacement: np.ndarray
+    exact: bool  # or to three digits
+
+    def scaled(self, b: np.ndarray, fixed: np.ndarray, comm: MPI.Comm) -> np.ndarray | None:
+        """The displacement under ``b``, if that is the load times a factor.  Collective.
+
+        Args:
+            b: As ``ElasticBody.load`` returns it.
+            fixed: Fixed degrees of freedom, which hold boundary values.
+            comm: MPI communicator.
+        """
+        asked_again = comm.allreduce(np.array_equal(b, self.load), op=MPI.LAND)
+        if asked_again:  # in the same step
+            return self.displacement.copy()
+        factor = max(comm.allgather(_ratio(b, self.load)))[1]
+        sizes = np.abs([b - factor * self.load, b])
+        # Forces and boundary values have different units: each to its own rounding.
+        given = sizes[:, fixed]
+        sizes[:, fixed] = 0.0
+        largest = np.array([part.max(axis=1, initial=0.0) for part in (given, sizes)])
+        comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+        same = (largest[:, 0] <= 16 * np.finfo(float).eps * largest[:, 1]).all()
+        return factor * self.displacement if same else None
+
+
+def _ratio(b: np.ndarray, last: np.ndarray) -> tuple[float, float]:
+    """Largest entry of ``last`` in magnitude, and ``b`` over ``last`` there."""
+    if not last.any():
+        return 0.0, 0.0
+    k = np.abs(last).argmax()
+    return abs(last[k]), b[k] / last[k]
 
 
 class ElasticBody(OverRanks):

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
+from dolfinx_contact.contact.contact_step import ContactStep
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import contact_nodes, weight_on
 from dolfinx_contact.contact.input import (
@@ -32,7 +33,7 @@ from dolfinx_contact.contact.placement import Placement, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction, as_friction
-from dolfinx_contact.law.maps import BipotentialMap, ContactLaw, NodalLaw, NodalMap, ReturnMap
+from dolfinx_contact.law.maps import BipotentialMap, ContactLaw, ReturnMap
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, place, positive
 from dolfinx_contact.support.collective import agree, raised_together
@@ -117,11 +118,10 @@ class Contact(Guarded):
         self.x = frozen(self.displacements.x[self.nodes])
         self._area: np.ndarray | None = None
         self._opposite_area: np.ndarray | None = None
-        self._repeats, self._wearing = 1.0, None
+        self._repeats = 1.0
         self._bare: np.ndarray | None = None  # nodes opposite nothing where the last step has ended
         self._axial: bool | None = None
-        self._dragged: np.ndarray | None = None
-        self._forget_supported()
+        self._landed_after: np.ndarray | None = None
         x, dofs = self.x[:, :gdim], self.displacements.dofs(self.nodes)
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
@@ -186,7 +186,6 @@ class Contact(Guarded):
     @friction.setter
     def friction(self, friction: Friction | float) -> None:
         self._laws.assign(self, friction)
-        self._forget_supported()
 
     @property
     def wear(self) -> Wear | None:
@@ -224,10 +223,17 @@ class Contact(Guarded):
         """Whether friction follows the pressure at the end of the step."""
         return self._laws.follow_pressure
 
-    def renew_friction(self, begin: bool = False) -> None:
-        """Let fields have their present values; ``begin``: a step begins here, with frames of its own.  Collective."""
-        self._laws.renew(self, begin)
-        self._forget_supported()
+    def renew_friction(self) -> None:
+        """Let fields have their present values: a step begins here, with frames of its own.  Collective."""
+        self._laws.renew(self)
+
+    def under_pressures_of(self, step: ContactStep, state: State) -> ContactStep:
+        """The contact in a step with the law of the pressures in a state, that itself if the law stays.  Collective."""
+        pressure = fields.per_area(state.reaction[:, -1], self.area)
+        friction = self._laws.under(self, pressure, step.friction)
+        if friction is step.friction:
+            return step
+        return step.but(friction=friction, law=friction.law(self.V.mesh.geometry.dim))
 
     def check(self) -> None:
         """Raise a ``ValueError`` on all ranks if a law does not fit their nodes, or surface or laws differ.  Collective."""
@@ -247,7 +253,6 @@ class Contact(Guarded):
     ) -> None:
         """Take note of what boundary conditions fix, see ``ContactPoints.hold``."""
         self.points.hold(held, closed, guided, fixed)
-        self._forget_supported()
 
     def meet(self, fixed: np.ndarray) -> None:
         """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
@@ -256,68 +261,30 @@ class Contact(Guarded):
             self._history.restore()
             self._settle_here()
 
-    def _forget_supported(self) -> None:
-        """Friction, points or the last state are others now."""
-        self._free_friction: Friction | None = None
-        self._usual = (
-            False  # whether all nodes that do not move along their support have the kernel's law
-        )
+    # -- in a step -----------------------------------------------------------------------------
 
-    @property
-    def known_slip(self) -> np.ndarray:
-        """Part of ``slip_increment`` that supports prescribe, ``shape=(n, gdim - 1)``, local frame, length units."""
-        known = self.present.known
-        return np.zeros_like(self.slip_increment) if known is None else known
-
-    @property
-    def dragged(self) -> np.ndarray | None:
-        """Slip of held nodes past which force drives the surface, ``shape=(n, gdim - 1)``, a direction; None is nowhere."""
-        return self._dragged
-
-    def drag(self, slip: np.ndarray | None) -> None:
-        """From now on held nodes with such a slip have the friction against it, whatever the present one is."""
-        self._dragged = slip
-
-    @property
-    def free_friction(self) -> Friction:
-        """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
-        points, friction = self.points, self.friction
-        if not points.along.any() or friction.frictionless:
-            return friction
-        if self._free_friction is None:
-            from dolfinx_contact.contact.friction_field import guided
-
-            found = guided(friction, points.count, points.supported, points.along)
-            self._free_friction = found
-        return self._free_friction
-
-    def law_of(self, law: NodalLaw, nodes: Any = slice(None)) -> NodalLaw:
-        """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
+    def in_step(self, stiffness: NodalStiffness | None = None, **parts: Any) -> ContactStep:
+        """The contact as a step has it, with its present frames, laws and last state, where the surface stands.
 
         Args:
-            law: Of the kernel, of these nodes.
-            nodes: Their indices, ``shape=(k,)``; all of them by default.
+            stiffness: Of the nodes.
+            **parts: Others of ``ContactStep``.
         """
-        points = self.points
-        if not points.supported.size or self.friction.frictionless:
-            return law
-        still = self.present.known is None and self.dragged is None
-        if still and self._usual:
-            return law
-        at_rows = np.arange(points.count)[nodes]
-        at = np.searchsorted(points.supported, at_rows)
-        at[at == points.supported.size] = 0
-        mine = points.supported[at] == at_rows
-        known, last = self.known_slip[at_rows], self.last.reaction[at_rows, :-1]
-        if self.dragged is not None:
-            known = np.where(self.dragged[at_rows] != 0.0, self.dragged[at_rows], known)
-        from dolfinx_contact.law.supported import supported
+        placement, laws = self._placement, self._laws
+        given = placement.now, laws.friction, laws.kernel, self.last, placement.surface_moved()
+        opening = self.opening
+        return ContactStep(
+            self, *given, opening, placement.clear, stiffness, begun=laws.begun, **parts
+        )
 
-        everywhere = isinstance(nodes, slice)
-        friction = self.friction if everywhere else self.friction.at(at_rows)
-        found = supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], known, last)
-        self._usual = self._usual or (found is law and still and everywhere)
-        return found
+    def at(self, u: fem.Function | np.ndarray) -> State:
+        """Gaps and slip increments at a displacement, as a state without reactions; slip counts from the last converged step.
+
+        Args:
+            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
+        """
+        values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
+        return self.in_step().at(values)
 
     # -- frames and motion ---------------------------------------------------------------------
 
@@ -391,20 +358,6 @@ class Contact(Guarded):
         self._placement.follow(u, u if start is None else start, self._wanders, self._settled)
         self._history.last = self._placement.carried(self._settled)
         self._history.restore()
-        self._forget_supported()
-
-    def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
-        """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
-        return self._placement.carried_by(axis, turns)
-
-    def move(self, u: fem.Function | np.ndarray) -> None:
-        """Compute gaps and slip increments for a displacement; slip counts from the last converged step.
-
-        Args:
-            u: Function on ``V``, or the array of its owned degrees of freedom; length units.
-        """
-        values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
-        self.take(**self._placement.moved(values, self.last, self.opening))
 
     def may_land(self, u: np.ndarray) -> bool:
         """Whether nodes of this rank are open at the last displacement, and there is friction if they land.
@@ -414,28 +367,8 @@ class Contact(Guarded):
         opens = (self.last.reaction[:, -1] == 0.0) & ~self.points.closed
         if self.points.local and not opens.any():
             return False
-        landing = self.last.gap[opens] > self.gap_rounding(u)
+        landing = self.last.gap[opens] > self.in_step().gap_rounding(u)
         return bool(landing.any()) and not self.friction.frictionless
-
-    @property
-    def opens(self) -> np.ndarray:
-        """Nodes that touched at the end of the last step and are open in the present state, ``shape=(n,)``, booleans."""
-        return (self.settled.reaction[:, -1] > 0.0) & (self.reaction[:, -1] == 0.0)
-
-    def before_touching(self, u: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Slips of some nodes up to where their gaps close on the way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
-        slips = self._placement.before_touching(u, self.last, self.opening)
-        return np.where(at[:, None], slips, 0.0)
-
-    @property
-    def counts_from(self) -> np.ndarray:
-        """In the step at hand, slip of nodes that land before they touch, ``shape=(n, gdim - 1)``, local frame, length."""
-        before = self._placement.now.before
-        return np.zeros_like(self.slip_increment) if before is None else before
-
-    def count_from(self, before: np.ndarray) -> None:
-        """Let slip count from where nodes have slipped by so much, ``shape=(n, gdim - 1)``, local frame."""
-        self._placement.count_from(before)
 
     @property
     def slip_before_touching(self) -> np.ndarray:
@@ -443,26 +376,17 @@ class Contact(Guarded):
 
         It does not count as slip if that changes friction.
         """
-        before = self._placement.landed_after
+        before = self._landed_after
         return np.zeros_like(self.slip_increment) if before is None else before
 
-    def gap_rounding(self, u: np.ndarray) -> float:
-        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
-        return self._placement.gap_rounding(u)
-
-    def motion_rounding(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Estimate of the rounding in each gap and slip for the displacement moved to last, see ``Placement.motion_rounding``."""
-        return self._placement.motion_rounding(u, self.present, self.last, self.opening)
-
-    def renew_gaps(self, u: np.ndarray) -> None:
-        """Let gaps of open nodes on a deformable surface be those at a displacement, not of the rows that a step used.  Collective."""
-        if self.surface.deformable and self.changes:
-            gap, points = self._placement.gap_at(u)
-            gap = np.where(
-                self.reaction[:, -1] > 0.0, self.present.gap, gap + self.opening_at(points)
-            )
-            self.take(gap=gap)
-            self._bare = points.alone
+    def with_own_gaps(self, step: ContactStep, state: State, u: np.ndarray) -> State:
+        """A state whose open nodes on a deformable surface have the gaps of a displacement, not of the rows that a step used.  Collective."""
+        if not (self.surface.deformable and self.changes):
+            return state
+        gap, points = self._placement.gap_at(u)
+        gap = gap + self.opening_at(points, step.depth)
+        self._bare = points.alone
+        return state._replace(gap=np.where(state.reaction[:, -1] > 0.0, state.gap, gap))
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
@@ -522,7 +446,9 @@ class Contact(Guarded):
         Raises:
             ValueError: ``rho`` has not been set; see ``set_metric``.
         """
-        self.respond(u, self._map(map))
+        values = (u.x.array if hasattr(u, "x") else u)[: self.points.size]
+        state = self.in_step().respond(values, self.reaction, self._map(map))
+        self.take(**state._asdict())
 
     def springs(self, map: str = "bipotential") -> np.ndarray:
         """Spring stiffnesses that match ``update``, ``shape=(n, gdim)``, local frame, force per length.
@@ -536,40 +462,6 @@ class Contact(Guarded):
         if self.rho is None:
             raise ValueError("contact.rho is not set: call contact.set_metric(K) first.")
         return BipotentialMap(self.rho) if name == "bipotential" else ReturnMap(self.rho, self.rho)
-
-    def respond(self, u: fem.Function | np.ndarray, map: NodalMap) -> None:
-        """Move to ``u``, and replace ``reaction`` and ``status`` by what a map of ``maps.py`` makes of them."""
-        self.move(u)
-        reaction, status = map(
-            self.law_of(self.law), self.reaction, self.present.gap, self.slip_increment
-        )
-        self.take(reaction=reaction, status=status)
-
-    def respond_with_derivatives(
-        self, u: fem.Function | np.ndarray, map: NodalMap
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
-
-        Returns:
-            Derivatives by the reaction before, dimensionless, and by slip and gap, force per length;
-            ``shape=(n, gdim, gdim)`` each, local frame.
-        """
-        self.move(u)
-        state = self.reaction, self.present.gap, self.slip_increment
-        reaction, status, *derivatives = map.linearised(self.law_of(self.law), *state)
-        self.take(reaction=reaction, status=status)
-        return tuple(derivatives)
-
-    def take_reaction(self, forces: np.ndarray) -> None:
-        """Take reactions from nodal forces on the body, owned degrees of freedom, global frame."""
-        reaction = self.points.reactions(forces)
-        reaction[self.points.closed] = 0.0
-        self.take(reaction=reaction)
-
-    def release(self) -> None:
-        """No reactions: all nodes open."""
-        status = np.full_like(self.status, int(Status.OPEN))
-        self.take(reaction=np.zeros_like(self.reaction), status=status)
 
     def assemble_reaction(self, b: PETSc.Vec | np.ndarray) -> None:
         """Add the nodal reactions, forces on the body, to ``b``.
@@ -594,12 +486,18 @@ class Contact(Guarded):
     def _settle_here(self) -> None:
         """The last state of the history is that of the last converged step, in the present frames."""
         self._placement.settle(self._history.sums.get(OPPOSITE))
-        self._settled, self._wearing = self._history.last, None
-        self._forget_supported()
+        self._settled = self._history.last
 
     def advance(self) -> None:
         """Accept the present state as the last converged one, from which the next slip counts."""
-        law, slip = self.friction, self.slip_kept + self.slip_increment
+        self.accept(self.in_step(), self.present)
+
+    def accept(self, step: ContactStep, state: State) -> None:
+        """Let a state in a step be the last converged one.  Collective."""
+        self._laws.take(self, step.friction)
+        self._history.take(**state._asdict())
+        self._landed_after = step.before
+        law, slip = step.friction, self.slip_kept + self.slip_increment
         sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
         pressed = np.maximum(self.last.reaction[:, -1], self.reaction[:, -1])
@@ -608,8 +506,8 @@ class Contact(Guarded):
         work, turned = self._work(slip)
         work, path, turned = (self.repeats * part for part in (work, path, turned))
         self._doubtful = float(np.abs(turned.sum(axis=1)).sum()) if self.may_turn else 0.0
-        if self._wearing is not None:
-            depth = self._wearing
+        if step.depth is not None:
+            depth = step.depth
         else:
             depth = np.zeros_like(path) if self.wear is None else self._depth(work)
         self._unloads = depth, pressed
@@ -632,33 +530,40 @@ class Contact(Guarded):
         """Whether what a step wears opens gaps in the same step; the same on all ranks but for friction per node."""
         return self.wear is not None and not self.wear.explicit
 
-    @property
-    def wearing(self) -> np.ndarray:
-        """What the step at hand wears, ``shape=(n,)``, length; nothing until a solution is looked for with it."""
-        return np.zeros(self.nodes.size) if self._wearing is None else self._wearing
-
-    def let_wear(self, depth: np.ndarray) -> None:
-        """Let the step at hand wear by so much, ``shape=(n,)``, length."""
-        self._wearing = frozen(depth)
-
-    def wear_rates(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+    def wear_rates(
+        self, step: ContactStep, state: State, u: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Depth that the slip of a state wears under the force at the start of the step, and that per normal force at its end; none of nodes that stick.
+
+        Args:
+            step: The contact in the step.
+            state: The state.
+            u: Its displacement, owned degrees of freedom; None is the last one.
 
         Returns:
             Length, and length per force, ``shape=(n,)`` each.
         """
+        if u is not None:
+            state = self.with_slip_past_edges(state, u)
         slips = (state.status != int(Status.STICK))[:, None]
         slip = slips * (self.slip_kept + state.slip_increment)
         unit = np.zeros_like(self.reaction)
         unit[:, -1] = 1.0
-        start, end, _ = (
-            2.0 * self.repeats * work for work in self._works(slip, unit)
-        )  # a half each
+        works = self._works(slip, unit, step.friction)[:2]
+        start, end = (2.0 * self.repeats * work for work in works)  # a half each
         begun = 1.0
         if self.wear.threshold:
             force = np.maximum(state.reaction[:, -1:], 0.0)
             begun = self._begun(0.5 * (start + force * end))
         return begun * self._rate(start), begun * self._rate(end)
+
+    def with_slip_past_edges(self, state: State, u: np.ndarray) -> State:
+        """A state in which nodes that have left what was opposite have slipped past its edge.  Collective between bodies."""
+        found = self._placement.slip_past_edge(u)
+        if found is None:
+            return state
+        left, slip = found
+        return state._replace(slip_increment=np.where(left[:, None], slip, state.slip_increment))
 
     @property
     def may_turn(self) -> bool:
@@ -673,7 +578,7 @@ class Contact(Guarded):
     def _work(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Frictional work of the step along each principal direction, for its slip, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         if self._laws.begun is not None:
-            start, end, turned = self._works(slip, self.reaction)
+            start, end, turned = self._works(slip, self.reaction, self.friction)
             return start + end, turned
         law, before = self.law_before, self.last.reaction
         return work_of_friction(self.friction, before, self._slipped(law), self.reaction, slip, law)
@@ -683,14 +588,16 @@ class Contact(Guarded):
         slips = self.last.status == int(Status.SLIP)
         return slipped_last(law or self.friction, self.last.reaction, slips)
 
-    def _works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _works(
+        self, slip: np.ndarray, reaction: np.ndarray, at_end: Friction
+    ) -> tuple[np.ndarray, ...]:
         """Shares of the frictional work of a step that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
         none, before = np.zeros_like(reaction), self.last.reaction
         law_before = self.law_before
         slipped = self._slipped(law_before)
-        law = self.friction if self._laws.begun is None else self._laws.begun
+        law = at_end if self._laws.begun is None else self._laws.begun
         start, turned = work_of_friction(law, before, slipped, none, slip, law_before)
-        return start, work_of_friction(self.friction, none, slipped, reaction, slip)[0], turned
+        return start, work_of_friction(at_end, none, slipped, reaction, slip)[0], turned
 
     def _rate(self, work: np.ndarray) -> np.ndarray:
         return self.wear.depth(work, self.whole_area, self._wear_field)
@@ -732,10 +639,9 @@ class Contact(Guarded):
     def restore(self) -> None:
         """Return to the last converged state, its frames and, where friction is a field, its law."""
         self._placement.restore()
-        self._history.last, self._wearing = self._settled, None
+        self._history.last = self._settled
         self._history.restore()
         self._laws.restore(self)
-        self._forget_supported()
 
     def history(self) -> tuple:
         """All that a step leaves to the next one, for ``go_back``."""
@@ -852,13 +758,13 @@ class Contact(Guarded):
 
     @property
     def opening(self) -> np.ndarray:
-        """Depth by which wear opens the gap at each node, ``shape=(n,)``: of both sides, and that of the step at hand."""
+        """Depth by which wear of both sides opens the gap at each node, ``shape=(n,)``."""
         return self.opening_at(self.points)
 
-    def opening_at(self, points: ContactPoints) -> np.ndarray:
-        """The same with nodes opposite others."""
+    def opening_at(self, points: ContactPoints, depth: np.ndarray | None = None) -> np.ndarray:
+        """The same with nodes opposite others, and what a step wears, ``shape=(n,)``."""
         own, other = self.wear_depth, self._placement.opened(points)
-        worn = own if self._wearing is None else own + self._wearing
+        worn = own if depth is None else own + depth
         return worn if other is None else worn + other
 
     @property

@@ -15,7 +15,7 @@ from scipy import sparse
 from dolfinx_contact.support.checks import STILL
 
 if TYPE_CHECKING:
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
 FREE = 1e-12
@@ -293,9 +293,9 @@ def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:
     K.assemble()
 
 
-def components(contacts: Sequence[Contact]) -> int:
+def components(contacts: Sequence[ContactStep]) -> int:
     """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
     smooth = all(contact.friction.frictionless for contact in contacts)
-    if contacts[0].V.mesh.comm.allreduce(smooth, op=MPI.LAND):
+    if contacts[0].comm.allreduce(smooth, op=MPI.LAND):
         return 1
     return contacts[0].points.dim

@@ -60,22 +60,29 @@ class Laws:
         ):  # what follows the pressure may be large without any
             warn_of_percent(friction)
         self._field, self.begun, self._rested = field, None, None
-        self._take(contact, friction)
+        self.take(contact, friction)
 
     def _evaluated(
-        self, contact: Contact, field: Friction, empty: bool = False, axes: Any = None
+        self,
+        contact: Contact,
+        field: Friction,
+        empty: bool = False,
+        axes: Any = None,
+        pressure: np.ndarray | None = None,
     ) -> Friction:
         """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
-        state = {
-            name: none if empty else getattr(contact, name) for name in _fields().followed(field)
-        }
+        names = _fields().followed(field)
+        state = {name: none if empty else getattr(contact, name) for name in names}
+        if pressure is not None:
+            state["pressure"] = pressure
         with raised_together(contact.comm):
             friction = _fields().on_nodes(contact, field, state, axes)
             check_law(contact.surface, friction, gdim, _fields().directed(field, gdim))
         return at_most_rough(friction)
 
-    def _take(self, contact: Contact, friction: Friction) -> None:
+    def take(self, contact: Contact, friction: Friction) -> None:
+        """These are the numbers at the nodes."""
         self.friction, self.kernel = friction, friction.law(contact.V.mesh.geometry.dim)
 
     @property
@@ -123,29 +130,28 @@ class Laws:
         """Whether friction follows the pressure at the end of the step."""
         return self._field is not None and "pressure" in _fields().followed(self._field)
 
-    def renew(self, contact: Contact, begin: bool = False) -> None:
-        """Let fields have their present values.  Collective.
-
-        Args:
-            contact: The contact.
-            begin: A step begins here, with frames of its own; else only what follows the pressure has changed.
-        """
-        if self._field is None or not (begin or self.follow_pressure):
+    def renew(self, contact: Contact) -> None:
+        """Let fields have their present values: a step begins here, with frames of its own.  Collective."""
+        if self._field is None:
             return
-        before = self.friction
-        friction = self._evaluated(contact, self._field, axes=None if begin else before.axes)
+        before, friction = self.friction, self._evaluated(contact, self._field)
         if not _same(friction, before):
-            self._take(contact, friction)
-        if not begin:
-            return
+            self.take(contact, friction)
         self._rested = before
         if _fields().followed(self._field):
             self.begun = self.friction
 
+    def under(self, contact: Contact, pressure: np.ndarray, before: Friction) -> Friction:
+        """The law of other pressures, ``shape=(n,)``, with the axes of the one before, or that itself if nothing changes.  Collective."""
+        if not self.follow_pressure:
+            return before
+        friction = self._evaluated(contact, self._field, axes=before.axes, pressure=pressure)
+        return before if _same(friction, before) else friction
+
     def restore(self, contact: Contact) -> None:
         """Return to the last converged state."""
         if self._rested is not None:
-            self._take(contact, self._rested)
+            self.take(contact, self._rested)
 
     def described(self, surface: Surface) -> dict[str, str]:
         """Surface and laws, but coefficients per node, in words, which have to be the same on all ranks."""
@@ -194,7 +200,7 @@ class Laws:
     def load(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> Friction:
         """Let fields have the values of the state that was saved; returns the law by which its last step was settled."""
         if self._field is not None:
-            self._take(contact, self._evaluated(contact, self._field))
+            self.take(contact, self._evaluated(contact, self._field))
         now = rows(self.friction, contact.nodes.size)
         then = saved.get("law_of_last_step", now)  # older checkpoints do not have it
         if np.array_equal(then, now):

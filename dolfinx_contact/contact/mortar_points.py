@@ -199,19 +199,16 @@ class MortarPlacement(Placement):
         gap = frozen(np.where(before.points.alone, 0.0, last.gap))
         return last._replace(displacement=moved, reaction=turned, gap=gap)
 
-    def moved(self, u: np.ndarray, last: State, worn: np.ndarray) -> dict:
-        """See ``Placement``; what is opposite nothing does not slip, but past what it has left in the step."""
-        moved, alone = super().moved(u, last, worn), self.now.points.alone
-        moved["slip_increment"][alone] = 0.0
-        if self._leaving:
-            before = self.settled
-            slip = before.points.motion(u - self._start)
-            slip[:, -1] = 0.0
-            slip = times(self.now.frame, turned_back(before.frame, slip))[:, :-1]
-            self.now.points.without_held(slip)
-            left = alone & ~before.points.alone
-            moved["slip_increment"][left] = slip[left]
-        return moved
+    def slip_past_edge(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """See ``Placement``: by the rows of the start."""
+        if not self._leaving:
+            return None
+        before, alone = self.settled, self.now.points.alone
+        slip = before.points.motion(u - self._start)
+        slip[:, -1] = 0.0
+        slip = times(self.now.frame, turned_back(before.frame, slip))[:, :-1]
+        self.now.points.without_held(slip)
+        return alone & ~before.points.alone, slip
 
     def back_to(self, at: np.ndarray | None) -> None:
         """See ``Placement``: rows of a displacement that was saved."""

@@ -18,7 +18,6 @@ import numpy as np
 
 from dolfinx_contact.contact.state import State
 from dolfinx_contact.support.attributes import frozen
-from dolfinx_contact.support.checks import EPSILON
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, composed, cross, rotation_between
 
@@ -50,7 +49,6 @@ class Placed(NamedTuple):
         np.ndarray | None
     )  # by what the way along the surface is more than its chord, (n, gdim - 1)
     ended: np.ndarray  # rotation of the surface at the end of the step
-    before: np.ndarray | None = None  # slip before nodes touch, (n, gdim - 1)
     at: np.ndarray | None = None  # displacement of a deformable surface, owned degrees of freedom
 
 
@@ -68,12 +66,10 @@ class Placement:
     Attributes:
         now: ``Placed``, of the present step.
         settled: That of the last step that converged.
-        landed_after: In that step, slip before nodes touched, ``shape=(n, gdim - 1)``; None is none.
     """
 
     now: Placed
     settled: Placed
-    landed_after: np.ndarray | None = None
 
     def __init__(
         self,
@@ -199,30 +195,7 @@ class Placement:
         if rotation is None:
             turned = surface.rotation
             rotation = turned if surface.spin is None else composed(surface.spin, turned)
-        self.landed_after = self.now.before
-        self.now = self.now._replace(ended=rotation, way=None, before=None)
-
-    def before_touching(self, u: np.ndarray, last: State, worn: np.ndarray) -> np.ndarray:
-        """Slips up to where gaps close on the straight way to a displacement, ``shape=(n, gdim - 1)``, local frame.
-
-        Args:
-            u: Displacement of owned degrees of freedom.
-            last, worn: As ``moved`` has them.
-        """
-        moved = self.moved(u, last, worn)
-        slip = moved["slip_increment"] + (0.0 if self.now.before is None else self.now.before)
-        start, gap = np.maximum(last.gap, 0.0), np.minimum(moved["gap"], 0.0)
-        return np.divide(start, start - gap, np.ones_like(gap), where=gap < 0.0)[:, None] * slip
-
-    def count_from(self, before: np.ndarray) -> None:
-        """Let slip count from where nodes have slipped by so much, ``shape=(n, gdim - 1)``, local frame."""
-        self.now = self.now._replace(before=frozen(before))
-
-    def count_as(self, other: Placed) -> None:
-        """Let slip count from where it does with other frames of the same step."""
-        if other.before is not None:
-            tangential = np.column_stack((other.before, np.zeros(len(self.x))))
-            self.count_from(times(self.now.own, turned_back(other.own, tangential))[:, :-1])
+        self.now = self.now._replace(ended=rotation, way=None)
 
     def restore(self, placed: Placed | None = None) -> None:
         """Return to the frames of the last step that converged, or to others that were kept."""
@@ -328,39 +301,9 @@ class Placement:
         gap, none = self.now.flat - moved[:, -1], np.zeros((n, gdim - 1))
         return State(-moved, np.zeros((n, gdim)), gap, none, np.zeros(n, dtype=np.uint8))
 
-    def moved(self, u: np.ndarray, last: State, worn: np.ndarray) -> dict:
-        """Gaps and slip increments for a displacement, from the last converged state on, as parts of a ``State``.
-
-        Args:
-            u: Displacement of owned degrees of freedom, length units.
-            last: The last converged state, in these frames.
-            worn: Depths, ``shape=(n,)``.
-        """
-        points, moved = self.now.points, self.surface_moved()
-        motion = points.motion(u)
-        displacement = motion - moved
-        gap = self.now.flat + worn + displacement[:, -1]
-        slip = displacement - last.displacement
-        if self.now.way is not None:
-            slip[:, :-1] += self.now.way
-        if self.now.before is not None:
-            slip[:, :-1] -= self.now.before
-        known = points.known(slip, (motion, moved, last.displacement))
-        slip = slip[:, :-1]
-        points.without_held(slip)
-        if known is not None:
-            slip += known
-        gap[points.closed] = np.maximum(gap[points.closed], self._apart)
-        return dict(displacement=displacement, gap=gap, slip_increment=slip, known=known)
-
-    def carried_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
-        """What moving the surface by one along, or turning it about an axis, moves at the nodes, local frame."""
-        if turns:
-            return times(self.now.frame, cross(axis, self.now.arms))
-        along, surface = self.now.frame @ axis, self.surface
-        if not (surface.curved or surface.spins):  # the axes are those of its frame
-            along = np.rint(along)
-        return np.broadcast_to(along, self.x.shape)
+    def slip_past_edge(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Nodes that have left what was opposite in the step, ``shape=(n,)``, and their slip, ``shape=(n, gdim - 1)``; None where nothing can be left.  Collective."""
+        return None
 
     def turned_past(self, displacement: np.ndarray) -> np.ndarray:
         """Displacements relative to the surface with what a rotation found in the step is beyond the first order."""
@@ -369,32 +312,14 @@ class Placement:
         moved = turned_back(self.now.frame, displacement) + self.of_surface()
         return times(self.now.own, ended.moved_past(self.x, moved))
 
-    def gap_rounding(self, u: np.ndarray) -> float:
-        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
-        lengths = (self.surface.point, self.surface.displacement, self.now.points.motion(u))
-        largest = max(np.abs(length).max(initial=0.0) for length in lengths)
-        return (
-            16 * np.finfo(float).eps * max(self._extent, largest)
-        )  # a rank may have the origin alone
+    def gap_rounding_of(self, largest: float) -> float:
+        """Bound of the rounding in a gap beside lengths of that size; a rank may have the origin alone."""
+        return 16 * np.finfo(float).eps * max(self._extent, largest)
 
-    def motion_rounding(self, u: np.ndarray, state: State, last: State, worn: np.ndarray) -> tuple:
-        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
-
-        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
-
-        Args:
-            u: Displacement of owned degrees of freedom, for which ``state`` was computed.
-            state, last, worn: As ``moved`` has them.
-        """
-        frame, motion = np.abs(self.now.frame), np.abs(self.of_surface())
-        felt = frame @ motion if motion.ndim == 1 else times(frame, motion)
-        terms = self.now.points.magnitudes(u) + felt
-        coordinates = max(np.abs(a).max(initial=0.0) for a in (self.x, self.surface.point))
-        gap = terms[:, -1] + coordinates + worn
-        slip = terms[:, :-1] + np.abs(last.displacement[:, :-1])
-        if state.known is None:
-            slip[self.now.points.held] = 0.0
-        return EPSILON * gap, EPSILON * slip
+    @property
+    def clear(self) -> float:
+        """Gap of nodes that cannot touch, at least."""
+        return self._apart
 
     # -- checkpoints ---------------------------------------------------------------------------
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.placement import LONGEST
 from dolfinx_contact.step.staggered import Change, Lagged
 from dolfinx_contact.support.anderson import Anderson
@@ -27,10 +26,11 @@ from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.placement import Placement
     from dolfinx_contact.contact.state import State
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
     from dolfinx_contact.surfaces.surface import Surface
 
 # How often a step is repeated with the geometry of its end.
@@ -47,44 +47,35 @@ class EndGeometry(Lagged):
     """Frames, gaps and ways: those of the displacement at which the step has ended.
 
     Args:
-        body: The body.
-        contacts: All contacts.
+        step: The step.
         tol: Largest error of the geometry.
         step_at: The step with frames of a displacement, from the step before.
     """
 
     def __init__(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        tol: float,
-        step_at: Callable[[LoadStep, np.ndarray], LoadStep],
+        self, step: LoadStep, tol: float, step_at: Callable[[LoadStep, np.ndarray], LoadStep]
     ):
-        self._body, self._contacts, self._tol, self._step_at = body, contacts, tol, step_at
-        self._ends, self._repeated = Ends(body, contacts), 0
-        self.limit = self._ends.most
+        self._tol, self._step_at = tol, step_at
+        self._ends = Ends(step.body, [contact.given for contact in step.contacts])
+        self._repeated, self.limit = 0, self._ends.most
 
-    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
-        both = [two for two in zip(self._contacts, step.stiffness) if two[0].changes]
-        if not both:
-            return Change(True, step)
-        contacts, stiffness = map(list, zip(*both))
-        refused = "" if self._repeated else too_long(self._body, contacts, found.x)
-        acting = step.carried(self._tol)
-        missed = geometry_error(self._body, contacts, stiffness, found.x, acting)
-        return Change(missed <= self._tol, step, missed, refused=refused)
+    def change(self, found: SolverResult, goal: float) -> Change:
+        state = found.state
+        if not any(contact.given.changes for contact in state.step.contacts):
+            return Change(True, state)
+        state.step.place_surfaces(state)
+        refused = "" if self._repeated else too_long(state)
+        missed = geometry_error(state, state.step.reaction_scale(state, self._tol))
+        return Change(missed <= self._tol, state, missed, refused=refused)
 
-    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
+    def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
         self._repeated += 1
-        for surface in surfaces_of(self._contacts):
+        step.place_surfaces(state)
+        for surface in surfaces_of(step.contacts):
             surface.end_step()
-        placed = [contact.placement.now for contact in self._contacts]
-        for contact in self._contacts:
-            contact.restore()
-        step = self._step_at(step, self._ends.after(found.x))
-        for contact, before in zip(self._contacts, placed):
-            contact.placement.count_as(before)
-        return step
+        for contact in step.contacts:
+            contact.given.restore()
+        return self._step_at(step, self._ends.after(state.x))
 
     def not_settled(self, change: Change) -> str:
         return undivided(change.size, self._tol, self._repeated)
@@ -128,109 +119,103 @@ class Ends:
         return self._at[: x.size]
 
 
-def geometry_error(
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    stiffness: list[NodalStiffness],
-    u: np.ndarray,
-    S: float,
-) -> float:
+def geometry_error(state: StepState, S: float) -> float:
     """Forces by which the geometry at the end of a step differs from that used, over the reactions.  Collective.
 
     Args:
-        body: The body.
-        contacts: Those whose geometry changes; in the state of ``u``.
-        stiffness: Of their nodes.
-        u: Displacement of owned degrees of freedom.
+        state: The state, with surfaces where it has them.
         S: Norm of the reactions.
     """
-    squares = np.zeros(3)
-    for contact, of in zip(contacts, stiffness):
+    body, squares = state.step.body, np.zeros(3)
+    for contact, nodes in _changing(state):
         if contact.surface.deformable:
-            missed = _missed_by_rows(contact, of, u, body.fixed)
+            missed = _missed_by_rows(contact, nodes, state.x, body.fixed)
         else:
             with raised_together(body.comm):  # the user's functions
-                missed = _missed(contact, of, u)
+                missed = _missed(contact, nodes, state.x)
         squares += [np.square(force).sum() for force in missed]
-    parts = [*np.sqrt(body.total(squares)), *_moments(body, contacts, u)]
+    parts = [*np.sqrt(body.total(squares)), *_moments(state)]
     left = float(max(parts))
     return left / S if S > 0.0 else (np.inf if left > 0.0 else 0.0)
 
 
-def _missed(contact: Contact, stiffness: NodalStiffness, u: np.ndarray) -> tuple[np.ndarray, ...]:
+def _changing(state: StepState) -> list[tuple[ContactStep, State]]:
+    """Contacts whose geometry changes in the step, with their nodes."""
+    both = zip(state.step.contacts, state.nodes)
+    return [(contact, nodes) for contact, nodes in both if contact.given.changes]
+
+
+def _missed(contact: ContactStep, state: State, u: np.ndarray) -> tuple[np.ndarray, ...]:
     """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
-    placement, r = contact.placement, contact.reaction
+    placement, r, frames = contact.given.placement, state.reaction, contact.frames
     surface, there = placement.ended_at(u)
     y = surface.relative(there)
     own, distance = surface.frames(y), surface.distance(y)
     size, friction = np.linalg.norm(r, axis=1), np.linalg.norm(r[:, :-1], axis=1)
-    turned = surface.turned(own)[..., -1, :] - contact.frame[..., -1, :]
+    turned = surface.turned(own)[..., -1, :] - frames.frame[..., -1, :]
     angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
-    way = placement.way(surface, y, own, distance, contact.settled)
-    missed = way - (0.0 if placement.now.way is None else placement.now.way)
+    way = placement.way(surface, y, own, distance, contact.given.settled)
+    missed = way - (0.0 if frames.way is None else frames.way)
     return (
-        _pressed(contact, stiffness, distance + contact.opening, contact.points.closed),
-        np.hypot(size * angle, friction * contact.axes_turned(y, own)),
-        _dragged(contact, stiffness, missed),
+        _pressed(contact, state, distance + contact.opening, contact.points.closed),
+        np.hypot(size * angle, friction * contact.given.axes_turned(y, own)),
+        _dragged(contact, state, missed),
     )
 
 
 def _missed_by_rows(
-    contact: Contact, stiffness: NodalStiffness, u: np.ndarray, fixed: np.ndarray
-) -> tuple:
+    contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
-    ended = contact.placement.ended(contact.present, u)
+    ended = contact.given.placement.ended(state, u)
     ended.forces[fixed] = 0.0
-    friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
+    friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
     came = contact.points.alone & ~ended.alone  # opposite something at the end alone
     with raised_together(contact.comm):  # the user's functions
-        turned = friction * contact.axes_turned(ended.home, ended.frame, ended.points)
+        turned = friction * contact.given.axes_turned(ended.home, ended.frame, ended.points)
     turned[ended.alone] = 0.0
+    opening = contact.given.opening_at(ended.points, contact.depth)
+    closed = contact.points.closed & ~came
     return (
-        _pressed(
-            contact,
-            stiffness,
-            ended.gap + contact.opening_at(ended.points),
-            contact.points.closed & ~came,
-        ),  # fmt: skip
+        _pressed(contact, state, ended.gap + opening, closed),
         np.append(ended.forces, turned),
-        _dragged(contact, stiffness, ended.slip),
+        _dragged(contact, state, ended.slip),
     )
 
 
 def _pressed(
-    contact: Contact, stiffness: NodalStiffness, exact: np.ndarray, closed: np.ndarray
+    contact: ContactStep, state: State, exact: np.ndarray, closed: np.ndarray
 ) -> np.ndarray:
     """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
-    presses = contact.reaction[:, -1] > 0.0
-    off = np.where(presses, np.abs(exact - contact.present.gap), np.maximum(-exact, 0.0))
+    presses = state.reaction[:, -1] > 0.0
+    off = np.where(presses, np.abs(exact - state.gap), np.maximum(-exact, 0.0))
     off[closed] = 0.0
-    return stiffness.normal * off
+    return contact.stiffness.normal * off
 
 
-def _dragged(contact: Contact, stiffness: NodalStiffness, missed: np.ndarray) -> np.ndarray:
+def _dragged(contact: ContactStep, state: State, missed: np.ndarray) -> np.ndarray:
     """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
     contact.points.without_held(missed)
-    made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, missed), axis=1)
+    made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, missed), axis=1)
     # Friction of what slips turns at most as its slip does.
-    slip = np.linalg.norm(contact.slip_increment, axis=1)
-    friction = np.linalg.norm(contact.reaction[:, :-1], axis=1)
+    slip = np.linalg.norm(state.slip_increment, axis=1)
+    friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
     length = np.linalg.norm(missed, axis=1)
     turns = np.divide(friction * length, slip, made.copy(), where=slip > 0.0)
     return np.where(friction > 0.0, np.minimum(made, turns), 0.0)
 
 
-def _moments(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> list[float]:
+def _moments(state: StepState) -> list[float]:
     """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
-    missed = []
-    for surface in surfaces_of(c for c in contacts if c.surface.spins):
+    missed, body, changing = [], state.step.body, _changing(state)
+    for surface in surfaces_of(contact for contact, _ in changing if contact.surface.spins):
         sums, arms = np.zeros(surface.rotation.size), [np.zeros(1)]
-        for contact in contacts:
+        for contact, nodes in changing:
             if contact.surface is surface:
-                _, there = contact.placement.ended_at(u)
-                used = contact.arms
+                _, there = contact.given.placement.ended_at(state.x)
+                used = contact.frames.arms
                 off = there - surface.point - surface.displacement - used
-                forces = np.einsum("ni,nij->nj", contact.reaction, contact.points.frames)
+                forces = np.einsum("ni,nij->nj", nodes.reaction, contact.points.frames)
                 turning = np.eye(sums.size)
                 sums += [(cross(axis, off) * forces).sum() for axis in turning]
                 arms.append(np.linalg.norm(used, axis=1))
@@ -240,29 +225,25 @@ def _moments(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> l
     return missed
 
 
-def too_long(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> str:
+def too_long(state: StepState) -> str:
     """Where the way of a step cannot be followed, in words; empty where it can.  Collective.
 
     The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
     opens.  Its frame must not turn by more than half a radian, about the normal either: then the way is shorter than half of the least radius, and
     the side of the surface stays.
-
-    Args:
-        body: The body.
-        contacts: Those whose geometry changes; in the state of ``u``.
-        u: Displacement of owned degrees of freedom.
     """
-    for contact in [c for c in contacts if c.surface.deformable and body.nonlinear]:
-        turned = contact.placement.twist(u)
+    body, changing = state.step.body, _changing(state)
+    for contact in [c for c, _ in changing if c.surface.deformable and body.nonlinear]:
+        turned = contact.given.placement.twist(state.x)
         if turned > LONGEST:
             return (
                 f"the step is too long: two bodies turn against each other by {turned:.2g} radians in it, {LONGEST:g} is the most. Divide the step, "
                 "or let dc.advance do so"
             )
     lost = [(2.0, "")]
-    for contact in [c for c in contacts if not c.surface.deformable]:
+    for contact, nodes in [both for both in changing if not both[0].surface.deformable]:
         with raised_together(body.comm):  # the user's functions
-            turned = _turned_on_the_way(contact, u)
+            turned = _turned_on_the_way(contact, nodes, state.x)
         some = np.flatnonzero((turned > TURNED).any(axis=0))
         if some.size:
             first = (turned > TURNED)[:, some].argmax(axis=0)
@@ -288,19 +269,19 @@ def undivided(missed: float, tol: float, repeated: int) -> str:
     )
 
 
-def _turned_on_the_way(contact: Contact, u: np.ndarray) -> np.ndarray:
+def _turned_on_the_way(contact: ContactStep, state: State, u: np.ndarray) -> np.ndarray:
     """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
-    placement = contact.placement
+    placement = contact.given.placement
     surface, there = placement.ended_at(u)
     count, dim = there.shape
     if not count:
         return np.zeros((PLACES + 1, 0))
-    y = _way(surface, placement, contact.settled, surface.relative(there))
+    y = _way(surface, placement, contact.given.settled, surface.relative(there))
     flat = y.reshape(-1, dim)
     normals, distance = _looked_at(surface, flat)
     normals, touches = normals.reshape(y.shape), distance.reshape(-1, count) < 0.0
     touches[0] |= contact.last.reaction[:, -1] > 0.0
-    touches[-1] |= contact.reaction[:, -1] > 0.0
+    touches[-1] |= state.reaction[:, -1] > 0.0
     touches[:, contact.points.closed] = False
     touched = np.logical_or.accumulate(touches)[:-1]
     opens = np.logical_or.accumulate(touches[::-1])[::-1][1:]

@@ -4,36 +4,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
-    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
+    from dolfinx_contact.surfaces.held import HeldSurfaces
 
 
 class HeldPlanes(Lagged):
     """Planes that held nodes hold: those that they cannot hold slide, in the next solution and all later ones.
 
     Args:
-        contacts: All contacts.
-        step_again: The step anew, with planes held as they are.
+        step_again: The step anew, with planes held as they are given.
     """
 
     limit = 1
 
-    def __init__(self, contacts: Sequence[Contact], step_again: Callable[[LoadStep], LoadStep]):
-        self._contacts, self._step_again, self._asked = contacts, step_again, False
+    def __init__(self, step_again: Callable[[HeldSurfaces], LoadStep]):
+        self._step_again, self._slid, self._asked = step_again, None, False
 
-    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
-        slides = not self._asked and step.holding.slide()
-        self._asked = True
-        return Change(not slides, step)
+    def change(self, found: SolverResult, goal: float) -> Change:
+        state, step = found.state, found.state.step
+        slid = None if self._asked else step.holding.slid(step.contacts, state.nodes)
+        self._slid, self._asked = slid, True
+        return Change(slid is None, state)
 
-    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
-        for contact in self._contacts:
-            contact.restore()
-        return self._step_again(step)
+    def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
+        return self._step_again(self._slid)

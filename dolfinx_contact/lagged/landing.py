@@ -15,134 +15,138 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.contact.placement import times, turned_back
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.state import State
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 
 class SlipBeforeLanding(Lagged):
-    """Slip of nodes that land, which counts from where they touch; renewed together with the geometry."""
-
-    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], tol: float):
-        self._body, self._contacts, self._tol = body, contacts, tol
-
-    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
-        late = _landing(self._body, self._contacts, step, found.x, self._tol)
-        return Change(late <= self._tol, step, late)
-
-    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
-        return step
-
-
-def _landing(
-    body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, x: np.ndarray, tol: float
-) -> float:
-    """Let slip of nodes that land count from where they touch, where that matters; how much it does.  Collective.
+    """Slip of nodes that land, which counts from where they touch; renewed together with the geometry.
 
     An estimate that is made stays for the step: friction, which answers to it, would move the next one to and fro.
 
     Args:
-        body: The body.
-        contacts: All contacts, in the state of ``x``.
-        step: The ``LoadStep``.
-        x: Displacement of owned degrees of freedom.
         tol: Part of the reactions which does not matter.
-
-    Returns:
-        The largest change of friction over the reactions; above ``tol`` the step has to be solved again.
     """
-    lands = [_opened(c, x) & (c.reaction[:, -1] > 0.0) for c in contacts]
-    new = [at & ~c.counts_from.any(axis=1) for c, at in zip(contacts, lands)]
-    slips = [contact.slip_increment for contact in contacts]
-    if _felt(body, contacts, step, slips, new, tol) <= tol:
-        return 0.0
-    without = _without(body, contacts, step, x, lands)
-    if without is None:
-        return 0.0
-    before = [contact.before_touching(without, at) for contact, at in zip(contacts, new)]
-    late = _felt(body, contacts, step, before, new, tol)
-    if late > tol:
-        for contact, slip in zip(contacts, before):
-            contact.count_from(contact.counts_from + slip)
-    return late
+
+    def __init__(self, tol: float):
+        self._tol = tol
+        self._more: list[np.ndarray] | None = None  # slip that has turned out not to count
+
+    def change(self, found: SolverResult, goal: float) -> Change:
+        state, step, self._more = found.state, found.state.step, None
+        lands = [_opened(k, state.x) & (s.reaction[:, -1] > 0.0) for k, s in zip(step.contacts, state.nodes)]  # fmt: skip
+        new = [at if k.before is None else at & ~k.before.any(axis=1) for k, at in zip(step.contacts, lands)]  # fmt: skip
+        slips = [nodes.slip_increment for nodes in state.nodes]
+        if _felt(state, slips, new, self._tol) <= self._tol:
+            return Change(True, state)
+        without = _without(state, lands)
+        if without is None:
+            return Change(True, state)
+        both = zip(step.contacts, new)
+        before = [_before_touching(contact, without, state.c, at) for contact, at in both]
+        late = _felt(state, before, new, self._tol)
+        self._more = before if late > self._tol else None
+        return Change(late <= self._tol, state, late)
+
+    def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
+        contacts = []
+        for k, (new, old) in enumerate(zip(step.contacts, state.step.contacts)):
+            before = old.before
+            if self._more is not None:
+                before = self._more[k] if before is None else before + self._more[k]
+            if before is not None:
+                tangential = np.column_stack((before, np.zeros(len(before))))
+                before = times(new.frames.own, turned_back(old.frames.own, tangential))[:, :-1]
+            contacts.append(new.but(before=before))
+        return step.with_contacts(contacts)
 
 
-def _opened(contact: Contact, x: np.ndarray) -> np.ndarray:
+def _opened(contact: ContactStep, x: np.ndarray) -> np.ndarray:
     """Nodes that were open at the start of a step, ``shape=(n,)``, booleans: what is left of gaps under reactions is none."""
     last = contact.last
     return (last.gap > contact.gap_rounding(x)) & (last.reaction[:, -1] == 0.0)
 
 
+def _before_touching(
+    contact: ContactStep, u: np.ndarray, c: np.ndarray, at: np.ndarray
+) -> np.ndarray:
+    """Slips of some nodes up to where gaps close on the straight way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
+    state = contact.at(u, c)
+    slip = state.slip_increment + (0.0 if contact.before is None else contact.before)
+    start, gap = np.maximum(contact.last.gap, 0.0), np.minimum(state.gap, 0.0)
+    part = np.divide(start, start - gap, np.ones_like(gap), where=gap < 0.0)
+    return np.where(at[:, None], part[:, None] * slip, 0.0)
+
+
 def _felt(
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    step: LoadStep,
-    slips: Sequence[np.ndarray],
-    at: Sequence[np.ndarray],
-    tol: float,
+    state: StepState, slips: Sequence[np.ndarray], at: Sequence[np.ndarray], tol: float
 ) -> float:
-    """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries."""
-    squares = 0.0
-    for contact, of, slip, here in zip(contacts, step.stiffness, slips, at):
+    """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries.  Collective."""
+    step, squares = state.step, 0.0
+    for contact, nodes, slip, here in zip(step.contacts, state.nodes, slips, at):
         slip = np.where(here[:, None], slip, 0.0)
         contact.points.without_held(slip)
-        made = np.linalg.norm(np.einsum("nij,nj->ni", of.tangential, slip), axis=1)
-        most = 2.0 * contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
+        made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, slip), axis=1)
+        most = 2.0 * contact.friction.mu.max(axis=-1) * nodes.reaction[:, -1]
         squares += np.square(np.minimum(made, most)[here]).sum()
-    size = float(np.sqrt(body.total([squares])[0]))
-    return size / step.carried(tol) if size > 0.0 else 0.0
+    size = float(np.sqrt(step.total([squares])[0]))
+    return size / step.reaction_scale(state, tol) if size > 0.0 else 0.0
 
 
-def _without(
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    step: LoadStep,
-    x: np.ndarray,
-    nodes: Sequence[np.ndarray],
-) -> np.ndarray | None:
+def _without(state: StepState, nodes: Sequence[np.ndarray]) -> np.ndarray | None:
     """The displacement with which some nodes carry nothing, and all others what they carry.  Collective.
 
     A loose body would fall: it is left where it was placed if it touched nowhere, else nothing is known.
     """
+    step, x = state.step, state.x
     if step.statics is not None:
-        gaps = np.concatenate([contact.last.gap - contact.gap_rounding(x) for contact in contacts])
-        return step.statics.start if -body.highest(-gaps) > 0.0 else None
-    forces = np.zeros(body.size)
-    for contact, at in zip(contacts, nodes):
-        contact.points.add_forces(np.where(at[:, None], contact.reaction, 0.0), forces)
-    forces[body.fixed] = 0.0
-    return x - body.solve(forces)
+        gaps = [contact.last.gap - contact.gap_rounding(x) for contact in step.contacts]
+        touched = -step.body.highest(-np.concatenate(gaps)) <= 0.0
+        return None if touched else step.statics.start
+    forces = np.zeros(step.body.size)
+    for contact, one, at in zip(step.contacts, state.nodes, nodes):
+        contact.points.add_forces(np.where(at[:, None], one.reaction, 0.0), forces)
+    forces[step.body.fixed] = 0.0
+    return x - step.body.solve(forces)
 
 
-def opening(body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, tol: float) -> None:
-    """Let the slip of nodes that have opened in the step end where they did.  Collective.
+def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> Sequence[State]:
+    """States whose nodes that have opened in the step have slipped until they did.  Collective.
 
     Args:
-        body: The body.
-        contacts: All contacts, in their state at the end.
-        step: The ``LoadStep``.
+        state: The state at the end.
+        nodes: Those of its contacts, with their final gaps.
         tol: Part of the reactions which does not matter.
     """
-    opens = [contact.opens for contact in contacts]
-    squares = [np.square(c.settled.reaction[at]).sum() for c, at in zip(contacts, opens)]
-    size = np.sqrt(body.total([sum(squares)])[0])
-    if size == 0.0 or size <= tol * step.carried(tol):
-        return
-    before = [np.where(at[:, None], c.settled.reaction, 0.0) for c, at in zip(contacts, opens)]
-    forces, points = np.zeros(body.size), [c.placement.settled.points for c in contacts]
+    step = state.step
+    opens = [contact.opened(one) for contact, one in zip(step.contacts, nodes)]
+    settled = [contact.given.settled.reaction for contact in step.contacts]
+    squares = sum(np.square(reaction[at]).sum() for reaction, at in zip(settled, opens))
+    size = np.sqrt(step.total([squares])[0])
+    if size == 0.0 or size <= tol * step.reaction_scale(state, tol):
+        return nodes
+    before = [np.where(at[:, None], reaction, 0.0) for reaction, at in zip(settled, opens)]
+    points = [contact.given.placement.settled.points for contact in step.contacts]
+    forces = np.zeros(step.body.size)
     for of, reaction in zip(points, before):
         of.add_forces(reaction, forces)
-    forces[body.fixed] = 0.0
+    forces[step.body.fixed] = 0.0
     # Of a loose body each node alone: without reactions it would fall.
-    moved = body.solve(forces) if step.statics is None else None
-    for k, (contact, of, at) in enumerate(zip(contacts, points, opens)):
-        alone = before[k][:, -1] / step.stiffness[k].normal
+    moved, found = step.body.solve(forces) if step.statics is None else None, []
+    for k, (contact, of, one) in enumerate(zip(step.contacts, points, nodes)):
+        alone = before[k][:, -1] / contact.stiffness.normal
         pressed = np.maximum(alone if moved is None else of.motion(moved)[:, -1], 0.0)
-        beside = contact.covered == 0.0  # left the other side along the surface: that is no gap
-        way = pressed + np.where(beside, 0.0, np.maximum(contact.present.gap, 0.0))
-        part = np.where(at, np.divide(pressed, way, np.ones_like(way), where=way > 0.0), 1.0)
-        contact.take(slip_increment=part[:, None] * contact.slip_increment)
+        beside = (
+            contact.given.covered == 0.0
+        )  # left the other side along the surface: that is no gap
+        way = pressed + np.where(beside, 0.0, np.maximum(one.gap, 0.0))
+        part = np.divide(pressed, way, np.ones_like(way), where=way > 0.0)
+        part = np.where(opens[k], part, 1.0)
+        found.append(one._replace(slip_increment=part[:, None] * one.slip_increment))
+    return found

@@ -24,12 +24,14 @@ import numpy as np
 
 from dolfinx_contact.step.staggered import Change, Lagged
 from dolfinx_contact.support.anderson import Anderson
+from dolfinx_contact.support.attributes import frozen
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.state import State
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Stiffness with which depths follow, over the node's own.
 STIFF = 2.0
@@ -56,41 +58,40 @@ class WearOfStep(Lagged):
     """Depths that a step wears at the nodes of its contacts; begins with the slip of the last step under its pressure.
 
     Args:
-        body: The body.
         step: The step.
         tol: By how much forces may differ for depths that are off, over the reactions: a part of the geometry's.
     """
 
     limit = 200
 
-    def __init__(self, body: ElasticBody, step: LoadStep, tol: float):
-        self._body, self._tol, self._geometry_tol = body, PART * tol, tol
-        self._contacts = [contact for contact in step.contacts if contact.wears_within]
-        self._share = STIFF * _shares(self._contacts)
-        self._anderson = Anderson(self._share.size, MIXED_DEPTHS, body.total)
+    def __init__(self, step: LoadStep, tol: float):
+        self._body, self._tol, self._geometry_tol = step.body, PART * tol, tol
+        contacts = _wearing(step)
+        self._share = STIFF * _shares([contact.given for contact in contacts])
+        self._anderson = Anderson(self._share.size, MIXED_DEPTHS, step.body.total)
         self._best, self._stale = np.inf, 0
-        self._take_stiffness(step)
-        forces = [contact.last.reaction[:, -1] for contact in self._contacts]
-        self._take(self._worn("last", forces)[0])
+        forces = [contact.last.reaction[:, -1] for contact in contacts]
+        kappa, nodes = self._stiffness(contacts), [contact.last for contact in contacts]
+        self._depth = self._worn(contacts, kappa, nodes, None, forces)[0]
 
-    def _take_stiffness(self, step: LoadStep) -> None:
+    def _stiffness(self, contacts: Sequence[ContactStep]) -> np.ndarray:
         """With which nodes resist to depths: between bodies it follows the rows."""
-        both = zip(step.contacts, step.stiffness)
-        normal = [stiffness.normal for contact, stiffness in both if contact.wears_within]
-        self._kappa = self._share * np.concatenate(normal)
+        return self._share * np.concatenate([k.stiffness.normal for k in contacts])
 
-    def restart(self) -> None:
+    def restarted(self, step: LoadStep) -> LoadStep:
         self._anderson.restart()
         self._best, self._stale = np.inf, 0
-        self._take(self._depth)
+        return self._with_depths(step)
 
-    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
-        """Whether the depths are those that the state found wears; if not, takes others to solve the step with.  Collective."""
-        self._take_stiffness(step)
-        return Change(self._settled(step.carried(self._geometry_tol)), step)
+    def change(self, found: SolverResult, goal: float) -> Change:
+        """Whether the depths are those that the state found wears; if not, finds others to solve the step with.  Collective."""
+        state = found.state
+        scale = state.step.reaction_scale(state, self._geometry_tol)
+        settled = self._settled(state, scale)
+        return Change(settled, state.of(self._with_depths(state.step)) if settled else state)
 
-    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
-        return step.with_laws_of(found.x)
+    def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
+        return self._with_depths(step).but(starts=(state.x,), motions=state.c)
 
     def not_settled(self, change: Change) -> str:
         return f"the depth that the step wears still changes after {self.limit} solutions"
@@ -98,18 +99,21 @@ class WearOfStep(Lagged):
     def said(self, solutions: int) -> str:
         return f"{solutions} times with the depth that the step wears" if solutions > 1 else ""
 
-    def _settled(self, scale: float) -> bool:
-        kappa, depth = self._kappa, self._depth
-        forces = [contact.reaction[:, -1] for contact in self._contacts]
-        gap = np.concatenate([contact.present.gap for contact in self._contacts])
-        exact, start, c = self._worn("present", forces)
+    def _settled(self, state: StepState, scale: float) -> bool:
+        some = [k for k, contact in enumerate(state.step.contacts) if contact.given.wears_within]
+        contacts = [state.step.contacts[k] for k in some]
+        nodes = [state.nodes[k] for k in some]
+        kappa, depth = self._stiffness(contacts), self._depth
+        forces = [one.reaction[:, -1] for one in nodes]
+        gap = np.concatenate([one.gap for one in nodes])
+        exact, start, c = self._worn(contacts, kappa, nodes, state.x, forces)
         pushed = np.concatenate(forces) + kappa * (depth - np.maximum(gap, 0.0))
         implicit = np.maximum((start + c * pushed) / (1.0 + c * kappa), start)
         for following in (exact, implicit):
             change = kappa * (following - depth)
             off = self._body.norm(change)
             if off <= self._tol * scale:
-                self._take(following)
+                self._depth = following
                 return True
         self._stale += 1
         if off <= FALL * self._best:
@@ -120,25 +124,42 @@ class WearOfStep(Lagged):
         elif self._stale >= 3 * PATIENCE:  # some rounds without differences are over
             self._anderson.restart()
             self._best, self._stale = off, 0
-        self._take(following)
+        self._depth = following
         return False
 
-    def _worn(self, name: str, forces: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    def _worn(
+        self,
+        contacts: Sequence[ContactStep],
+        kappa: np.ndarray,
+        nodes: Sequence[State],
+        x: np.ndarray | None,
+        forces: Sequence[np.ndarray],
+    ) -> tuple[np.ndarray, ...]:
         """Depth that the slip of a state wears under forces at the end, the part of it due to the start, and that per force at the end."""
-        rates = [contact.wear_rates(getattr(contact, name)) for contact in self._contacts]
+        both = zip(contacts, nodes)
+        rates = [contact.given.wear_rates(contact, state, x) for contact, state in both]
         start, c = map(np.concatenate, zip(*rates))
-        repeats = np.concatenate([np.full(of.nodes.size, of.repeats) for of in self._contacts])
-        z, part = c * self._kappa, START * repeats
+        repeats = np.concatenate([np.full(k.nodes.size, k.given.repeats) for k in contacts])
+        z, part = c * kappa, START * repeats
         share = np.divide(part, z, np.ones_like(z), where=z > part)
         share = np.minimum(share, np.where(repeats > 1.0, JUMP, 0.5))
         start, c = share * start, (1.0 - share) * c
         return start + c * np.concatenate(forces), start, c
 
-    def _take(self, depth: np.ndarray) -> None:
-        self._depth, first = depth, 0
-        for contact in self._contacts:
-            contact.let_wear(depth[first : first + contact.nodes.size])
-            first += contact.nodes.size
+    def _with_depths(self, step: LoadStep) -> LoadStep:
+        """The step that wears by the depths."""
+        contacts, first = list(step.contacts), 0
+        for k, contact in enumerate(contacts):
+            if contact.given.wears_within:
+                size = contact.nodes.size
+                contacts[k] = contact.but(depth=frozen(self._depth[first : first + size]))
+                first += size
+        return step.with_contacts(contacts)
+
+
+def _wearing(step: LoadStep) -> list[ContactStep]:
+    """Contacts that wear within the step."""
+    return [contact for contact in step.contacts if contact.given.wears_within]
 
 
 def _shares(contacts: Sequence[Contact]) -> np.ndarray:

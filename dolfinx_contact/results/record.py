@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.errors import Errors
+    from dolfinx_contact.step.load_step import StepState
 
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3
@@ -134,51 +135,37 @@ class NotConverged(RuntimeError):
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
-def counts(body: ElasticBody, contacts: Sequence[Contact]) -> Counts:
-    """Contact nodes open, sticking and slipping in the present state.  Collective."""
-    here = sum(np.bincount(contact.status, minlength=3) for contact in contacts)
-    return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
-
-
 def record(
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    errors: Errors,
-    found: SolverResult,
-    seconds: float,
-    geometry_error: float = 0.0,
+    state: StepState, found: SolverResult, seconds: float, geometry_error: float = 0.0
 ) -> Step:
-    """Record of the contacts' present state.  Collective.
+    """Record of a state.  Collective.
 
     Args:
-        body: The body.
-        contacts: Its contacts.
-        errors: ``Errors`` of the state.
-        found: ``SolverResult``.
+        state: The state, judged by F itself.
+        found: What the solver has found.
         seconds: That the step took on this rank.
         geometry_error: As ``Step`` has it.
     """
+    step, errors = state.step, state.errors
     gap, penetration, of_vertices = 0.0, 0.0, 0.0
-    for contact in contacts:
-        if (
-            contact.displacements.degree > 1
-            and contact.wear is None
-            and not contact.surface.deformable
-        ):
-            of_vertices = max(of_vertices, contact.penetration_between(found.x))
-        gap += contact.bipotential_gap.sum()
-        penetration = max(penetration, -contact.present.gap.min(initial=0.0))
+    for contact, nodes in zip(step.contacts, state.nodes):
+        given = contact.given
+        if given.displacements.degree > 1 and given.wear is None and not given.surface.deformable:
+            of_vertices = max(of_vertices, given.penetration_between(state.x))
+        gap += contact.bipotential_gap(nodes).sum()
+        penetration = max(penetration, -nodes.gap.min(initial=0.0))
+    largest = step.body.largest
     return Step(
         error=errors.error,
         slip_error=errors.slip_error,
         rounding=errors.rounding,
         # where nothing acts it has no scale
         forward_error=found.forward_error if errors.acts else errors.largest,
-        bipotential_gap=float(body.total(gap)),
-        penetration=body.largest(np.array([penetration])),
+        bipotential_gap=float(step.total(gap)),
+        penetration=largest(np.array([penetration])),
         iterations=found.iterations,
-        seconds=body.largest(np.array([seconds])),
-        counts=counts(body, contacts),
+        seconds=largest(np.array([seconds])),
+        counts=step.counts(state),
         solver=found.solver,
         tried=found.tried,
         contact_error=errors.of_contact(found.forward_error),

@@ -13,10 +13,7 @@ from dolfinx_contact.contact.interface import components
 from dolfinx_contact.solvers.base import ASTRAY, SolverResult
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.solvers.base import Solver
+    from dolfinx_contact.solvers.base import BoundSolver, Solver
     from dolfinx_contact.step.load_step import LoadStep
 
 
@@ -73,43 +70,52 @@ class Automatic:
 
     nonlinear = True
 
-    def bind(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        memory: dict[str, Any],
-    ):
+    def bind(self, step: LoadStep) -> BoundAutomatic:
         """See ``Solver``."""
-        return BoundAutomatic(body, contacts, stiffness, memory)
+        return BoundAutomatic(step)
 
 
 class BoundAutomatic:
-    """The candidate solvers for one body, each set up when it is first used."""
+    """The candidate solvers, each bound when it is first used."""
 
-    def __init__(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        memory: dict[str, Any],
-    ):
-        self._arguments, self._bound = (body, contacts, stiffness, memory), {}
-        if body.nonlinear:
-            self._choose_nonlinear()
+    def __init__(self, step: LoadStep):
+        self._bound: dict[Callable, BoundSolver] = {}
+        self._choose(step)
+
+    def _choose(self, step: LoadStep) -> None:
+        self._stamps, self._components = step.stamps, None
+        if step.body.nonlinear:
+            self._choose_nonlinear(step)
         else:
-            self._choose_linear()
+            self._choose_linear(step)
 
-    def _choose_nonlinear(self) -> None:
-        body, self._components = self._arguments[0], None
+    def update(self, step: LoadStep) -> None:
+        """See ``BoundSolver``; candidates are told when they are used."""
+        new, old, self._stamps = step.stamps, self._stamps, step.stamps
+        rows = new.rows != old.rows and new.step != old.step
+        if rows or new.stiffness != old.stiffness or new.parts != old.parts:
+            self._choose(step)
+            for solver in [one for one in self._bound if one is not self._solvers[0]]:
+                self._bound.pop(solver).close()  # memory counts more than time
+        elif self._components not in (None, components(step.contacts)):
+            self._choose(step)  # with friction another one may be the faster
+
+    def _candidate(self, solver: Callable, step: LoadStep) -> BoundSolver:
+        if solver in self._bound:
+            self._bound[solver].update(step)
+        else:
+            self._bound[solver] = solver().bind(step)
+        return self._bound[solver]
+
+    def _choose_nonlinear(self, step: LoadStep) -> None:
         self._solvers, self._why = [_linearised], "F is not linear in u"
-        if body.factorised and not any(c.surface.free for c in self._arguments[1]):
+        if step.body.factorised and not any(c.surface.free for c in step.contacts):
             self._solvers.insert(0, _sparse)
 
-    def _choose_linear(self) -> None:
+    def _choose_linear(self, step: LoadStep) -> None:
         from dolfinx_contact.solvers.condensed.compliance import fits
 
-        body, contacts, *_ = self._arguments
+        body, contacts = step.body, step.contacts
         nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
         self._components = components(contacts)
         unknowns = body.K.getSize()[0]
@@ -130,43 +136,23 @@ class BoundAutomatic:
         if not (enough and cheap):
             self._solvers = self._solvers[:1]
 
-    def destroy(self) -> None:
+    def close(self) -> None:
         """Free all solvers.  Collective."""
         for bound in self._bound.values():
-            bound.destroy()
+            bound.close()
 
-    def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool:
+    def solve(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
         """See ``BoundSolver``."""
-        self._arguments = (*self._arguments[:2], stiffness, self._arguments[3])
-        self._keep(lambda bound: hasattr(bound, "renew_rows") and bound.renew_rows(stiffness))
-        return bool(self._bound)
-
-    def _keep(self, valid: Callable) -> None:
-        """Of what is set up that which is still valid.  Collective."""
-        for solver in list(self._bound):
-            if not valid(self._bound[solver]):
-                self._bound.pop(solver).destroy()
-
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``."""
-        self._keep(lambda bound: bound.renew_law())
-        if self._components is None:  # nonlinear: the choice does not depend on friction
-            return True
-        return components(self._arguments[1]) == self._components
-
-    def solve(self, step: LoadStep) -> SolverResult:
-        """See ``BoundSolver``."""
-        iterations, smallest, best, start, ended = 0, np.inf, None, None, []
+        iterations, smallest, best, start, ended, kept = 0, np.inf, None, None, [], None
         solvers = self._solvers
         # For bodies held by contact alone, the fixed point quickly solves cases that take Newton's fallbacks thousands of iterations.
         brief = step.statics is not None and solvers[0] is _condensed
         for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
-            if solver not in self._bound:
-                self._bound[solver] = solver().bind(*self._arguments)
             options = {"fallbacks": False} if brief and not ended else {}
-            found = self._bound[solver].solve(step, start, **options)
+            found = self._candidate(solver, step).solve(step, starts, start, **options)
             iterations += found.iterations
-            errors = step.measure(found.x)
+            found = found._replace(state=found.state.judged)
+            errors, kept = found.state.errors, found.start or kept
             ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
             # An open state may be one that Newton's method strayed to, away from a pressed one: the fixed point decides.
@@ -177,10 +163,11 @@ class BoundAutomatic:
             if best is None or done or size < smallest:
                 smallest, best = size, found
                 # far from a solution, the state is no better than the other solver's own start
-                start = found.x if smallest <= ASTRAY else None
+                start = found.state if smallest <= ASTRAY else None
             if done:
                 break
-            if not options and step.slides():
+            if not options and step.slides(found.state):
                 break
         said = [self._why, best.reason, *(how for other, how in ended if other is not best)]
-        return best._replace(iterations=iterations, reason="; ".join(filter(None, said)))
+        said = "; ".join(filter(None, said))
+        return best._replace(iterations=iterations, reason=said, start=kept)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The interface of solvers.
 
-A solver is an object with options and a method ``bind(body, contacts, stiffness, memory)``, which returns a ``BoundSolver``.  The
-bound solver solves load steps.  It owns everything set up for the body's present stiffness, and is discarded when the stiffness changes.
+A solver is an object with options and a method ``bind(step)``, which returns a ``BoundSolver``.  The bound solver solves load steps of
+one problem.  It owns what it has set up, and is told by ``update(step)``, before each solution, what has become another one.
 """
 
 from __future__ import annotations
@@ -11,15 +11,10 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-import numpy as np
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 ASTRAY = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
 
@@ -45,40 +40,43 @@ class SolverName(str, Enum):
 
 
 class SolverResult(NamedTuple):
-    """What a solver found for a load step; the problem computes the errors and decides whether to accept it.
+    """What a solver found for a load step; the problem decides whether to accept it.
 
     Attributes:
-        x: The best displacement found, owned degrees of freedom, length units.
+        state: The best state found, of ``step.evaluate`` or ``step.measure``.
         iterations: Iterations of the solver.
         forward_error: Estimated error of the reactions, relative to the acting forces.
         solver: A ``SolverName``, or the name of your own solver.
         tried: Methods that were tried, in order, if the solver has several.
         reason: In words: why this solver was chosen, if the user did not choose, and the solver's remarks.
+        start: What the solver wants to have among the ``starts`` of later steps; None is nothing.
     """
 
-    x: np.ndarray
+    state: StepState
     iterations: int
     forward_error: float
     solver: str
     tried: tuple = ()
     reason: str = ""
+    start: Any = None
 
 
 class BoundSolver(Protocol):
-    """A solver bound to a body and its contacts."""
+    """A solver bound to the steps of a problem."""
 
-    def solve(self, step: LoadStep) -> SolverResult:
-        """Search for a displacement whose errors are at most ``step.tol``; return the best one found.  Collective."""
+    def update(self, step: LoadStep) -> None:
+        """Keep of what is set up that which is valid for a step, see ``step.stamps``.  Collective."""
 
-    def destroy(self) -> None:
+    def solve(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
+        """Search for a state whose errors are at most ``step.tol``; return the best one found.  Collective.
+
+        Args:
+            step: The step.
+            starts: What solvers have returned as ``start`` in earlier steps, at most ``KEPT``, the last one last.
+        """
+
+    def close(self) -> None:
         """Free PETSc objects.  Collective."""
-
-    # Optional; without it, the solver is bound again when friction changes:
-    # def renew_law(self) -> bool
-    #     Take the present friction of the contacts; return whether the set-up is still valid.  Collective.
-    # and when rows are renewed within a step, with the geometry of where it has ended:
-    # def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool
-    #     The same for the present contact points.  Collective.
 
 
 class Solver(Protocol):
@@ -88,22 +86,5 @@ class Solver(Protocol):
     # nonlinear = True
     #     Whether the solver handles steps whose residual is a nonlinear function of the displacement.
 
-    def bind(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        memory: dict[str, Any],
-    ) -> BoundSolver:
-        """Set up the solver for a body with its assembled stiffness.  Collective.
-
-        Args:
-            body: The body.
-            contacts: Its contacts.
-            stiffness: ``NodalStiffness`` of each contact.
-            memory: Dictionary that outlives the bound solver.  ``memory["past"]`` is a deque of at most ``KEPT`` earlier steps, the
-                starting points of the condensed solver; checkpoints contain it.
-
-        Returns:
-            A ``BoundSolver``.
-        """
+    def bind(self, step: LoadStep) -> BoundSolver:
+        """The solver for steps like this one.  Collective."""

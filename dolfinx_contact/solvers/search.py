@@ -6,15 +6,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from dolfinx_contact.law.maps import NodalMap
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations from which the convergence rate is estimated.
 WINDOW = 3
@@ -24,26 +22,29 @@ KEPT = 50
 
 
 class Search:
-    """Keeps the best iterate and decides when a search ends.
+    """Keeps the best state and decides when a search ends.
 
     Args:
         step: The ``LoadStep``.
-        x: Initial displacement, owned degrees of freedom.
+        state: Where it begins.
         max_seconds: Wall time after which the search ends, seconds.
 
     Attributes:
-        best: The iterate with the smallest errors.
+        best: The state with the smallest errors.
         nearest: That of the present attempt.
-        error: The largest error of the last iterate.
-        forward_error: Forward error of the best iterate, see docs/errors.md.
+        error: The largest error of the last state; far from the tolerance that of equilibrium alone.
+        forward_error: Forward error of the best state, see docs/errors.md.
         iterations: Iterations so far.
         left: Iterations left in the present attempt.
         over: Whether the step is solved, or time has run out.
-        statuses: Statuses of each contact in the last iterates.
+        statuses: Statuses of each contact in the last states.
+        strayed: A state without forces of a loose body that was pressed: another one may be the answer; None if none was met.
     """
 
-    def __init__(self, step: LoadStep, x: np.ndarray, max_seconds: float):
-        self.step, self.best, self.nearest = step, x, x
+    strayed: StepState | None = None
+
+    def __init__(self, step: LoadStep, state: StepState, max_seconds: float):
+        self.step, self.best, self.nearest = step, state, state
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = self._attempt = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=WINDOW + 1)
@@ -52,15 +53,15 @@ class Search:
         self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
-    def begin(self, x: np.ndarray, most: int, patience: float = math.inf) -> None:
-        """Begin an attempt at ``x`` of at most ``most`` iterations; it is lost if its smallest error does not halve within ``patience`` of them."""
+    def begin(self, state: StepState, most: int, patience: float = math.inf) -> None:
+        """Begin an attempt at a state, of at most ``most`` iterations; it is lost if its smallest error does not halve within ``patience`` of them."""
         self.left, self._lost, self._patience = most, False, patience
-        self.nearest, self._attempt, self._smallest = x, (True, np.inf), np.inf
+        self.nearest, self._attempt, self._smallest = state, (True, np.inf), np.inf
         self._halved, self._since = np.inf, self.iterations
 
     @property
     def within(self) -> bool:
-        """Whether the errors of the best iterate are at most the tolerance."""
+        """Whether the errors of the best state are at most the tolerance."""
         return not self._rank[0]
 
     @property
@@ -73,19 +74,26 @@ class Search:
         self.iterations += iterations
         self.left -= iterations
 
-    def residual(self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray) -> np.ndarray:
-        """Residual at ``x``, given the step's ``forces`` there; records the errors of ``x``."""
-        residual, errors = self.step.residual(x, maps, forces)
-        self.error, tol = errors.largest, self.step.tol
+    def see(self, state: StepState) -> StepState:
+        """Take note of a state; where its errors are at most the tolerance it is judged by F itself.  Returns it.  Collective."""
+        errors, tol = state.balance, self.step.tol
+        if not state.is_far:
+            errors = state.errors
+            if errors.within(tol):
+                state, change = state.confirmed, errors.change
+                errors = state.errors._replace(change=change)
+        self.step.tell(state)
+        self.error = errors.largest
         self._errors.append(errors.balance)
-        self.statuses.append([contact.status for contact in self.step.contacts])
+        self.statuses.append([nodes.status for nodes in state.nodes])
         change = errors.change * self._contraction()
         within = self.error <= tol  # then the forward error counts, too
         rank = (not within, max(self.error, change) if within else self.error)
-        if rank < self._rank:
-            self._rank, self.best, self.forward_error = rank, x, change
-        if rank < self._attempt:
-            self._attempt, self.nearest = rank, x
+        strays = not errors.acts and self.step.was_pressed
+        if rank < self._rank and not strays:
+            self._rank, self.best, self.forward_error = rank, state, change
+        if rank < self._attempt and not strays:
+            self._attempt, self.nearest = rank, state
         self._smallest = min(self._smallest, self.error)
         if self._smallest < 0.5 * self._halved:
             self._halved, self._since = self._smallest, self.iterations
@@ -93,8 +101,10 @@ class Search:
         solved = errors.acts and max(self.error, change) <= tol
         stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * errors.balance
         rounded = stalled and errors.within(0.0)
+        if rounded and strays:
+            self.strayed, self._lost, rounded = state, True, False
         self.over = bool(solved or rounded or self._late())
-        return residual
+        return state
 
     def _contraction(self) -> float:
         """Ratio of the remaining error to the last change, if convergence continues at its present rate."""

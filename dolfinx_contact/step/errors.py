@@ -35,8 +35,7 @@ from dolfinx_contact.contact.state import State, Status
 from dolfinx_contact.support.checks import EPSILON, ROUNDED
 
 if TYPE_CHECKING:
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.interface import NodalStiffness
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.law.friction import Friction
 
 # If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
@@ -75,17 +74,17 @@ class Errors(NamedTuple):
         return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
-def contact_defects(contact: Contact, stiffness: NodalStiffness) -> tuple[np.ndarray, ...]:
+def contact_defects(contact: ContactStep, state: State) -> tuple[np.ndarray, ...]:
     """Residual of the projection equation, penetration and defect of the slip rule, as forces.
 
     Args:
-        contact: Contact with its present reaction, gap and slip increment.
-        stiffness: Of its nodes.
+        contact: The contact.
+        state: Its reaction, gap and slip increment.
 
     Returns:
         ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
     """
-    state, law = contact.present, contact.law
+    law, stiffness = contact.law, contact.stiffness
     felt = _felt(state, contact.friction)
     projected, _ = law.bipotential_map(state.reaction, state.gap, felt, stiffness.normal)
     penetration = stiffness.normal * np.maximum(-state.gap, 0.0)
@@ -107,37 +106,20 @@ def _felt(state: State, friction: Friction) -> np.ndarray:
     return slip / np.where(sticks, np.maximum(mu, 1.0), 1.0)[:, None]
 
 
-def at_rest(contact: Contact, stiffness: NodalStiffness, unknown: float) -> np.ndarray:
-    """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
-
-    On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
-
-    Args:
-        contact: Contact with its present state.
-        stiffness: Of its nodes.
-        unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
-    """
-    slips = contact.status == int(Status.SLIP)
-    if not slips.any():
-        return slips
-    slip = contact.slip_kept + contact.slip_increment  # else what is slow would never slip
-    made = np.linalg.norm(np.einsum("nij,nj->ni", stiffness.tangential, slip), axis=1)
-    return slips & (made <= unknown) & (contact.friction.mu > 0.0).any(axis=-1)
-
-
-def contact_rounding(contact: Contact, stiffness: NodalStiffness, u: np.ndarray) -> np.ndarray:
+def contact_rounding(contact: ContactStep, state: State, u: np.ndarray) -> np.ndarray:
     """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
 
     Args:
-        contact: Contact that has been moved to ``u``.
-        stiffness: Of its nodes.
+        contact: The contact.
+        state: Its state at ``u``.
         u: Displacement of owned degrees of freedom, length units.
     """
-    normal, tangential = contact.motion_rounding(u)
+    normal, tangential = contact.motion_rounding(u, state)
+    stiffness = contact.stiffness
     stiff = np.abs(stiffness.tangential).sum(axis=2)
     mu = contact.friction.mu[..., : tangential.shape[1]]
     if (mu > 1.0).any():  # the law's residual has mu times the slip
-        slips = contact.status == int(Status.SLIP)
+        slips = state.status == int(Status.SLIP)
         normal = normal + slips * (mu * tangential).sum(axis=1)
     return np.column_stack((stiff * tangential, stiffness.normal * normal))
 

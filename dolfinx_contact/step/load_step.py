@@ -1,156 +1,120 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A load step as solvers see it: forces out of balance, their errors, and where to start."""
+"""A load step as a value: ``evaluate`` is the only way to a state, and changes nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.contact.interface import NodalStiffness
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.law.maps import NodalMap, ReturnMap
-from dolfinx_contact.results.record import WORSE, Counts, counts
-from dolfinx_contact.step.errors import (
-    Errors,
-    as_errors,
-    at_rest,
-    contact_defects,
-    contact_rounding,
-)
+from dolfinx_contact.results.record import WORSE, Counts
+from dolfinx_contact.step.errors import Errors, as_errors, contact_defects, contact_rounding
 from dolfinx_contact.support.checks import EPSILON, ROUNDED
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.shared import SharedNodes, Split
+    from dolfinx_contact.law.maps import NodalMap
     from dolfinx_contact.step.statics import Statics
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 
-def nodal_stiffness(
-    body: ElasticBody, contacts: Sequence[Contact]
-) -> tuple[list[NodalStiffness], float]:
-    """Stiffness at the nodes of each contact, and a unit of force; contacts take their ``rho``.  Collective."""
-    stiffness = [contact.nodal_stiffness(body.K) for contact in contacts]
-    for contact, of in zip(contacts, stiffness):
-        contact.rho = of.normal
-    size = body.largest(np.abs(body.displacements.x))
-    # Any unit that keeps squares within the range of double precision.
-    return stiffness, body.largest(body.cancelling(np.full(body.size, size))) or 1.0
+new_stamp = count(1).__next__  # one source, which all ranks ask alike
 
 
-def _shared_nodes(
-    contacts: Sequence[Contact], stiffness: Sequence[NodalStiffness], fixed: np.ndarray
-):
-    """The ``SharedNodes``, None where no node belongs to several contacts.  Collective."""
-    if len(contacts) < 2:
-        return None
-    from dolfinx_contact.contact.shared import shared_nodes
+class Stamps(NamedTuple):
+    """Numbers by which bound solvers see what is another one than in the step before, the same on all ranks."""
 
-    return shared_nodes(contacts, stiffness, fixed)
-
-
-def driven_surfaces(body: ElasticBody, contacts: Sequence[Contact]) -> DrivenSurfaces | None:
-    """The ``DrivenSurfaces`` of some contacts, None where force drives none.  Collective."""
-    if not any(contact.surface.motions for contact in contacts):
-        return None
-    from dolfinx_contact.surfaces.driven import DrivenSurfaces
-
-    return DrivenSurfaces(body, contacts)
+    stiffness: int = 0  # how often K was assembled
+    rows: int = 0  # of the contacts' frames
+    law: int = 0
+    parts: int = 0  # which motions of surfaces are free, and their springs
+    step: int = 0  # of the problem, not of its repetitions
 
 
-class Judged(NamedTuple):
-    """A state of a step, judged by F itself."""
-
-    x: np.ndarray  # displacement, (owned dofs,)
-    forces: np.ndarray  # -F(x)
-    states: list[State]  # of the contacts
-    surfaces: np.ndarray | None  # motions of surfaces that force drives
-    errors: Errors
-
-
-class LoadStep:
-    """Equilibrium of a body under new loads, its contacts, and the errors of a displacement.
-
-    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``law/maps.py`` for each contact.
+class Monitor:
+    """What tells the user of every iterate.
 
     Args:
+        function: Of iteration, largest error and ``Counts``.
+        comm: MPI communicator.
+    """
+
+    def __init__(self, function: Callable, comm: MPI.Comm):
+        self._function, self._comm, self._told = function, comm, 0
+
+    def tell(self, error: float, nodes: Sequence[int]) -> None:
+        """Tell the error of another iterate, and its nodes by status.  Collective."""
+        with raised_together(self._comm):
+            self._function(self._told, error, Counts(*nodes))
+        self._told += 1
+
+
+@dataclass(frozen=True, eq=False)
+class LoadStep:
+    """Equilibrium of a body under new loads with its contacts.
+
+    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``law/maps.py`` for each contact.  Motions of
+    surfaces that force drives are unknowns ``c``, ``shape=(m,)``, none of them where there are no such surfaces.
+
+    Attributes:
         body: The body, its stiffness assembled.
-        contacts: Its contacts; their reactions, gaps and statuses are those of the displacement asked for last.
-        stiffness: ``NodalStiffness`` of each contact.
+        contacts: ``ContactStep`` of each contact.
         b: ``b - K u`` are the forces out of balance for a ``u`` with the boundary values, which ``b`` holds.
         external: External forces.
         starts: Displacements near which the solution may lie.
         tol: Largest error.
         unit: Of force, any that keeps squares within the range of double precision.
-        monitor: None, or the user's function of iteration, largest error and ``Counts``.
-        holding: As the attribute.
-        last: Displacement of the last step that converged; None is the first start.
-
-    Attributes:
-        surfaces: The ``DrivenSurfaces``, None where force drives none.  They follow every displacement that is asked for.
+        last: Displacement of the last step that converged.
+        surfaces: The ``DrivenSurfaces``, None where force drives none.
         holding: ``HeldSurfaces``, None where held nodes hold none of them.
-        statics: ``Statics`` of a body that contact alone holds, else None; see ``held_by``.
-        errors: Of the state judged last.
+        statics: ``Statics`` of a body that contact alone holds, else None.
+        shared: ``SharedNodes``, None where no node belongs to several contacts.
+        monitor: None, or the ``Monitor``.
+        stamps: Numbers of what it consists of.
         continues: Whether it starts from what was found for the same step, so that tangents there are still good.
+        motions: Where the motions of surfaces begin.
     """
 
-    continues = False
-    surfaces: DrivenSurfaces | None
-    statics: Statics | None
-    errors: Errors
+    body: ElasticBody
+    contacts: tuple[ContactStep, ...]
+    b: np.ndarray
+    external: np.ndarray
+    starts: tuple[np.ndarray, ...]
+    tol: float
+    unit: float
+    last: np.ndarray
+    surfaces: DrivenSurfaces | None = None
+    holding: HeldSurfaces | None = None
+    statics: Statics | None = None
+    shared: SharedNodes | None = None
+    monitor: Monitor | None = None
+    stamps: Stamps = Stamps()
+    continues: bool = False
+    motions: np.ndarray | None = None
 
-    def __init__(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        b: np.ndarray,
-        external: np.ndarray,
-        starts: Sequence[np.ndarray],
-        tol: float,
-        unit: float,
-        monitor: Callable | None = None,
-        holding: HeldSurfaces | None = None,
-        last: np.ndarray | None = None,
-    ):
-        self.body, self.contacts, self.stiffness = body, contacts, stiffness
-        self.b, self.external, self.tol = b, external, tol
-        self.surfaces = driven_surfaces(body, contacts)
-        self._shared = _shared_nodes(contacts, stiffness, body.fixed)
-        self.statics, self.holding = None, holding
-        self._starts, self.unit, self._monitor = starts, unit, monitor
-        self.last = starts[0] if last is None else last
-        self._before, self._told = None, 0  # reactions of the state judged before, states told
-        self._contact_rounding = np.inf  # the last one, in the unit of force; none is known yet
-        self._judged: Judged | None = None  # the state judged last by F
+    def but(self, **parts: Any) -> LoadStep:
+        """The step with some things replaced."""
+        return replace(self, **parts)
 
-    @property
-    def may_slide(self) -> bool:
-        """Whether a plane, or the body, is held by contact along some direction."""
-        return self.surfaces is not None or self.statics is not None
+    def with_contacts(self, contacts: Sequence[ContactStep], **parts: Any) -> LoadStep:
+        """The step with other contacts on the same rows."""
+        return self.but(contacts=tuple(contacts), **parts)
 
-    def held_by(self, statics: Statics) -> LoadStep:
-        """The step of a body that contact alone holds, with its ``Statics``."""
-        return self._but(statics=statics)
-
-    def within(self, tol: float) -> LoadStep:
-        """The step with another tolerance."""
-        return self._but(tol=tol)
-
-    def with_laws_of(self, x: np.ndarray) -> LoadStep:
-        """The step with the laws that contacts have now, to start from a displacement; nothing is judged by them yet.  Collective."""
-        shared = _shared_nodes(self.contacts, self.stiffness, self.body.fixed)
-        return self._but(_starts=[x], _judged=None, _shared=shared)
-
-    def finer(self, tol: float, x: np.ndarray) -> LoadStep:
-        """The step with a smaller tolerance, from what was found with another one."""
-        return self._but(tol=tol, _starts=[x], continues=True)
+    def with_laws(self, contacts: Sequence[ContactStep]) -> LoadStep:
+        """The step with contacts of other laws, on all ranks."""
+        return self.with_contacts(contacts, stamps=self.stamps._replace(law=new_stamp()))
 
     def half_way(self) -> LoadStep:
         """The step with half of what its loads and boundary values change, for a start; of tolerance zero, since F itself has all of them."""
@@ -159,77 +123,179 @@ class LoadStep:
             contact.points.add_forces(contact.last.reaction, reactions)
         b = 0.5 * (self.b + self.body.multiply(last) - reactions)
         b[fixed] = 0.5 * (self.b + last)[fixed]
-        return self._but(b=b, tol=0.0, _starts=[last], _judged=None, _before=None)
+        return self.but(b=b, tol=0.0, starts=(last,))
 
-    def _but(self, **parts: Any) -> LoadStep:
-        other = copy(self)
-        vars(other).update(parts)
-        return other
+    @property
+    def may_slide(self) -> bool:
+        """Whether a plane, or the body, is held by contact along some direction."""
+        return self.surfaces is not None or self.statics is not None
 
-    def slides(self) -> bool:
-        """Whether force pushes a plane, or loads a body, by more than friction carries in the present state.  Collective."""
-        slides = self.surfaces is not None and bool(self.surfaces.beyond())
-        return slides or (self.statics is not None and self.statics.slides(self))
+    @cached_property
+    def was_pressed(self) -> bool:
+        """Whether contact alone holds the body, and did so at the end of the last step.  Collective."""
+        if self.statics is None:
+            return False
+        pressed = [contact.last.reaction[:, -1] for contact in self.contacts]
+        return self.body.largest(np.concatenate(pressed)) > 0.0
 
-    def refusal(self) -> str:
-        """Why it has not converged, in words, as far as anything tells.  Collective."""
-        said = "" if self.statics is None else self.statics.hidden(self)
-        said = said or self._no_state() or self._hard()
-        if any(contact.follows_pressure for contact in self.contacts):
-            said += "; friction follows the pressure, and was that of the last iterate"
-        if any(contact.wears_within for contact in self.contacts):
-            said += (
-                "; the depth that the step wears is part of it, and was that of the last iterate"
-            )
-        return said
+    @cached_property
+    def measuring_maps(self) -> list[NodalMap]:
+        """The maps by which states are measured."""
+        return [contact.measuring_map() for contact in self.contacts]
 
-    def _hard(self) -> str:
-        """What may help where a state should exist, in words.  Collective."""
-        from dolfinx_contact.step.stalled import slow
+    @property
+    def no_motions(self) -> np.ndarray:
+        """Where the motions of surfaces begin, zero at first."""
+        if self.motions is not None:
+            return self.motions
+        return np.zeros(0 if self.surfaces is None else self.surfaces.count)
 
-        return "; ".join(
-            filter(None, ("Smaller load steps help most often", slow(self.body, self.b)))
-        )
+    # -- states --------------------------------------------------------------------------------
 
-    def _no_state(self) -> str:
-        """Why there is no static state, in words; empty where nothing tells.  Collective."""
-        said = "" if self.statics is None else self.statics.said
+    def evaluate(
+        self,
+        x: np.ndarray,
+        maps: Sequence[NodalMap],
+        *,
+        forces: np.ndarray | None = None,
+        c: np.ndarray | None = None,
+        before: StepState | None = None,
+        near: Sequence[np.ndarray] | None = None,
+    ) -> StepState:
+        """The state of a displacement: every node has the reaction that its map makes of the one which the body asks for.  Collective.
+
+        Args:
+            x: Displacement.
+            maps: Of the contacts.
+            forces: ``forces(x)``, where they are known.
+            c: Where motions of surfaces may be; they are balanced from there.
+            before: The state before, for the change of the reactions since and what it knows of shared nodes.
+            near: Reactions of each contact that a solver knows better than the body tells, at shared nodes.
+        """
+        forces = self.forces(x) if forces is None else forces
+        return self._state(x, maps, forces, self.exact_forces, c, before, near)
+
+    def measure(
+        self,
+        x: np.ndarray,
+        *,
+        c: np.ndarray | None = None,
+        before: StepState | None = None,
+        near: Sequence[np.ndarray] | None = None,
+    ) -> StepState:
+        """The state of a displacement by F itself, with reactions by the return map.  Collective.
+
+        Beside large slip their direction is that of the slip, not that of rounding in forces.
+        """
+        return self._state(x, self.measuring_maps, self.by_form(x), True, c, before, near)
+
+    def open(self, x: np.ndarray, c: np.ndarray | None = None) -> StepState:
+        """The state of a displacement without reactions, by F itself.  Collective."""
+        c = self.no_motions if c is None else c
+        nodes = tuple(contact.at(x, c) for contact in self.contacts)
+        required = tuple(state.reaction for state in nodes)
+        return StepState(self, x, c, self.by_form(x), nodes, required, True)
+
+    def derivatives(self, state: StepState, maps: Sequence[NodalMap]) -> list[tuple]:
+        """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``.  Collective."""
+        return self._linearised(state.x, state.c, state.required, maps, state.split)[1]
+
+    def linearise(
+        self,
+        x: np.ndarray,
+        maps: Sequence[NodalMap],
+        *,
+        forces: np.ndarray,
+        c: np.ndarray | None = None,
+        before: StepState | None = None,
+    ) -> tuple[StepState, list[tuple]]:
+        """``evaluate`` and ``derivatives`` there, by one call of the law.  Collective."""
+        free = self.free(forces)
+        c, required, split = self._balanced(x, maps, free, c, before, None)
+        nodes, derivatives = self._linearised(x, c, required, maps, split)
+        exact = self.exact_forces
+        state = StepState(self, x, c, forces, nodes, required, exact, split, before)
+        return state, derivatives
+
+    def _linearised(self, x: np.ndarray, c: np.ndarray, required: Any, maps: Any, split: Any):
+        both = zip(self.contacts, required, maps)
+        found = [contact.linearised(x, reaction, map, c) for contact, reaction, map in both]
+        derivatives = [derivative for _, derivative in found]
+        if split is not None:
+            derivatives = self.shared.coupled(derivatives, split)
+        return self._with_shares(tuple(state for state, _ in found), c), derivatives
+
+    def _state(
+        self,
+        x: np.ndarray,
+        maps: Sequence[NodalMap],
+        forces: np.ndarray,
+        exact: bool,
+        c: np.ndarray | None,
+        before: StepState | None,
+        near: Sequence[np.ndarray] | None,
+    ) -> StepState:
+        c, required, split = self._balanced(x, maps, self.free(forces), c, before, near)
+        given = zip(self.contacts, required, maps)
+        nodes = tuple(contact.respond(x, reaction, map, c) for contact, reaction, map in given)
+        nodes = self._with_shares(nodes, c)
+        return StepState(self, x, c, forces, nodes, required, exact, split, before)
+
+    def _balanced(
+        self,
+        x: np.ndarray,
+        maps: Sequence[NodalMap],
+        free: np.ndarray,
+        c: np.ndarray | None,
+        before: StepState | None,
+        near: Sequence[np.ndarray] | None,
+    ) -> tuple:
+        """Motions of surfaces in balance, the reactions that the body requires of each contact, and how those of shared nodes were split."""
+        c = c if c is not None else self.no_motions if before is None else before.c
+        alone = tuple(contact.required(free) for contact in self.contacts)
+        split = None if before is None else before.split
+        if near is None and self.shared is not None:
+            near = [k.last.reaction for k in self.contacts] if before is None else [s.reaction for s in before.nodes]  # fmt: skip
+
+        def required(c: np.ndarray) -> tuple:
+            """Where nodes are shared it depends on where surfaces are."""
+            nonlocal split
+            if self.shared is None:
+                return alone
+            given = self.contacts, self.tol, x, c, -free, alone, near, split
+            found, split = self.shared.split(*given)
+            return found
+
         if self.surfaces is not None:
-            said = said or self.surfaces.beyond(True) or self.surfaces.beyond()
-            if not said and self.statics is not None:
-                from dolfinx_contact.surfaces.sliding import nothing_holds
+            c = self.surfaces.balanced(self.contacts, x, c, maps, required)
+        return c, required(c), split
 
-                said = nothing_holds(self.contacts)
-        return said
+    def _with_shares(self, nodes: tuple[State, ...], c: np.ndarray) -> tuple[State, ...]:
+        """The states with what held nodes carry of the planes that they hold."""
+        return nodes if self.holding is None else self.holding.shared(self.contacts, nodes)
 
-    def total(self, array: Any) -> np.ndarray:
-        """Sum of an array over all ranks."""
-        return self.body.total(array)
-
-    def start(self) -> np.ndarray:
-        """The start with the smallest error, by the return map: the paper's takes extrapolations for worse than they are."""
-        guesses = [start.copy() for start in self._starts]
-        if self.statics is not None:
-            # a body that was placed begins there, or where this step has ended before
-            away = self.statics.placed and len(guesses) > 1
-            guesses = [*([] if away else guesses), self.statics.start.copy()]
-        for guess in guesses:
-            guess[self.body.fixed] = self.b[self.body.fixed]
-        maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
-        best = min(guesses, key=lambda guess: self._imbalance(guess, maps))
-        self._before = None
-        return best
-
-    def _imbalance(self, x: np.ndarray, maps: Sequence[NodalMap]) -> float:
-        """The error of equilibrium alone.  Collective."""
-        left = self.out_of_balance(x, maps)
-        return self._as_errors(x, self._balance(left, x, self.body.support_forces(x))).error
+    def place_surfaces(self, state: StepState) -> None:
+        """Move the surfaces that force drives to where a state has them."""
+        if self.surfaces is not None:
+            self.surfaces.place(state.c)
 
     # -- forces --------------------------------------------------------------------------------
+
+    exact_forces = False  # whether ``forces`` are those of F itself
 
     def forces(self, x: np.ndarray) -> np.ndarray:
         """``b - K x``."""
         return self.b - self.body.multiply(x)
+
+    def by_form(self, x: np.ndarray) -> np.ndarray:
+        """``-F(x)``, by which errors are measured."""
+        return -self.body.residual(x)
+
+    def supports(self, state: StepState) -> np.ndarray:
+        """What supports carry, at fixed degrees of freedom."""
+        if state.exact:
+            return -state.forces[self.body.fixed]
+        return self.body.support_forces(state.x)
 
     def free(self, forces: np.ndarray) -> np.ndarray:
         """Forces without what supports carry."""
@@ -251,250 +317,281 @@ class LoadStep:
         """Norm of forces at free degrees of freedom."""
         return self.body.norm(self.free(forces))
 
-    def out_of_balance(
-        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Forces that are left once every contact node has its new reaction, ``b - K x + B^T R(K x - b, x)``.
-
-        Args:
-            x: Displacement.
-            maps: Of the contacts.
-            forces: ``forces(x)``, where they are known; so with the other methods.
-        """
-        forces = self.free(self.forces(x) if forces is None else forces)
-        self._respond(x, forces, maps)
-        return self.with_reactions(forces)
-
-    def derivatives(
-        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
-    ) -> list[tuple]:
-        """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``."""
-        forces = self.free(self.forces(x) if forces is None else forces)
-        self._balance_surfaces(x, forces, maps)
-        both = zip(self._asked(x, forces), maps)
-        derivatives = [contact.respond_with_derivatives(x, map) for contact, map in both]
-        return derivatives if self._shared is None else self._shared.coupled(derivatives)
-
-    # -- errors --------------------------------------------------------------------------------
-
-    @property
-    def scale(self) -> float:
-        """Forces that act in the state judged last."""
-        return self.errors.scale * self.unit
-
-    def carried(self, tol: float) -> float:
-        """What forces are held against of which a part ``tol`` does not matter: the reactions of that state.
-
-        Beside stiff springs they may be so small that it is told; then what the errors leave unknown does not matter either.
-        """
-        errors = self.errors
-        unknown = max(errors.largest, ROUNDED * errors.rounding)
-        told = unknown > WORSE * self.tol * errors.share
-        return self.scale * max(errors.share, unknown / tol if told else 0.0)
-
-    def rest(self) -> None:
-        """Call sticking what slips by less than is unknown of the state judged last, or than the tolerance of its reactions."""
-        errors = self.errors
-        unknown = max(self.tol * errors.share, errors.largest, ROUNDED * errors.rounding)
-        unknown *= errors.scale * self.unit
-        for contact, stiffness in zip(self.contacts, self.stiffness):
-            still = at_rest(contact, stiffness, unknown)
-            if still.any():
-                contact.take(status=np.where(still, int(Status.STICK), contact.status).astype(np.uint8))  # fmt: skip
-
-    def residual(
-        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
-    ) -> tuple[np.ndarray, Errors]:
-        """``out_of_balance`` and the errors of the state.
-
-        The reactions that enter the predictor are those the body asks for, ``K x - b``.  Far from the tolerance the errors are
-        those of equilibrium alone, which costs no other call of the law.  Once they fall below the tolerance they are measured
-        again with F itself, assembled by DOLFINx.
-        """
-        left = self.out_of_balance(x, maps, forces)
-        self._left = self._balance(left, x, self.body.support_forces(x))
-        self.errors = self._as_errors(x, self._left)
-        if not self._is_far(self.errors):
-            contacts = self._at_contacts(x)
-            self.errors = self._as_errors(x, self._left, contacts)
-            if self.errors.within(self.tol):
-                self._judge(x, self.by_form(x), contacts, self.errors.change)
-        self._tell()
-        return left, self.errors
-
-    def errors_in_full(self, x: np.ndarray) -> Errors:
-        """The errors of the displacement that ``residual`` was asked for last, those of the law included.  Collective."""
-        if self._is_far(self.errors):
-            self.errors = self._as_errors(x, self._left, self._at_contacts(x))
-        return self.errors
-
-    def measure(self, x: np.ndarray) -> Errors:
-        """Errors of a displacement by F itself; also takes its reactions, gaps and slips, see ``judged``."""
-        return self.judged(x).errors
-
-    def judged(self, x: np.ndarray) -> Judged:
-        """The state of a displacement, judged by F itself; contacts and surfaces are in that state then.  Collective.
-
-        Reactions by the return map: beside large slip their direction is that of the slip, not that of rounding in forces.
-        """
-        if not self._is_judged(x):
-            forces = self.by_form(x)
-            maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
-            self._respond(x, self.free(forces), maps)
-            self._judge(x, forces)
-            self._tell()
-        elif self.surfaces is not None:  # where they were judged
-            self.surfaces.move_to(self._judged.surfaces)
-        self.errors = self._judged.errors
-        return self._judged
-
-    def by_form(self, x: np.ndarray) -> np.ndarray:
-        """``-F(x)``, by which errors are measured."""
-        return -self.body.residual(x)
-
-    def _is_judged(self, x: np.ndarray) -> bool:
-        """Whether the state judged last is that of ``x``, and contacts are in it.  Collective."""
-        last = self._judged
-        if last is None:
-            return False
-        both = zip(self.contacts, last.states)
-        stand = all(same_states(contact.present, state) for contact, state in both)
-        return self.body.same(x, last.x if stand else None)  # asked on all ranks
-
-    def measure_open(self, x: np.ndarray) -> Errors:
-        """Errors of a displacement without reactions."""
-        for contact in self.contacts:
-            contact.move(x)
-            contact.release()
-        self._judge(x, self.by_form(x))
-        return self.errors
-
-    @property
-    def monitored(self) -> bool:
-        """Whether the user wants to be told."""
-        return self._monitor is not None
-
-    def tell(self, error: float, nodes: Sequence[int]) -> None:
-        """Tell the user's monitor the error of another iterate, and its nodes by status.  Collective."""
-        with raised_together(self.body.comm):
-            self._monitor(self._told, error, Counts(*nodes))
-        self._told += 1
-
-    def _tell(self) -> None:
-        """Tell the errors of another state of the body."""
-        if self.monitored:
-            self.tell(self.errors.largest, counts(self.body, self.contacts))
-
-    def _asked(self, x: np.ndarray, forces: np.ndarray):
-        """The contacts, each with the reactions that balance the forces at its nodes, of shared ones with its own part."""
-        if self._shared is not None:
-            self._shared.split(x, -forces, self.tol)
-        for k, contact in enumerate(self.contacts):
-            contact.take_reaction(-forces)
-            if self._shared is not None:
-                self._shared.give(k)
-            yield contact
-
-    def _balance_surfaces(
-        self, x: np.ndarray, forces: np.ndarray, maps: Sequence[NodalMap]
-    ) -> None:
-        if self.surfaces is not None:
-            self.surfaces.balance(x, maps, lambda: self._asked(x, forces))
-
-    def _respond(self, x: np.ndarray, forces: np.ndarray, maps: Sequence[NodalMap]) -> None:
-        """Give contacts the reactions that maps make of those which balance the forces."""
-        self._balance_surfaces(x, forces, maps)
-        for contact, map in zip(self._asked(x, forces), maps):
-            contact.respond(x, map)
-        if self.holding is not None:
-            self.holding.share()
-
-    def with_reactions(self, forces: np.ndarray) -> np.ndarray:
-        """Forces plus the contacts' present reactions."""
+    def with_reactions(self, forces: np.ndarray, nodes: Sequence[State]) -> np.ndarray:
+        """Forces plus the reactions of states of the contacts."""
         forces = forces.copy()
-        for contact in self.contacts:
-            contact.assemble_reaction(forces)
+        for contact, state in zip(self.contacts, nodes):
+            contact.points.add_forces(state.reaction, forces)
         return forces
 
-    def _judge(
-        self,
-        x: np.ndarray,
-        forces: np.ndarray,
-        contacts: np.ndarray | None = None,
-        change: float | None = None,
-    ) -> None:
-        """Errors of the contacts' present state, ``forces = -F(x)``; with sums at the contacts and a change that are known."""
-        balance = self._balance(self.with_reactions(forces), x, -forces[self.body.fixed])
-        contacts = self._at_contacts(x) if contacts is None else contacts
-        errors = self._as_errors(x, balance, contacts)
-        self.errors = errors if change is None else errors._replace(change=change)
-        moved = None if self.surfaces is None else self.surfaces.moved
-        states = [contact.present for contact in self.contacts]
-        self._judged = Judged(x.copy(), forces, states, moved, self.errors)
+    def total(self, array: Any) -> np.ndarray:
+        """Sum of an array over all ranks."""
+        return self.body.total(array)
 
-    def _balance(self, left: np.ndarray, x: np.ndarray, supports: np.ndarray) -> np.ndarray:
-        """Sums of squares of what balances in the contacts' present state, ``shape=(6,)``, see ``as_errors``.  Collective.
+    # -- where to start ------------------------------------------------------------------------
 
-        Args:
-            left: Forces out of balance, ``f - F(u) + r``; at fixed degrees of freedom they do not count.
-            x: Displacement.
-            supports: What the supports carry, at fixed degrees of freedom.
-        """
-        left, acting = self.free(left), np.abs(self.external)
-        left += self.body.cancelling(self.missing(x))
-        for contact in self.contacts:
-            contact.points.add_magnitudes(contact.reaction, acting)
-        reaction = np.concatenate([np.zeros(0), *(c.reaction.ravel() for c in self.contacts)])
-        # Where contacts share a node only the sum is the state's; how they share it may jump.
-        acts = reaction if self._shared is None else self.free(self.with_reactions(0.0 * left))
-        before, self._before = self._before, acts
-        change = np.full(1, np.inf) if before is None else acts - before
-        cancelling = EPSILON * (self.body.cancelling(x) + acting)
-        if self.surfaces is not None:
-            on_surfaces, terms = self.surfaces.left()
-            mine = slice(None if self.body.comm.rank == 0 else 0)  # they are the same on all ranks
-            left = np.append(left, on_surfaces[mine])
-            cancelling = np.append(cancelling, EPSILON * terms[mine])
-        return self._sums(left, reaction, self.external, supports, cancelling, change)
+    def start(self) -> StepState:
+        """The start with the smallest imbalance, by the return map: the paper's takes extrapolations for worse than they are.  Collective."""
+        guesses = [start.copy() for start in self.starts]
+        if self.statics is not None:
+            # a body that was placed begins there, or where this step has ended before
+            away = self.statics.placed and len(guesses) > 1
+            guesses = [*([] if away else guesses), self.statics.start.copy()]
+        for guess in guesses:
+            guess[self.body.fixed] = self.b[self.body.fixed]
+        states = [self.evaluate(guess, self.measuring_maps) for guess in guesses]
+        # errors of states without forces are not relative to any
+        strays = [self.was_pressed and not state.balance.acts for state in states]
+        return min(zip(strays, states), key=lambda both: (both[0], both[1].balance.error))[1]
 
-    def _at_contacts(self, x: np.ndarray) -> np.ndarray:
-        """Sums of squares of what is left of the law in the contacts' present state, ``shape=(4,)``, see ``as_errors``.  Collective."""
-        columns = [[np.zeros(0)] for _ in range(4)]
-        for contact, stiffness in zip(self.contacts, self.stiffness):
-            parts = (*contact_defects(contact, stiffness), contact_rounding(contact, stiffness, x))
-            for column, part in zip(columns, parts):
-                column.append(part.ravel())
-        sums = self._sums(*map(np.concatenate, columns))
-        self._contact_rounding = float(np.sqrt(sums[-1]))
-        return sums
+    # -- what is said of a state ---------------------------------------------------------------
 
-    def _sums(self, *parts: np.ndarray) -> np.ndarray:
-        """Sums of squares over all ranks, in the unit of force.  Collective."""
-        return self.total([np.square(part / self.unit).sum() for part in parts])
-
-    def _is_far(self, errors: Errors) -> bool:
-        """Whether equilibrium alone tells that a state is no solution, whatever the law adds, known rounding at the contacts allowed for."""
-        known = self._contact_rounding / errors.scale if errors.scale > 0.0 else np.inf
-        return not errors._replace(rounding=max(errors.rounding, known)).within(self.tol)
-
-    def _as_errors(
-        self, x: np.ndarray, balance: np.ndarray, contacts: np.ndarray | None = None
-    ) -> Errors:
-        """Errors of a displacement from both kinds of sums; without those of the contacts they are smaller.  Collective."""
-        errors = as_errors(balance, contacts)
-        lost = errors.blind and self.may_slide and self._is_lost(x, errors.acts)
+    def errors_of(self, state: StepState, contacts: np.ndarray | None) -> Errors:
+        """Errors from sums of balance and, where they are asked for, of the contacts.  Collective."""
+        errors = as_errors(state.balance_sums, contacts)
+        lost = errors.blind and self.may_slide and self._is_lost(state, errors.acts)
         return errors._replace(error=np.inf) if lost else errors
 
-    def _is_lost(self, x: np.ndarray, acts: bool) -> bool:
+    def _is_lost(self, state: StepState, acts: bool) -> bool:
         """See ``lost_far_away``.  Collective."""
         from dolfinx_contact.surfaces.sliding import lost_far_away
 
-        return lost_far_away(self.body, self.statics, self.surfaces, x, acts)
+        return lost_far_away(self, state, acts)
+
+    def balance_sums_of(self, state: StepState) -> np.ndarray:
+        """Sums of squares of what balances in a state, ``shape=(6,)``, see ``as_errors``.  Collective."""
+        body, x = self.body, state.x
+        left, acting = state.residual + body.cancelling(self.missing(x)), np.abs(self.external)
+        for contact, nodes in zip(self.contacts, state.nodes):
+            contact.points.add_magnitudes(nodes.reaction, acting)
+        change = np.full(1, np.inf) if state.acts_before is None else state.acts - state.acts_before
+        cancelling = EPSILON * (body.cancelling(x) + acting)
+        if self.surfaces is not None:
+            on_surfaces, terms = self.surfaces.left(state.nodes, state.c)
+            mine = slice(None if body.comm.rank == 0 else 0)  # they are the same on all ranks
+            left = np.append(left, on_surfaces[mine])
+            cancelling = np.append(cancelling, EPSILON * terms[mine])
+        supports = self.supports(state)
+        return self.sums(left, state.reactions, self.external, supports, cancelling, change)
+
+    def contact_sums_of(self, state: StepState) -> np.ndarray:
+        """Sums of squares of what is left of the law in a state, ``shape=(4,)``, see ``as_errors``.  Collective."""
+        columns = [[np.zeros(0)] for _ in range(4)]
+        for contact, nodes in zip(self.contacts, state.nodes):
+            rounding = contact_rounding(contact, nodes, state.x)
+            for column, part in zip(columns, (*contact_defects(contact, nodes), rounding)):
+                column.append(part.ravel())
+        return self.sums(*map(np.concatenate, columns))
+
+    def sums(self, *parts: np.ndarray) -> np.ndarray:
+        """Sums of squares over all ranks, in the unit of force.  Collective."""
+        return self.total([np.square(part / self.unit).sum() for part in parts])
+
+    def scale(self, state: StepState) -> float:
+        """Forces that act in a state."""
+        return state.errors.scale * self.unit
+
+    def reaction_scale(self, state: StepState, tol: float) -> float:
+        """What forces are held against of which a part ``tol`` does not matter: the reactions of a state.
+
+        Beside stiff springs they may be so small that it is told; then what the errors leave unknown does not matter either.
+        """
+        errors = state.errors
+        unknown = max(errors.largest, ROUNDED * errors.rounding)
+        told = unknown > WORSE * self.tol * errors.share
+        return self.scale(state) * max(errors.share, unknown / tol if told else 0.0)
+
+    def with_small_slip_as_stick(self, state: StepState) -> StepState:
+        """A state whose nodes stick that slip by less than is unknown of it, or than the tolerance of its reactions."""
+        errors = state.errors
+        unknown = max(self.tol * errors.share, errors.largest, ROUNDED * errors.rounding)
+        unknown *= self.scale(state)
+        nodes = []
+        for contact, one in zip(self.contacts, state.nodes):
+            status = np.where(contact.still(one, unknown), int(Status.STICK), one.status)
+            nodes.append(one._replace(status=status.astype(np.uint8)))
+        return state.with_nodes(nodes)
+
+    def slides(self, state: StepState) -> bool:
+        """Whether force pushes a plane, or loads a body, by more than friction carries in a state.  Collective."""
+        return self.pushed_off(state) or (self.statics is not None and self.statics.slides(state))
+
+    def pushed_off(self, state: StepState) -> bool:
+        """Whether force pushes a plane by more than friction carries in a state.  Collective."""
+        return self.surfaces is not None and bool(
+            self.surfaces.beyond(self.contacts, state.nodes, state.c)
+        )
+
+    def refusal(self, state: StepState) -> str:
+        """Why it has not converged, in words, as far as anything tells.  Collective."""
+        said = "" if self.statics is None else self.statics.hidden(self)
+        said = said or self._no_state(state) or self._hard()
+        if any(contact.given.follows_pressure for contact in self.contacts):
+            said += "; friction follows the pressure, and was that of the last iterate"
+        if any(contact.given.wears_within for contact in self.contacts):
+            said += (
+                "; the depth that the step wears is part of it, and was that of the last iterate"
+            )
+        return said
+
+    def _hard(self) -> str:
+        """What may help where a state should exist, in words.  Collective."""
+        from dolfinx_contact.step.stalled import slow
+
+        return "; ".join(
+            filter(None, ("Smaller load steps help most often", slow(self.body, self.b)))
+        )
+
+    def _no_state(self, state: StepState) -> str:
+        """Why there is no static state, in words; empty where nothing tells.  Collective."""
+        said = "" if self.statics is None else self.statics.said
+        if self.surfaces is not None:
+            said = said or self.surfaces.beyond(self.contacts, state.nodes, state.c, given=True)
+            said = said or self.surfaces.beyond(self.contacts, state.nodes, state.c)
+            if not said and self.statics is not None:
+                from dolfinx_contact.surfaces.sliding import nothing_holds
+
+                said = nothing_holds(self.contacts)
+        return said
+
+    def counts(self, state: StepState) -> Counts:
+        """Contact nodes open, sticking and slipping.  Collective."""
+        here = sum(np.bincount(nodes.status, minlength=3) for nodes in state.nodes)
+        return Counts(*(int(count) for count in self.total(here + np.zeros(3))))
+
+    def tell(self, state: StepState) -> None:
+        """Tell the user of a state of the body, if that is wanted.  Collective."""
+        if self.monitor is not None:
+            known = state.balance if state.is_far else state.errors
+            self.monitor.tell(known.largest, self.counts(state))
 
 
-def same_states(one: State, other: State) -> bool:
-    """Whether two states of a contact have the same values."""
-    return one is other or all(
-        a is b or (a is not None and b is not None and np.array_equal(a, b, equal_nan=True))
-        for a, b in zip(one, other)
-    )
+@dataclass(frozen=True, eq=False)
+class StepState:
+    """A displacement in a step, and all that follows from it: ``LoadStep.evaluate`` makes it.
+
+    What is lazy is computed when it is first asked for, on all ranks together.
+
+    Attributes:
+        step: The step.
+        x: Displacement.
+        c: Motions of surfaces that force drives.
+        forces: ``b - K x`` or ``-F(x)``, with what supports carry.
+        nodes: ``State`` of each contact.
+        required: Reactions that the body requires of each contact, from which maps have made those of ``nodes``.
+        exact: Whether ``forces`` are those of F itself.
+        split: How reactions of shared nodes were split.
+    """
+
+    step: LoadStep = field(repr=False)
+    x: np.ndarray
+    c: np.ndarray
+    forces: np.ndarray
+    nodes: tuple[State, ...]
+    required: tuple[np.ndarray, ...]
+    exact: bool
+    split: Split | None = field(default=None, repr=False)
+    before: Any = field(default=None, repr=False)
+    is_start: bool = False
+
+    def __post_init__(self) -> None:
+        # Of the state before, its reactions and what is known of rounding: not that state itself, and all before it.
+        before = self.before
+        if isinstance(before, StepState):
+            acts = None if before.is_start else before.acts
+            object.__setattr__(self, "before", (acts, before.contact_rounding))
+
+    @property
+    def as_start(self) -> StepState:
+        """The same as a start: of the next state it is not known by how much reactions have changed."""
+        return replace(self, is_start=True)
+
+    @property
+    def acts_before(self) -> np.ndarray | None:
+        """``acts`` of the state before."""
+        return None if self.before is None else self.before[0]
+
+    @property
+    def contact_rounding(self) -> float:
+        """Rounding at the contacts, in the unit of force, as far as any state has told; else infinite."""
+        if "contact_sums" in vars(self):
+            return float(np.sqrt(self.contact_sums[-1]))
+        return np.inf if self.before is None else self.before[1]
+
+    @cached_property
+    def reactions(self) -> np.ndarray:
+        """Reactions of all contacts, flat."""
+        return np.concatenate([np.zeros(0), *(nodes.reaction.ravel() for nodes in self.nodes)])
+
+    @cached_property
+    def acts(self) -> np.ndarray:
+        """Reactions of which a change counts: where contacts share a node their sum alone, how they share it may jump."""
+        if self.step.shared is None:
+            return self.reactions
+        return self.step.free(self.step.with_reactions(0.0 * self.x, self.nodes))
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """Forces that are left once every contact node has its new reaction, zero at fixed degrees of freedom."""
+        return self.step.free(self.step.with_reactions(self.forces, self.nodes))
+
+    @cached_property
+    def balance_sums(self) -> np.ndarray:
+        """See ``LoadStep.balance_sums_of``."""
+        return self.step.balance_sums_of(self)
+
+    @cached_property
+    def contact_sums(self) -> np.ndarray:
+        """See ``LoadStep.contact_sums_of``."""
+        return self.step.contact_sums_of(self)
+
+    @cached_property
+    def balance(self) -> Errors:
+        """Errors of equilibrium alone, which take no other call of the law.  Collective."""
+        return self.step.errors_of(self, None)
+
+    @cached_property
+    def errors(self) -> Errors:
+        """All errors.  Collective."""
+        return self.step.errors_of(self, self.contact_sums)
+
+    @cached_property
+    def is_far(self) -> bool:
+        """Whether equilibrium alone tells that the state is no solution, whatever the law adds, known rounding at the contacts allowed for.  Collective."""
+        errors = self.balance
+        known = self.contact_rounding / errors.scale if errors.scale > 0.0 else np.inf
+        errors = errors._replace(rounding=max(errors.rounding, known))
+        return not errors.within(self.step.tol)
+
+    @property
+    def within(self) -> bool:
+        """Whether its errors are at most the tolerance of the step.  Collective."""
+        return self.errors.within(self.step.tol)
+
+    @cached_property
+    def confirmed(self) -> StepState:
+        """The same state with forces of F itself, by which it is judged.  Collective."""
+        if self.exact:
+            return self
+        state = replace(self, forces=self.step.by_form(self.x), exact=True)
+        vars(state)["contact_sums"] = self.contact_sums  # of the same nodes
+        return state
+
+    @cached_property
+    def judged(self) -> StepState:
+        """The state by F itself: with its reactions where it is a solution, else with those of the return map.  Collective."""
+        if self.exact or (not self.is_far and self.within):
+            return self.confirmed
+        return self.step.measure(self.x, c=self.c, before=self)
+
+    def of(self, step: LoadStep) -> StepState:
+        """The same state in a step that differs from its own by less than counts; errors stay."""
+        state = replace(self, step=step)
+        vars(state)["errors"] = self.errors
+        return state
+
+    def with_nodes(self, nodes: Sequence[State]) -> StepState:
+        """The same displacement with other states of the nodes; errors stay those of this state."""
+        state = replace(self, nodes=tuple(nodes))
+        vars(state)["errors"] = self.errors
+        return state

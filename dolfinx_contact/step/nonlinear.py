@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.law.maps import NodalMap, ReturnMap
-from dolfinx_contact.step.errors import Errors
-from dolfinx_contact.step.load_step import LoadStep
+from dolfinx_contact.step.load_step import LoadStep, StepState
+
+if TYPE_CHECKING:
+    from dolfinx_contact.step.errors import Errors
 
 
 class NonlinearStep(LoadStep):
@@ -20,43 +21,35 @@ class NonlinearStep(LoadStep):
     tangent at the last converged displacement.
     """
 
-    def start(self) -> np.ndarray:
+    exact_forces = True
+
+    def start(self) -> StepState:
         """The start from which the least is missing, as forces of the linearised body; with boundary values of its own."""
-        maps = [ReturnMap(of.normal, of.normal) for of in self.stiffness]
         sizes, different = [], []
-        for guess in self._starts:
-            if any(self.body.same(guess, other) for other in different):
+        for guess in self.starts:
+            if any(self.body.same(guess, other.x) for other in different):
                 continue
-            left = self.out_of_balance(guess, maps) - self.body.carried(self.missing(guess))
-            sizes.append(self.size(left))
-            different.append(guess)
+            state = self.evaluate(guess, self.measuring_maps)
+            left = self.with_reactions(state.forces, state.nodes)
+            sizes.append(self.size(left - self.body.carried(self.missing(guess))))
+            different.append(state)
         return different[int(np.argmin(np.nan_to_num(sizes, nan=np.inf)))]
 
     def forces(self, x: np.ndarray) -> np.ndarray:
         """``-F(x)``; at fixed degrees of freedom what supports carry."""
         return self.by_form(x)
 
-    def residual(
-        self, x: np.ndarray, maps: Sequence[NodalMap], forces: np.ndarray | None = None
-    ) -> tuple[np.ndarray, Errors]:
-        """``out_of_balance`` and the errors of the state."""
-        forces = self.forces(x) if forces is None else forces
-        left = self.out_of_balance(x, maps, forces)
-        self._judge(x, forces)
-        self._tell()
-        return left, self.errors
-
-    def _as_errors(
-        self, x: np.ndarray, balance: np.ndarray, contacts: np.ndarray | None = None
-    ) -> Errors:
-        errors = super()._as_errors(x, balance, contacts)
-        return errors if self.held(x) else errors._replace(error=np.inf)
+    def errors_of(self, state: StepState, contacts: np.ndarray | None) -> Errors:
+        """See ``LoadStep``; infinite where supports are not where they should be."""
+        errors = super().errors_of(state, contacts)
+        return errors if self.held(state.x) else errors._replace(error=np.inf)
 
 
 class LinearisedStep(LoadStep):
     """As ``LoadStep`` of a linear body; errors are measured with its ``K``, too."""
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
+        """See ``LoadStep``."""
         forces = self.forces(x)
         forces[self.body.fixed] = -self.body.support_forces(x)
         return forces

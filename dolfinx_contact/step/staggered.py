@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import SolverResult
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 Level = Sequence["Lagged"]
-Search = Callable[["LoadStep"], "tuple[LoadStep, SolverResult]"]
+Search = Callable[["LoadStep"], "SolverResult"]
 
 
 class Change(NamedTuple):
     """How far a lagged quantity is from that of the state found."""
 
     settled: bool
-    step: LoadStep  # to go on with; its errors are those of the state
+    state: StepState  # the one to go on with; of its step
     size: float = 0.0  # of the forces that it makes, over the reactions
     forward: float = 0.0  # the part of the forward error that it makes
     tol: float = 0.0  # to which the step is solved next, 0 is that of the level
@@ -41,20 +41,20 @@ class Lagged:
 
     limit, first_tol = 5, 0.0
 
-    def restart(self) -> None:
-        """A slower quantity has another value."""
+    def restarted(self, step: LoadStep) -> LoadStep:
+        """The step with a first value, once a slower quantity has another one.  Collective."""
+        return step
 
-    def change(self, step: LoadStep, found: SolverResult, goal: float) -> Change:
+    def change(self, found: SolverResult, goal: float) -> Change:
         """What has become of it in the state found.  Collective.
 
         Args:
-            step: The step, in the state found.
-            found: What the solver has found.
+            found: With the state.
             goal: The tolerance of the step.
         """
         raise NotImplementedError
 
-    def renewed(self, step: LoadStep, found: SolverResult) -> LoadStep:
+    def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
         """The step with the value of the state found, to be solved again.  Collective."""
         raise NotImplementedError
 
@@ -70,7 +70,6 @@ class Lagged:
 class Staggered(NamedTuple):
     """What the loop ends with."""
 
-    step: LoadStep
     found: SolverResult
     changes: dict  # sizes, by names of classes
     refused: str  # why it is no solution, in words
@@ -82,7 +81,7 @@ def solve_staggered(
     """Solve a step with all lagged quantities those of the state found.  Collective.
 
     Args:
-        step: The step with first values, to be solved to its tolerance until all is settled.
+        step: The step, to be solved to its tolerance until all is settled.
         levels: Of lagged quantities, the fastest first.
         search: What a solver finds.
         goal: The tolerance in the end.
@@ -90,21 +89,23 @@ def solve_staggered(
     loop = _Loop(levels, step.tol, goal)
     step = loop.begun(step, len(levels))
     while True:
-        step, found = search(step)
+        found = search(step)
         loop.count(found)
-        if not step.errors.within(step.tol):
+        if not found.state.within:
             break  # no state with these values
-        late, step = loop.first_unsettled(step, found)
+        late, found = loop.first_unsettled(found)
+        state, step = found.state, found.state.step
         if late == len(levels):
             if step.tol <= goal:
                 break
             loop.aim = goal
-            step = loop.begun(step.finer(goal, found.x), late)
+            finer = step.but(tol=goal, starts=(state.x,), motions=state.c, continues=True)
+            step = loop.begun(finer, late)
         elif loop.at_its_limit(late):
             break
         else:
-            step = loop.renewed(step, found, late)
-    return Staggered(step, loop.result(found), loop.sizes, loop.refused)
+            step = loop.renewed(step, state, late)
+    return Staggered(loop.result(found), loop.sizes, loop.refused)
 
 
 class _Loop:
@@ -122,30 +123,31 @@ class _Loop:
         """The step with the tolerance of its next solution, once levels before ``slower`` begin anew.  Collective."""
         quantities = [quantity for level in self._levels[:slower] for quantity in level]
         for quantity in quantities:
-            quantity.restart()
+            step = quantity.restarted(step)
         self._renewals[:slower] = self._solutions[:slower] = [0] * slower
-        return step.within(max([tol or self.aim, *(quantity.first_tol for quantity in quantities)]))
+        tol = max([tol or self.aim, *(quantity.first_tol for quantity in quantities)])
+        return step.but(tol=tol)
 
     def count(self, found: SolverResult) -> None:
         """Count a solution."""
         self._iterations, self._forward = self._iterations + found.iterations, found.forward_error
         self._solutions = [count + 1 for count in self._solutions]
 
-    def first_unsettled(self, step: LoadStep, found: SolverResult) -> tuple[int, LoadStep]:
-        """The first level that has not settled, or their number, and the step as the quantities leave it.  Collective."""
+    def first_unsettled(self, found: SolverResult) -> tuple[int, SolverResult]:
+        """The first level that has not settled, or their number, and the state as the quantities leave it.  Collective."""
         for k, level in enumerate(self._levels):
             self._changes = []
             for quantity in level:
-                change = quantity.change(step, found, self.aim)
-                step = change.step
+                change = quantity.change(found, self.aim)
+                found = found._replace(state=change.state)
                 self._changes.append(change)
                 self.sizes[type(quantity).__name__] = change.size
                 self._forward = max(self._forward, change.forward)
                 if change.refused:
-                    return k, step
+                    return k, found
             if not all(change.settled for change in self._changes):
-                return k, step
-        return len(self._levels), step
+                return k, found
+        return len(self._levels), found
 
     def at_its_limit(self, k: int) -> bool:
         """Whether a level cannot be renewed any more; ``refused`` says why."""
@@ -157,11 +159,11 @@ class _Loop:
         self.refused = self.refused or next(filter(None, words), "")
         return True
 
-    def renewed(self, step: LoadStep, found: SolverResult, k: int) -> LoadStep:
+    def renewed(self, step: LoadStep, state: StepState, k: int) -> LoadStep:
         """The step with all quantities of a level renewed.  Collective."""
         self._renewals[k] += 1
         for quantity in self._levels[k]:
-            step = quantity.renewed(step, found)
+            step = quantity.renewed(step, state)
         return self.begun(step, k, max(change.tol for change in self._changes))
 
     def result(self, found: SolverResult) -> SolverResult:

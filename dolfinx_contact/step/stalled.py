@@ -15,7 +15,7 @@ from dolfinx_contact.support.checks import place
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
 
 # Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
 # where few do, it is not that.
@@ -30,7 +30,7 @@ MANY = 60
 
 def stalled(
     body: ElasticBody,
-    contacts: Sequence[Contact],
+    contacts: Sequence[ContactStep],
     statuses: Iterable[Sequence[np.ndarray]],
     wrong: Sequence[np.ndarray],
 ) -> list[str]:
@@ -59,7 +59,7 @@ def stalled(
     return said + tall(body, contacts) if changed > MANY_CHANGE * nodes else said
 
 
-def tall(body: ElasticBody, contacts: Sequence[Contact]) -> list[str]:
+def tall(body: ElasticBody, contacts: Sequence[ContactStep]) -> list[str]:
     """That elements at the surface are tall, in the mean, and what to do; nothing if they are not.  Collective."""
     ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
@@ -88,7 +88,7 @@ def slow(body: ElasticBody, forces: np.ndarray) -> str:
     )
 
 
-def _ratios(contact: Contact) -> np.ndarray:
+def _ratios(contact: ContactStep) -> np.ndarray:
     """Height over width of this rank's cells that have a facet of contact nodes."""
     V, dim = contact.displacements.V, contact.points.dim
     nodes, x = compat.cell_nodes(V), V.tabulate_dof_coordinates()[:, :dim]

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ from mpi4py import MPI
 from dolfinx_contact.bodies.forms import times_volume
 from dolfinx_contact.contact.nodal import times
 from dolfinx_contact.law.friction import principal_axes
-from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.results.record import NO_SOLUTION, UNHELD
 from dolfinx_contact.step.errors import BLIND, contact_rounding
 from dolfinx_contact.support.checks import EPSILON
@@ -21,9 +19,7 @@ from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
@@ -53,9 +49,7 @@ class Statics:
     """Loads and reactions of a loose body along its rigid motions ``Z``, which have no elastic energy.
 
     Args:
-        body: ElasticBody with ``loose`` motions.
-        contacts: Its contacts.
-        step: The ``LoadStep``.
+        step: The ``LoadStep`` of a body with ``loose`` motions.
         last: The last converged displacement, owned degrees of freedom.  Collective.
 
     Attributes:
@@ -69,9 +63,8 @@ class Statics:
         ValueError: on all ranks, if no contact node is on a part of the body that nothing holds.
     """
 
-    def __init__(
-        self, body: ElasticBody, contacts: Sequence[Contact], step: LoadStep, last: np.ndarray
-    ):
+    def __init__(self, step: LoadStep, last: np.ndarray):
+        body, contacts = step.body, step.contacts
         self._body, self._contacts, self._modes = body, contacts, body.loose.modes
         m, self._dim = self._modes.shape[1], body.V.mesh.geometry.dim
         parts, coefficients = [np.zeros((0, self._dim, m))], [np.zeros((0, self._dim - 1))]
@@ -90,7 +83,7 @@ class Statics:
         self.reason = NO_SOLUTION
         if not self._felt.all():
             free = body.loose.refusal(np.eye(m)[:, self._felt == 0.0])
-            if not any(contact.has_history for contact in contacts):
+            if not any(contact.given.has_history for contact in contacts):
                 raise ValueError(
                     f"{free} No contact node can hold it: fix it by Dirichlet "
                     "conditions, add a soft spring to F, or name the facets that may touch."
@@ -117,7 +110,8 @@ class Statics:
         Of such planes reactions are in balance with their forces: ``D^T r = F``, what they press with is known.
         """
         dead, felt = surfaces.springs == 0.0, self._felt.max()
-        driving, parts = surfaces.driving()[dead], [np.zeros((0, self._dim, dead.sum()))]
+        driving = surfaces.driving(np.zeros(surfaces.count))[dead]
+        parts = [np.zeros((0, self._dim, dead.sum()))]
         for contact, axes in zip(self._contacts, surfaces.axes):
             turns = principal_axes(contact.free_friction, contact.points.count, self._dim)
             parts.append(-turns @ axes[:, :, dead])
@@ -204,9 +198,8 @@ class Statics:
         A linear program for the rigid motion: no node penetrates, and those of the reactions that balance the loads are
         as near as they can be.
         """
-        for contact in self._contacts:
-            contact.move(self.start)
-        gaps = np.concatenate([np.zeros(0), *(contact.present.gap for contact in self._contacts)])
+        gaps = [contact.at(self.start).gap for contact in self._contacts]
+        gaps = np.concatenate([np.zeros(0), *gaps])
         mine = self._motion[:, -1], gaps, self._balancing[:, -1]
         parts = [np.concatenate(each) for each in zip(*self._body.comm.allgather(mine))]
         motion = self._body.comm.bcast(_touching(*parts) if self._body.comm.rank == 0 else None)
@@ -221,8 +214,8 @@ class Statics:
         m, dim = self._motion.shape[2], self._dim
         left, weights = [np.zeros((0, dim))], [np.zeros((0, dim))]
         for contact in self._contacts:
-            contact.move(self.last)
-            off = np.column_stack((contact.slip_increment, contact.present.gap - contact.last.gap))
+            state = contact.at(self.last)
+            off = np.column_stack((state.slip_increment, state.gap - contact.last.gap))
             left.append(times(principal_axes(contact.free_friction, len(off), dim), off))
             weights.append(np.repeat(contact.last.reaction[:, -1:], dim, axis=1))
         off, weight = np.concatenate(left), np.concatenate(weights)
@@ -241,22 +234,22 @@ class Statics:
         sums = self._body.total(self._modes.T @ forces)
         return max(float(-(self.loads @ sums) / ((sums @ sums) or 1.0)), 0.0)
 
-    def _free_motions(self, step: LoadStep, x: np.ndarray, unfelt: float) -> np.ndarray:
-        """Motions that change no reaction of the present state, to first order: ``shape=(m, k)``.  Collective.
+    def _free_motions(self, state: StepState, x: np.ndarray, unfelt: float) -> np.ndarray:
+        """Motions that change no reaction of a state, to first order: ``shape=(m, k)``.  Collective.
 
         Args:
-            step: The ``LoadStep``.
-            x: Displacement about as large as that of the present state: nodes pressed by no more than its rounding are not.
+            state: The state.
+            x: Displacement about as large as that of the state: nodes pressed by no more than its rounding are not.
             unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
         """
         changed = [np.zeros((0, self._felt.size))]
-        least = ROUNDING * self._body.largest(self._pressures())
-        for contact, of in zip(self._contacts, step.stiffness):
-            map = ReturnMap(of.normal, of.normal)
-            state = contact.reaction, contact.present.gap, contact.slip_increment
-            by_motion = map.linearised(contact.law, *state)[-1] / of.normal[:, None, None]
-            rounding = contact_rounding(contact, of, x)[:, -1]
-            by_motion[contact.reaction[:, -1] <= np.maximum(least, rounding)] = 0.0
+        least = ROUNDING * self._body.largest(_pressures(state))
+        for contact, nodes in zip(state.step.contacts, state.nodes):
+            kappa, given = contact.stiffness.normal, (nodes.reaction, nodes.gap, nodes.slip_increment)  # fmt: skip
+            by_motion = contact.measuring_map().linearised(contact.law, *given)[-1]
+            by_motion = by_motion / kappa[:, None, None]
+            rounding = contact_rounding(contact, nodes, x)[:, -1]
+            by_motion[nodes.reaction[:, -1] <= np.maximum(least, rounding)] = 0.0
             changed.append(
                 (by_motion @ contact.points.motion(self._modes)).reshape(-1, self._felt.size)
             )
@@ -268,10 +261,10 @@ class Statics:
         small = np.append(values, np.zeros(len(vectors) - len(values))) <= unfelt
         return vectors[small].T / np.sqrt(self._felt)[:, None]
 
-    def slides(self, step: LoadStep) -> bool:
-        """Whether loads are left along a motion that changes no reaction of the present state; says so.  Collective."""
-        motions = self._free_motions(step, self.last, SLIDING)
-        left, sizes = self._left()
+    def slides(self, state: StepState) -> bool:
+        """Whether loads are left along a motion that changes no reaction of a state; says so.  Collective."""
+        motions = self._free_motions(state, self.last, SLIDING)
+        left, sizes = self._left(state)
         driven = (
             motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
         )
@@ -279,7 +272,8 @@ class Statics:
         if np.linalg.norm(left) > np.linalg.norm(self.loads):
             return False  # reactions of a body that is lost, not of one that slides
         if driven @ self.loads <= least or abs(driven @ left) <= least:
-            overcome = [along for along in (self.loads, left) if self._overcome(along, sizes)]
+            both = (self.loads, left)
+            overcome = [along for along in both if self._overcome(state, along, sizes)]
             if not overcome:
                 return False
             driven = overcome[0]
@@ -287,7 +281,7 @@ class Statics:
             return False
         self.said = (
             f"In the best state found the loads drive {self._body.loose.words(driven)} by more than friction carries with its "
-            f"normal forces{', of which there are none' if self._unpressed() else ''}"
+            f"normal forces{', of which there are none' if self._unpressed(state) else ''}"
         )
         return True
 
@@ -297,38 +291,33 @@ class Statics:
         into, fastest = self._body.largest(-velocity[:, -1]), self._body.largest(np.abs(velocity))
         return into > ROUGH * fastest
 
-    def _overcome(self, along: np.ndarray, sizes: np.ndarray) -> bool:
-        """Whether loads along a motion are more than present normal reactions carry with all their friction.  Collective."""
+    def _overcome(self, state: StepState, along: np.ndarray, sizes: np.ndarray) -> bool:
+        """Whether loads along a motion are more than normal reactions carry with all their friction.  Collective."""
         velocity = self._motion @ along
         friction = np.linalg.norm(self._mu * velocity[:, :-1], axis=1)
-        carried = self._body.total([self._pressures() @ (friction - velocity[:, -1])])[0]
+        carried = self._body.total([_pressures(state) @ (friction - velocity[:, -1])])[0]
         least = ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
         return bool(self.loads @ along - carried > least)
 
-    def _needed(self) -> str:
+    def _needed(self, state: StepState) -> str:
         """Whether friction or a normal force is missing where no reaction changes with a motion, in words.  Collective."""
-        if self._unpressed():
+        if self._unpressed(state):
             return (
                 "Friction holds nothing, since no node with friction is pressed: add a normal force"
             )
         return "No reaction changes with them: add friction"
 
-    def _unpressed(self) -> bool:
+    def _unpressed(self, state: StepState) -> bool:
         """Whether there is friction, but only at nodes that are not pressed.  Collective."""
         mu, largest = self._mu.max(axis=1, initial=0.0), self._body.largest
-        return largest(mu) > 0.0 >= largest(mu * self._pressures())
-
-    def _pressures(self) -> np.ndarray:
-        """Present normal reactions of all contacts."""
-        return np.concatenate([np.zeros(0), *(c.reaction[:, -1] for c in self._contacts)])
+        return largest(mu) > 0.0 >= largest(mu * _pressures(state))
 
     def hidden(self, step: LoadStep) -> str:
         """Whether rounding in gaps and slips makes forces as large as the loads, in words.  Collective."""
         total, unit = self._body.total, step.unit
         rounding = [np.zeros(0)]
-        for contact, of in zip(self._contacts, step.stiffness):
-            contact.move(self.last)
-            rounding.append(contact_rounding(contact, of, self.last).ravel())
+        for contact in step.contacts:
+            rounding.append(contact_rounding(contact, contact.at(self.last), self.last).ravel())
         forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self.last)
         hiding = np.sqrt(max(total(np.square(force / unit).sum()) for force in forces))
         acting = self._body.norm(step.external / unit)
@@ -339,42 +328,42 @@ class Statics:
             f"{unit * hiding:.1e}: no step can tell what holds the body. Take the load off altogether, or leave a thousand times as much"
         )
 
-    def balanced(self) -> bool:
+    def balanced(self, state: StepState) -> bool:
         """Whether reactions balance the loads, roughly: of a body that is lost rounding hides that they do not.  Collective.
 
         Along motions without loads reactions may be no more than rounding, and say nothing.
         """
-        left, sizes = self._left()
+        left, sizes = self._left(state)
         return bool((np.abs(left) <= ROUGH * sizes)[self.loads != 0.0].all())
 
-    def _left(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sums of loads and present reactions along the motions, and those of their magnitudes."""
+    def _left(self, state: StepState) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of loads and reactions along the motions, and those of their magnitudes.  Collective."""
         forces = np.zeros((2, self._body.size))
-        for contact in self._contacts:
-            contact.points.add_forces(contact.reaction, forces[0])
-            contact.points.add_magnitudes(contact.reaction, forces[1])
+        for contact, nodes in zip(self._contacts, state.nodes):
+            contact.points.add_forces(nodes.reaction, forces[0])
+            contact.points.add_magnitudes(nodes.reaction, forces[1])
         sums, sizes = self._body.total(
             [self._modes.T @ forces[0], np.abs(self._modes).T @ forces[1]]
         )
         return sums + self.loads, sizes + np.abs(self.loads)
 
-    def settled(self, step: LoadStep, x: np.ndarray, choice: str) -> np.ndarray:
+    def settled(self, state: StepState, choice: str) -> StepState:
         """A solution whose undetermined motions are those nearest to the last displacement, by volume.  Collective.
 
         Args:
-            step: The ``LoadStep``; has measured ``x``.
-            x: Displacement of owned degrees of freedom.
+            state: A solution.
             choice: "refused" or "nearest".
 
         Raises:
             ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
         """
-        motions = self._free_motions(step, x, UNFELT)
+        step, x = state.step, state.x
+        motions = self._free_motions(state, x, UNFELT)
         if not motions.size:
-            return x
+            return state
         if choice == "refused":
             raise ValueError(
-                f"{self._body.loose.refusal(motions)} {self._needed()} or a soft spring, fix them by Dirichlet conditions, "
+                f"{self._body.loose.refusal(motions)} {self._needed(state)} or a soft spring, fix them by Dirichlet conditions, "
                 'or take the state nearest to the last one by dc.ContactProblem(..., undetermined="nearest").'
             )
         Z = self._modes @ motions
@@ -387,11 +376,15 @@ class Statics:
         )
         way = Z @ np.linalg.solve(sizes, apart)
         for length in halves(SHORTEST):
-            trial = x + length * way
-            if step.measure(trial).within(step.tol):
+            trial = step.measure(x + length * way, before=state)
+            if trial.within:
                 return trial
-        step.measure(x)
-        return x
+        return state
+
+
+def _pressures(state: StepState) -> np.ndarray:
+    """Normal reactions of all contacts."""
+    return np.concatenate([np.zeros(0), *(nodes.reaction[:, -1] for nodes in state.nodes)])
 
 
 def _cone_weights(

@@ -16,12 +16,12 @@ import numpy as np
 from scipy import sparse
 
 from dolfinx_contact.bodies.rigid_motion import rigid_modes
-from dolfinx_contact.step.load_step import driven_surfaces
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # About how many nodes of a rank are asked how the body turns.
 SAMPLED = 2000
@@ -73,8 +73,8 @@ class Turn:
         """
         body, of = self._body, self._body.displacements
         motions = self._motions(u, angles)
-        driven = driven_surfaces(body, contacts)
-        count, rows, touching = 0 if driven is None else driven.count, [], False
+        driven, rows, touching = self._driven(contacts), [], False
+        count = 0 if driven is None else driven.count
         for k, contact in enumerate(contacts):
             moved, gap = _moved(contact, u, motions)
             felt = (contact.reaction[:, -1] > 0.0) | (gap < moved[:, -1, 0])
@@ -89,6 +89,14 @@ class Turn:
         if grown == 0.0:
             return 0.0
         return float(np.sqrt(grown / deformed)) if deformed > 0.0 else np.inf
+
+    def _driven(self, contacts: Sequence[Contact]) -> DrivenSurfaces | None:
+        """Surfaces that force drives, None where there are none.  Collective."""
+        if not any(contact.surface.motions for contact in contacts):
+            return None
+        from dolfinx_contact.surfaces.driven import DrivenSurfaces
+
+        return DrivenSurfaces(self._body, [contact.in_step() for contact in contacts])
 
     def _motions(self, u: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """By what the body grows, by what else than turning it moves, and rigid motions of its parts, ``shape=(owned dofs, 2 + m)``."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from dolfinx_contact.support.line_search import halves
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.law.maps import NodalMap
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
@@ -42,79 +43,81 @@ class SurfaceBalance:
     Args:
         surfaces: The ``DrivenSurfaces``.
         body: The body, for sums over ranks.
+        contacts: ``ContactStep`` of each contact.
         x: Displacement of owned degrees of freedom.
         maps: Of the contacts, see ``law/maps.py``.
-        asked: Function that yields the contacts, each with the reactions that the body asks for.
+        required: Of motions, the reactions that the body asks of each contact.
     """
 
     def __init__(
         self,
         surfaces: DrivenSurfaces,
         body: ElasticBody,
+        contacts: Sequence[ContactStep],
         x: np.ndarray,
         maps: Sequence[NodalMap],
-        asked: Callable,
+        required: Callable,
     ):
-        self._surfaces, self._body, self._x, self._maps, self._asked = (
-            surfaces,
-            body,
-            x,
-            maps,
-            asked,
-        )
+        self._surfaces, self._body, self._contacts = surfaces, body, contacts
+        self._x, self._maps, self._required = x, maps, required
 
-    def reach(self) -> None:
-        """Move the planes into equilibrium, or as near as Newton's method comes.  Collective."""
+    def reached(self, c: np.ndarray) -> np.ndarray:
+        """Motions in equilibrium, or as near as Newton's method comes, from others.  Collective."""
         surfaces, limits = self._surfaces, None
         if surfaces.plain:
             for motion in np.flatnonzero(surfaces.pressing):
-                self._press(motion)
+                c = self._pressed(c, motion)
         elif surfaces.pressing.any():
-            self._press_together()
-        left, size = self._response()
+            c = self._pressed_together(c)
+        left, size = self._left(c)
         for _ in range(STEPS):
             if (np.abs(left) <= BALANCED * size).all():
-                return
+                return c
             if limits is None:
-                limits = self._limits()
-            both = zip(self._asked(), self._maps)
-            derivatives = [contact.respond_with_derivatives(self._x, map) for contact, map in both]
-            change = np.linalg.solve(surfaces.tangent(derivatives), -left)
-            room = np.where(change > 0, limits[1] - surfaces.moved, surfaces.moved - limits[0])
+                limits = self._limits(c)
+            change = np.linalg.solve(self._tangent(c), -left)
+            room = np.where(change > 0, limits[1] - c, c - limits[0])
             within = np.divide(room, np.abs(change), np.ones(surfaces.count), where=change != 0)
             change *= min(max(within.min(), 0.0), 1.0)
             before = np.linalg.norm(left)
-            left, size = self._step(change, left)
+            c, left, size = self._step(c, change, left)
             if np.linalg.norm(left) >= before:
-                return
+                return c
+        return c
 
-    def _response(self) -> tuple[np.ndarray, np.ndarray]:
+    def _at(self, c: np.ndarray) -> Iterator[tuple]:
+        """Each contact with the reactions that the body asks for, its map and its columns."""
+        return zip(self._contacts, self._required(c), self._maps, self._surfaces.axes)
+
+    def _tangent(self, c: np.ndarray) -> np.ndarray:
+        found = [contact.linearised(self._x, r, map, c)[1] for contact, r, map, _ in self._at(c)]
+        return self._surfaces.tangent(self._contacts, found)
+
+    def _left(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left of the forces on planes, and the size of its terms."""
-        for contact, map in zip(self._asked(), self._maps):
-            contact.respond(self._x, map)
-        return self._surfaces.left()
+        nodes = [contact.respond(self._x, r, map, c) for contact, r, map, _ in self._at(c)]
+        return self._surfaces.left(nodes, c)
 
-    def _step(self, change: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Go along a change as far as what is left falls and does not turn round; what is left then.
+    def _step(self, start: np.ndarray, change: np.ndarray, before: np.ndarray) -> tuple:
+        """Go along a change as far as what is left falls and does not turn round: motions, and what is left then.
 
         Where nodes slip reactions do not grow with the motion, and a whole step would go far beyond the solution.
         """
-        start, size_before = self._surfaces.moved, np.linalg.norm(before)
+        size_before = np.linalg.norm(before)
         low, high, length = 0.0, 1.0, 1.0
         for _ in range(LENGTHS):
-            self._surfaces.move_to(start + length * change)
-            left, size = self._response()
+            c = start + length * change
+            left, size = self._left(c)
             turned = before @ left < -TURNED * size_before**2
             if not turned and np.linalg.norm(left) < size_before:
-                return left, size
+                return c, left, size
             if not turned and length == 1.0:
                 break
             low, high = (low, length) if turned else (length, high)
             length = (low + high) / 2
-        self._surfaces.move_to(start)
-        return self._response()
+        return start, *self._left(start)
 
-    def _limits(self) -> np.ndarray:
+    def _limits(self, c: np.ndarray) -> np.ndarray:
         """Smallest and largest motions along planes, beyond which all nodes slip (nearly) the same way.  Collective.
 
         Returns:
@@ -122,39 +125,38 @@ class SurfaceBalance:
         """
         surfaces = self._surfaces
         limits = np.full((2, surfaces.count), -np.inf)
-        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
-            contact.move(self._x)
+        for contact, reaction, map, axes in self._at(c):
+            state = contact.at(self._x, c)
             springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
-            pressure = np.maximum(contact.reaction[:, -1] - map.normal * contact.present.gap, 0.0)
+            pressure = np.maximum(reaction[:, -1] - map.normal * state.gap, 0.0)
             bound = contact.friction.mu.max(axis=-1) * pressure
             carried = np.where(np.abs(axes[:, :-1]) >= CARRIED, axes[:, :-1], 0.0)
             node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
             rate, way = springs[node, row], carried[node, row, motion]
-            middle = (contact.slip_increment[node, row] - contact.reaction[node, row] / rate) / way
+            middle = (state.slip_increment[node, row] - reaction[node, row] / rate) / way
             # In three dimensions directions go on turning to that of the motion.
             width = (1.0 if contact.points.dim == 2 else TURNING) * bound[node] / (rate * abs(way))
             for side, sign in enumerate((-1, 1)):
                 np.maximum.at(limits[side], motion, width + sign * middle)
         self._body.comm.Allreduce(MPI.IN_PLACE, limits, op=MPI.MAX)
         limits[0] *= -1
-        limits += surfaces.moved
+        limits += c
         endless = ~np.isfinite(limits).all(axis=0) | (surfaces.springs > 0) | surfaces.pressing
         limits[:, endless] = np.array([[-np.inf], [np.inf]])
         return limits
 
-    def _press(self, motion: int) -> None:
-        """Move a plane along its normal until predictors ``max(r_n - rho x_n, 0)`` are in balance.
+    def _pressed(self, c: np.ndarray, motion: int) -> np.ndarray:
+        """Motions with a plane along its normal where predictors ``max(r_n - rho x_n, 0)`` are in balance.
 
         Their sum grows with the motion, piecewise linear and convex: Newton's method comes down to the only solution.
         """
         surfaces, total = self._surfaces, self._body.total
         parts = [np.zeros((2, 0))]
-        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
-            contact.move(self._x)
-            pressure = contact.reaction[:, -1] - map.normal * contact.present.gap
+        for contact, reaction, map, axes in self._at(c):
+            pressure = reaction[:, -1] - map.normal * contact.at(self._x, c).gap
             parts.append(np.array([pressure, map.normal])[:, axes[:, -1, motion] > 0])
         at_first, rho = np.concatenate(parts, axis=1)
-        spring, target, moved = surfaces.springs[motion], surfaces.driving()[motion], 0.0
+        spring, target, moved = surfaces.springs[motion], surfaces.driving(c)[motion], 0.0
         for _ in range(STEPS):
             pressure = np.maximum(at_first + rho * moved, 0.0)
             force, slope = total([pressure.sum(), rho[pressure > 0].sum()])
@@ -166,11 +168,10 @@ class SurfaceBalance:
             if abs(left) <= BALANCED * (force + abs(target) + spring * abs(moved)):
                 break
             moved -= left / (slope + spring)
-        if moved != 0.0:
-            surfaces.move_to(surfaces.moved + moved * np.eye(surfaces.count)[motion])
+        return c + moved * np.eye(surfaces.count)[motion]
 
-    def _press_together(self) -> None:
-        """Move planes until predictors ``max(r_n - rho x_n, 0)`` are in balance along all motions that these resist.
+    def _pressed_together(self, c: np.ndarray) -> np.ndarray:
+        """Motions of planes where predictors ``max(r_n - rho x_n, 0)`` are in balance along all that these resist.
 
         The forces are the gradient of a convex function, the energy of springs ``rho``: Newton's method, in steps along
         which it falls.
@@ -178,14 +179,12 @@ class SurfaceBalance:
         surfaces, total = self._surfaces, self._body.total
         which = np.flatnonzero(surfaces.pressing)
         parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
-        for contact, map, axes in zip(self._asked(), self._maps, surfaces.axes):
-            contact.move(self._x)
-            parts.append(
-                np.array([contact.reaction[:, -1] - map.normal * contact.present.gap, map.normal])
-            )
+        for contact, reaction, map, axes in self._at(c):
+            pressure = reaction[:, -1] - map.normal * contact.at(self._x, c).gap
+            parts.append(np.array([pressure, map.normal]))
             columns.append(axes[:, -1, which])
         (at_first, rho), D = np.concatenate(parts, axis=1), np.concatenate(columns)
-        springs, target, n = surfaces.springs[which], surfaces.driving()[which], which.size
+        springs, target, n = surfaces.springs[which], surfaces.driving(c)[which], which.size
 
         def energy(moved: np.ndarray):
             pressure = np.maximum(at_first + rho * (D @ moved), 0.0)
@@ -212,7 +211,6 @@ class SurfaceBalance:
             else:
                 break
             moved, least = moved + length * change, following
-        if moved.any():
-            whole = np.zeros(surfaces.count)
-            whole[which] = moved
-            surfaces.move_to(surfaces.moved + whole)
+        whole = np.zeros(surfaces.count)
+        whole[which] = moved
+        return c + whole

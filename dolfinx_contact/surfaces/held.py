@@ -21,7 +21,8 @@ from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.state import State
     from dolfinx_contact.surfaces.drive import Motion
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -32,15 +33,15 @@ ALONG = 1e-8
 class Holding(NamedTuple):
     """Nodes of a contact that hold a plane."""
 
-    contact: Contact
+    contact: int  # its number
     rows: np.ndarray  # (k,)
     axes: np.ndarray  # what the plane's motions move there, tangential components, (k, T, m)
 
 
 def held_surfaces(
-    body: ElasticBody, contacts: Sequence[Contact], last: np.ndarray, b: np.ndarray
+    body: ElasticBody, contacts: Sequence[ContactStep], last: np.ndarray, b: np.ndarray
 ) -> HeldSurfaces | None:
-    """The planes that held nodes hold, None if there are none; from now on these motions are not free.  Collective.
+    """The planes that held nodes hold, None if there are none; from now on these motions are not free, and the planes go with the nodes.  Collective.
 
     Args:
         last: The last displacement, owned degrees of freedom.
@@ -52,22 +53,22 @@ def held_surfaces(
     for contact in contacts:
         if contact.surface.driver is not None:
             contact.surface.driver.hold()
-        contact.drag(None)
     u = last.copy()
     u[body.fixed] = b[body.fixed]
     surfaces = surfaces_of(c for c in contacts if c.surface.motions)
     found = [_held_surface(body, contacts, surface, u) for surface in surfaces]
-    return HeldSurfaces(body, [one for one in found if one is not None]) if any(found) else None
+    return HeldSurfaces([one for one in found if one is not None]) if any(found) else None
 
 
 def _held_surface(
-    body: ElasticBody, contacts: Sequence[Contact], surface: Surface, u: np.ndarray
+    body: ElasticBody, contacts: Sequence[ContactStep], surface: Surface, u: np.ndarray
 ) -> HeldSurface | None:
     """The plane with the motions that nodes hold.  Collective."""
-    motions, on = surface.motions, [c for c in contacts if c.surface is surface]
-    moving = [np.stack([c.carried_by(m.axis, m.turns) for m in motions], axis=2) for c in on]
+    motions = surface.motions
+    on = [(k, c) for k, c in enumerate(contacts) if c.surface is surface]
+    moving = [np.stack([c.moved_by(m.axis, m.turns) for m in motions], axis=2) for _, c in on]
     held, resists = [], np.zeros(len(motions))
-    for contact, axes in zip(on, moving):
+    for (_, contact), axes in zip(on, moving):
         rows = contact.points.supported
         f, rough = contact.points.along, contact.friction.at(rows).mu[..., :1] > 0.0
         along = axes[rows, :-1] * np.broadcast_to(rough, (rows.size, 1))[:, :, None]
@@ -84,7 +85,7 @@ def _held_surface(
     names, holding = [motions[k].name for k in which], []
     simple = not surface.curved and not any(motions[k].turns for k in which)
     with raised_together(body.comm):
-        for contact, along in zip(on, held):
+        for (k, contact), along in zip(on, held):
             mine = (np.abs(along[:, :, which]) > ALONG * largest[which]).any(axis=(1, 2))
             rows = contact.points.supported[mine]
             if mine.any() and (not simple or contact.points.along[mine].any()):
@@ -95,32 +96,40 @@ def _held_surface(
                     "with which it holds the surface is not known. Leave these motions out of surface.free (on a plane of "
                     "symmetry they are none), and prescribe them by surface.displacement or surface.rotation."
                 )
-            holding.append(Holding(contact, rows, along[mine][:, :, which]))
-    found = HeldSurface(body, surface, [motions[k] for k in which], holding, on)
-    found.follow(u)
+            holding.append(Holding(k, rows, along[mine][:, :, which]))
+    of_nodes = [k for k, _ in on]
+    found = HeldSurface(body, surface, [motions[k] for k in which], holding, of_nodes)
+    found.follow(contacts, u)
     return found
 
 
 class HeldSurfaces:
-    """All planes that held nodes hold."""
+    """All planes that held nodes hold; nothing in it changes.
 
-    def __init__(self, body: ElasticBody, surfaces: list):
-        self._body, self._surfaces, self._beyond = body, surfaces, False
+    Attributes:
+        beyond: Whether a plane that slides is pushed by more than all of its nodes carry with the reactions found before.
+        dragged: Directions of slip past which planes slide, by numbers of contacts, ``shape=(n, gdim - 1)``.
+    """
 
-    def share(self) -> None:
-        """Give the held nodes their share of what drives the planes, with the present reactions of the others.  Collective."""
+    def __init__(self, surfaces: list[HeldSurface], beyond: bool = False):
+        self._surfaces, self.beyond = surfaces, beyond
+        self.dragged: dict[int, np.ndarray] = {}
+        for surface in surfaces:
+            self.dragged |= surface.dragged
+
+    def shared(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> tuple[State, ...]:
+        """States with the share of the held nodes of what drives the planes, the reactions of all others given.  Collective."""
         for surface in self._surfaces:
-            surface.share()
+            nodes = surface.shared(contacts, nodes)
+        return tuple(nodes)
 
-    def slide(self) -> bool:
-        """Let those planes slide whose held nodes cannot hold them; whether there are any.  Collective."""
-        self._beyond = any([surface.beyond() for surface in self._surfaces])
-        return any([surface.slide() for surface in self._surfaces])
-
-    @property
-    def beyond(self) -> bool:
-        """Whether a plane that slides is pushed by more than all of its nodes carry with the reactions found before."""
-        return self._beyond
+    def slid(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> HeldSurfaces | None:
+        """With those planes let slide whose held nodes cannot hold them; None if there are none.  Collective."""
+        beyond = any([surface.beyond(contacts, nodes) for surface in self._surfaces])
+        found = [surface.slid(contacts, nodes) for surface in self._surfaces]
+        if not any(one is not None for one in found):
+            return None
+        return HeldSurfaces([new or old for new, old in zip(found, self._surfaces)], beyond)
 
 
 class HeldSurface:
@@ -131,7 +140,8 @@ class HeldSurface:
         surface: The plane.
         motions: Those that are held, ``m`` of them, translations.
         holding: ``Holding`` of each contact on the plane.
-        contacts: All contacts on it.
+        contacts: Numbers of all contacts on it.
+        dragged: Where it slides: as ``HeldSurfaces`` has it.
     """
 
     def __init__(
@@ -140,15 +150,16 @@ class HeldSurface:
         surface: Surface,
         motions: list[Motion],
         holding: list[Holding],
-        contacts: Sequence[Contact],
+        contacts: Sequence[int],
+        dragged: dict[int, np.ndarray] | None = None,
     ):
         self._body, self._surface, self._motions = body, surface, motions
-        self._holding, self._contacts = holding, contacts
-        self._part = np.zeros(len(motions))
-        self._slid = False
-        surface.driver.hold(tuple(motion.name for motion in motions))
+        self._holding, self._contacts, self.dragged = holding, contacts, dragged or {}
+        self._slides = dragged is not None
+        if not self._slides:
+            surface.driver.hold(tuple(motion.name for motion in motions))
 
-    def follow(self, u: np.ndarray) -> None:
+    def follow(self, contacts: Sequence[ContactStep], u: np.ndarray) -> None:
         """Move the plane with the held nodes.  Collective.
 
         Raises:
@@ -160,11 +171,12 @@ class HeldSurface:
                 [np.zeros((0, len(self._motions)))],
                 [np.zeros(1)],
             )
-            for contact, rows, axes in self._holding:
-                contact.move(u)
-                slips.append(contact.known_slip[rows].ravel())
+            for k, rows, axes in self._holding:
+                contact = contacts[k].given.in_step()  # the plane has moved
+                state = contact.at(u)
+                slips.append(contact.known_slip(state)[rows].ravel())
                 columns.append(axes.reshape(-1, len(self._motions)))
-                sizes.append(np.abs(contact.displacement[rows]).ravel())
+                sizes.append(np.abs(state.displacement[rows]).ravel())
                 sizes.append(np.abs(contact.last.displacement[rows]).ravel())
             s, D = np.concatenate(slips), np.concatenate(columns)
             sums = self._body.total(np.concatenate([(D.T @ D).ravel(), D.T @ s]))
@@ -181,11 +193,11 @@ class HeldSurface:
                 "them it moves is not known. Leave these motions out of surface.free, and prescribe them by surface.displacement."
             )
 
-    def _carried(self) -> list[np.ndarray]:
+    def _carried(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> list[np.ndarray]:
         """What each held node could carry along each motion, ``shape=(k, T, m)``."""
         most = []
-        for contact, rows, axes in self._holding:
-            law, R = contact.friction.at(rows), contact.reaction[rows, -1]
+        for k, rows, axes in self._holding:
+            law, R = contacts[k].friction.at(rows), nodes[k].reaction[rows, -1]
             if axes.shape[1] == axes.shape[2] == 2:
                 parts = [law.along_radii(axis) for axis in np.moveaxis(axes, 2, 0)]
             else:
@@ -193,57 +205,77 @@ class HeldSurface:
             most.append(R[:, None, None] * np.stack(parts, axis=2))
         return most
 
-    def share(self) -> None:
-        """Give the held nodes their share.  Collective."""
-        if self._slid:
-            return
-        m, most = len(self._motions), self._carried()
+    def _part(
+        self,
+        contacts: Sequence[ContactStep],
+        nodes: Sequence[State],
+        most: list[np.ndarray],
+    ) -> np.ndarray:
+        """The part of what all held nodes could carry that the force asks of them along each motion, ``shape=(m,)``.  Collective.
+
+        Reactions of held nodes along the plane do not count: they are what is asked for.
+        """
+        m = len(self._motions)
         sums = np.zeros((m, m + 1))
-        for (contact, rows, axes), part in zip(self._holding, most):
+        for (k, rows, axes), part in zip(self._holding, most):
             sums[:, :m] += np.einsum("nti,ntj->ij", axes, part)
-            sums[:, m] -= np.einsum("nt,nti->i", contact.reaction[rows, :-1], axes)
-        for contact in self._contacts:
-            moved = [contact.carried_by(motion.axis, False) for motion in self._motions]
-            sums[:, m] += [np.sum(contact.reaction * way) for way in moved]
+            sums[:, m] -= np.einsum("nt,nti->i", nodes[k].reaction[rows, :-1], axes)
+        for k in self._contacts:
+            moved = [contacts[k].moved_by(motion.axis, False) for motion in self._motions]
+            sums[:, m] += [np.sum(nodes[k].reaction * way) for way in moved]
         sums = self._body.total(sums)
         asked = self._surface.driver.pulled_by(self._motions) - sums[:, m]
         with np.errstate(divide="ignore", invalid="ignore"):
-            self._part = np.linalg.lstsq(sums[:, :m], asked, rcond=ALONG)[0]
-        if asked.any() and not np.allclose(sums[:, :m] @ self._part, asked):
-            self._part = np.where(asked == 0.0, 0.0, np.sign(asked) * np.inf)
-        length = np.linalg.norm(self._part)
-        given = self._part / max(length, 1.0) if length < np.inf else np.zeros(m)
-        for (contact, rows, _), part in zip(self._holding, most):
-            reaction = contact.reaction.copy()
-            reaction[rows, :-1] = part @ given
-            contact.take(reaction=reaction)
+            part = np.linalg.lstsq(sums[:, :m], asked, rcond=ALONG)[0]
+        if asked.any() and not np.allclose(sums[:, :m] @ part, asked):
+            part = np.where(asked == 0.0, 0.0, np.sign(asked) * np.inf)
+        return part
 
-    def beyond(self) -> bool:
+    def shared(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> list[State]:
+        """States with the share of the held nodes.  Collective."""
+        nodes = list(nodes)
+        if self._slides:
+            return nodes
+        most = self._carried(contacts, nodes)
+        asked = self._part(contacts, nodes, most)
+        length = np.linalg.norm(asked)
+        given = asked / max(length, 1.0) if length < np.inf else np.zeros(len(asked))
+        for (k, rows, _), part in zip(self._holding, most):
+            reaction = nodes[k].reaction.copy()
+            reaction[rows, :-1] = part @ given
+            nodes[k] = nodes[k]._replace(reaction=reaction)
+        return nodes
+
+    def beyond(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> bool:
         """Whether no spring pulls the plane, and its force along a motion is more than all nodes carry.  Collective."""
-        most = sum((c.friction.mu.max(axis=-1) * c.reaction[:, -1]).sum() for c in self._contacts)
+        pressed = ((contacts[k], nodes[k].reaction[:, -1]) for k in self._contacts)
+        most = sum((contact.friction.mu.max(axis=-1) * R).sum() for contact, R in pressed)
         most = float(self._body.total([most])[0])
         loose = [motion for motion in self._motions if motion.spring == 0.0]
         return bool((np.abs(self._surface.driver.pulled_by(loose)) > most).any())
 
-    def slide(self) -> bool:
-        """Let the plane slide if its held nodes cannot hold it; whether they cannot.  Collective.
+    def slid(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> HeldSurface | None:
+        """The plane let slide if its held nodes cannot hold it, else None.  Collective.
 
         Raises:
             ValueError: on all ranks, if nothing tells the direction.
         """
-        if np.linalg.norm(self._part) <= 1.0:
-            return False
+        if self._slides:
+            return None
+        part = self._part(contacts, nodes, self._carried(contacts, nodes))
+        if np.linalg.norm(part) <= 1.0:
+            return None
         if len(self._motions) > 1:
             raise ValueError(
                 "surface.force is more than the friction of contact nodes that boundary conditions hold, and surface.free leaves two "
                 "directions along the plane: in which it slides is not known. Leave one of them free, or prescribe the motion by "
                 "surface.displacement."
             )
-        sign = float(np.sign(self._part[0]))
-        for contact, rows, axes in self._holding:
-            slip = np.zeros((contact.points.count, axes.shape[1]))
+        sign, dragged = float(np.sign(part[0])), {}
+        for k, rows, axes in self._holding:
+            slip = np.zeros((contacts[k].points.count, axes.shape[1]))
             slip[rows] = -sign * axes[:, :, 0]
-            contact.drag(slip)
+            dragged[k] = slip
         self._surface.driver.hold(past=sign)
-        self._slid = True
-        return True
+        given = self._surface, self._motions, self._holding, self._contacts, dragged
+        return HeldSurface(self._body, *given)

@@ -12,9 +12,10 @@ from mpi4py import MPI
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.state import State
     from dolfinx_contact.law.friction import Friction
-    from dolfinx_contact.step.statics import Statics
+    from dolfinx_contact.step.load_step import LoadStep, StepState
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -26,19 +27,26 @@ MARGIN = 1e-9
 
 
 def slides_away(
-    surfaces: DrivenSurfaces, body: ElasticBody, contacts: Sequence[Contact], given: bool
+    surfaces: DrivenSurfaces,
+    body: ElasticBody,
+    contacts: Sequence[ContactStep],
+    nodes: Sequence[State],
+    c: np.ndarray,
+    given: bool,
 ) -> str:
     """Which of the ``DrivenSurfaces`` slides away, tips or spins, in words; none is the empty string.  Collective.
 
     Args:
-        given: Ask before anything is known but the forces that are given, not by the present normal reactions.
+        nodes: States of the contacts.
+        c: Motions of surfaces.
+        given: Ask before anything is known but the forces that are given, not by the normal reactions.
     """
-    driving = surfaces.driving()
+    driving = surfaces.driving(c)
     for surface, part in zip(surfaces.surfaces, surfaces.parts):
         of = [
-            (c, axes[:, :, part])
-            for c, axes in zip(contacts, surfaces.axes)
-            if c.surface is surface
+            (contact, state.reaction[:, -1], axes[:, :, part])
+            for contact, state, axes in zip(contacts, nodes, surfaces.axes)
+            if contact.surface is surface
         ]
         one = _Driven(surface, surfaces, part, driving[part], of, body)
         said = "" if surface.curved else one.slides(given) or one.tips()
@@ -49,34 +57,26 @@ def slides_away(
     return ""
 
 
-def lost_far_away(
-    body: ElasticBody,
-    statics: Statics | None,
-    surfaces: DrivenSurfaces | None,
-    x: np.ndarray,
-    acts: bool,
-) -> bool:
+def lost_far_away(step: LoadStep, state: StepState, acts: bool) -> bool:
     """Whether body or planes are so far away that rounding hides the loads on them: no state is one then.  Collective.
 
     Args:
-        body: The body.
-        statics: Its ``Statics``, None where something holds it.
-        surfaces: The ``DrivenSurfaces``, or None.
-        x: Displacement, owned degrees of freedom, whose rounding is as large as the forces that act, roughly.
+        step: The step.
+        state: Whose rounding is as large as the forces that act, roughly.
         acts: Whether some act above rounding.
     """
-    loads, moved = [], np.zeros(0)
-    if statics is not None:
-        loads.append(statics.loads)
+    loads, moved, surfaces = [], np.zeros(0), step.surfaces
+    if step.statics is not None:
+        loads.append(step.statics.loads)
     if surfaces is not None:  # of springs the force would be as large as the way is far
-        loads.append(surfaces.driving()[surfaces.springs == 0.0])
-        moved = np.abs(surfaces.moved)
+        loads.append(surfaces.driving(state.c)[surfaces.springs == 0.0])
+        moved = np.abs(state.c)
     if not any(load.any() for load in loads):
         return False
-    return not acts or max(body.farthest(x), moved.max(initial=0.0)) > body.extent
+    return not acts or max(step.body.farthest(state.x), moved.max(initial=0.0)) > step.body.extent
 
 
-def nothing_holds(contacts: Sequence[Contact]) -> str:
+def nothing_holds(contacts: Sequence[ContactStep]) -> str:
     """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
     surfaces = [contact.surface for contact in contacts]
     if any(
@@ -90,7 +90,7 @@ def nothing_holds(contacts: Sequence[Contact]) -> str:
 
 
 class _Driven:
-    """One surface, its motions ``part`` of all, and the contacts on it with their columns of ``D``."""
+    """One surface, its motions ``part`` of all, and the contacts on it with their normal reactions and columns of ``D``."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class _Driven:
         surfaces: DrivenSurfaces,
         part: Any,
         driving: Any,
-        contacts: Sequence[tuple[Contact, np.ndarray]],
+        contacts: Sequence[tuple[ContactStep, np.ndarray, np.ndarray]],
         body: ElasticBody,
     ):
         self._surface, self._driving, self._contacts, self._body = surface, driving, contacts, body
@@ -134,7 +134,7 @@ class _Driven:
             return ""
         for k in np.flatnonzero(self._turns & (self._springs == 0.0)):
             ends = [np.full((2, 1), -np.inf)]
-            for contact, axes in self._contacts:
+            for contact, _, axes in self._contacts:
                 normal, most = axes[:, -1, k], _radius(contact.friction, axes[:, :-1, k])
                 ends.append(np.array([-(normal - most), normal + most]))
             low, high = np.concatenate(ends, axis=1).max(axis=1)
@@ -183,31 +183,31 @@ class _Limit:
     have ``F . c <= sum r_n |M D_t c|`` for every ``c``.
 
     Args:
-        contacts: With their columns of ``D``.
+        contacts: With their normal reactions and columns of ``D``.
         motions: Columns that are asked for, ``shape=(k,)``.
         body: For sums over ranks.
-        weight: Sum of normal reactions, of which no node is known; None takes the present ones.
+        weight: Sum of normal reactions, of which no node is known; None takes those given.
     """
 
     def __init__(
         self,
-        contacts: Sequence[tuple[Contact, np.ndarray]],
+        contacts: Sequence[tuple[ContactStep, np.ndarray, np.ndarray]],
         motions: np.ndarray,
         body: ElasticBody,
         weight: float | None = None,
     ):
         self._body, self._weight = body, weight
-        self._parts = [(c.friction, c.reaction[:, -1], axes[:, :, motions]) for c, axes in contacts]
+        self._parts = [(c.friction, pressed, D[:, :, motions]) for c, pressed, D in contacts]
         laws = [friction for friction, _, _ in self._parts]
         alike = all(law.frictionless or law.isotropic for law in laws)
         self._plain = (
             alike
             and motions.size <= 2
-            and not any(c.surface.curved or c.surface.spins for c, _ in contacts)
+            and not any(c.surface.curved or c.surface.spins for c, _, _ in contacts)
         )
 
     def by_normals(self) -> np.ndarray:
-        """What the present normal reactions carry of each motion, ``shape=(k,)``.  Collective."""
+        """What the normal reactions carry of each motion, ``shape=(k,)``.  Collective."""
         return self._body.total(sum(normal @ axes[:, -1] for _, normal, axes in self._parts))
 
     def carried(self, way: np.ndarray) -> float:

@@ -124,18 +124,20 @@ class Curious:
 
     nonlinear = True
 
-    def bind(self, body, *others):
-        self.body, self.bound = body, dc.SparseNewton().bind(body, *others)
+    def bind(self, step):
+        self.bound = dc.SparseNewton().bind(step)
         return self
 
-    def solve(self, step):
-        found = self.bound.solve(step)
-        step.measure(found.x)
-        self.body.residual(np.zeros_like(found.x))
+    def update(self, step):
+        self.bound.update(step)
+
+    def solve(self, step, starts):
+        found = self.bound.solve(step, starts)
+        step.body.residual(np.zeros_like(found.state.x))
         return found
 
-    def destroy(self):
-        self.bound.destroy()
+    def close(self):
+        self.bound.close()
 
 
 def test_the_state_moves_on_from_the_answer():

@@ -252,13 +252,16 @@ class Lazy:
 
     nonlinear = True
 
-    def bind(self, *_):
+    def bind(self, step):
         return self
 
-    def solve(self, step):
+    def update(self, step):
+        pass
+
+    def solve(self, step, starts):
         return SolverResult(step.start(), 0, 0.0, "Lazy")
 
-    def destroy(self):
+    def close(self):
         pass
 
 
@@ -277,15 +280,11 @@ def test_boundary_values_that_were_not_reached_are_no_solution():
 class Lost(Lazy):
     """Linearises at a senseless displacement, and hands back one that nothing balances."""
 
-    def bind(self, body, *_):
-        self.body = body
-        return self
-
-    def solve(self, step):
-        x = step.start().copy()
-        x[self.body.fixed] = step.b[self.body.fixed]
-        self.body.linearise(1e40 * np.random.default_rng(0).standard_normal(x.size))
-        return SolverResult(x, 0, 0.0, "Lost")
+    def solve(self, step, starts):
+        x, body = step.start().x.copy(), step.body
+        x[body.fixed] = step.b[body.fixed]
+        body.linearise(1e40 * np.random.default_rng(0).standard_normal(x.size))
+        return SolverResult(step.measure(x), 0, 0.0, "Lost")
 
 
 def test_a_senseless_trial_does_not_make_forces_small():

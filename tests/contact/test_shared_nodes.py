@@ -16,7 +16,6 @@ import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.contact.nodal import NodalProblems
 from dolfinx_contact.contact.shared import shared_nodes
-from dolfinx_contact.law.maps import ReturnMap
 from mechanics.corners import STRAIN, Push, build_corner
 from mechanics.judge_corners import CornerJudge
 
@@ -292,15 +291,16 @@ def test_derivatives_at_shared_nodes_are_those_of_differences():
     for array in (x, way):
         array[body.fixed] = 0.0
     x[body.fixed] = step.b[body.fixed]
-    maps = [ReturnMap(k.normal, k.normal) for k in step.stiffness]
+    maps = step.measuring_maps
 
     def left(at):
-        return step.free(step.out_of_balance(at, maps) - step.forces(at))
+        return step.evaluate(at, maps).residual - step.free(step.forces(at))
 
     h = 1e-7 * size
     expected = (left(x + h * way) - left(x - h * way)) / (2 * h)
     forces, change = body.multiply(way), np.zeros(body.size)
-    for contact, (by_force, by_motion) in zip(scene.contacts, step.derivatives(x.copy(), maps)):
+    derivatives = step.derivatives(step.evaluate(x, maps), maps)
+    for contact, (by_force, by_motion) in zip(scene.contacts, derivatives):
         points = contact.points
         moved, pushed = points.motion(way), points.motion(step.free(forces))
         new = np.einsum("nij,nj->ni", by_force, pushed) + np.einsum("nij,nj->ni", by_motion, moved)
@@ -314,7 +314,7 @@ def test_contacts_that_share_no_node_have_no_nodal_problems():
     scene = build_corner(90, (3, 3), mu=0.3)
     problem = problem_of(scene)
     step = problem.load_step()
-    assert shared_nodes(scene.contacts[:1], step.stiffness[:1], problem.body.fixed) is None
+    assert shared_nodes(step.contacts[:1], problem.body.fixed) is None
     twice = scene.contacts[:1] * 2
     with pytest.raises(ValueError, match="same Contact twice"):
         dc.ContactProblem(scene.F, scene.u, twice, bcs=scene.bcs)

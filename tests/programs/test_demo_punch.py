@@ -189,7 +189,7 @@ def test_steps_start_from_the_nearer_state():
     last = before = np.zeros(body.size)
     for displacement in programme(punch.parameters):
         punch.approach.value = -displacement
-        begun = punch.problem.load_step().start()
+        begun = punch.problem.load_step().start().x
         punch.press(displacement)
         solution = punch.u.x.array[: body.size].copy()
         steps = [solution - start for start in (begun, last, 2 * last - before)]

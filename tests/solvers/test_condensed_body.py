@@ -67,8 +67,9 @@ def test_default_says_what_it_chose_and_why():
 def test_default_falls_back(monkeypatch):
     """Where one solver fails the other one takes over, and the record says so."""
 
-    def give_up(self, step, start=None):
-        return SolverResult(step.body.free_state(step.b), 1, 1.0, "CondensedNewton")
+    def give_up(self, step, starts, start=None):
+        state = step.measure(step.body.free_state(step.b))
+        return SolverResult(state, 1, 1.0, "CondensedNewton")
 
     monkeypatch.setattr(condensed.BoundCondensedNewton, "solve", give_up)
     reactions, steps = run()
@@ -176,15 +177,15 @@ def test_operator_is_kept_while_the_matrix_stands():
     scene = scenes.block(solver=dc.CondensedNewton())
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    first, operator = scenes.gathered(scene.contact)[1], scene.problem.bound()
+    first, kept = scenes.gathered(scene.contact)[1], scene.problem.bound().operator
     scene.move_top(0.001, 0, -0.006)
     scene.problem.solve()
-    assert scene.problem.bound() is operator
+    assert scene.problem.bound().operator is kept
     scene.modulus.value *= 2
     scene.problem.reset()
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    assert scene.problem.bound() is not operator
+    assert scene.problem.bound().operator is not kept
     assert scenes.gathered(scene.contact)[1] == pytest.approx(2 * first, abs=1e-8 * first.max())
 
 
@@ -275,22 +276,21 @@ def test_a_quarter_of_the_punch_is_a_quarter_of_the_whole(solver, law):
 @pytest.mark.parametrize("end,given", [(1.0, False), (1e-2, False), (1e-5, True)])
 def test_where_the_second_solver_starts(end, given):
     """The second solver of the default has a start of its own, unless the end of the first one misses no more than digits."""
-    starts, x = [], np.array([3.0])
+    starts, ends = [], []
 
     def solver(error):
-        def solve(step, start):
+        def solve(step, _, start):
             starts.append(start)
-            step.error = error
-            return SolverResult(x, 1, error, "this one", ())
+            ends.append(SimpleNamespace(errors=Errors(error, 0.0, 0.0)))
+            ends[-1].judged = ends[-1]
+            return SolverResult(ends[-1], 1, error, "this one", ())
 
-        return SimpleNamespace(solve=solve)
+        return SimpleNamespace(solve=solve, update=lambda step: None)
 
     bound = object.__new__(automatic.BoundAutomatic)
     bound._why, bound._solvers, bound._bound = "", [0, 1], {0: solver(end), 1: solver(0.0)}
-    step = SimpleNamespace(tol=1e-8, statics=None, slides=lambda: False)
-    step.measure = lambda x: Errors(step.error, 0.0, 0.0)
-    bound.solve(step)
-    assert starts[0] is None and (starts[1] is x if given else starts[1] is None)
+    bound.solve(SimpleNamespace(tol=1e-8, statics=None, slides=lambda state: False), ())
+    assert starts[0] is None and (starts[1] is ends[0] if given else starts[1] is None)
 
 
 @pytest.mark.filterwarnings("ignore:contact carries:UserWarning")  # its change is made up

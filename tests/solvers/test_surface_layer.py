@@ -28,9 +28,9 @@ def linearised(map, turn=None, **options):
     step = scene.problem.load_step()
     x = last + 0.3 * (step.body.solve(step.b) - last)
     x[step.body.fixed] = step.b[step.body.fixed]
-    rho = [of.normal for of in step.stiffness]
+    rho = [contact.stiffness.normal for contact in step.contacts]
     maps = [BipotentialMap(r) if map == "bipotential" else ReturnMap(r, r) for r in rho]
-    return step, maps, ContactPreconditioner(step.body, step.contacts, maps), x
+    return step, maps, ContactPreconditioner(step, maps), x
 
 
 @pytest.mark.parametrize("map", ["return", "bipotential"])
@@ -39,15 +39,15 @@ def test_tangent_is_the_derivative_of_the_residual(map, mu, p):
     """J x is the difference quotient of the fixed point's residual, in any direction, in a turned frame."""
     step, maps, preconditioner, x = linearised(map, turn=scenes.rotation(), mu=mu, p=p)
     body = step.body
-    preconditioner.linearise(step.derivatives(x, maps))
+    before = step.evaluate(x, maps)
+    preconditioner.linearise(step, step.derivatives(before, maps))
     rng = np.random.default_rng(scenes.COMM.rank)
-    before = step.out_of_balance(x, maps)
     for _ in range(3):
         direction = rng.normal(size=x.size) * np.abs(body.norm(x)) / np.sqrt(x.size)
         direction[body.fixed] = 0.0
         h = 1e-7
-        after = step.out_of_balance(x + h * direction, maps)
-        quotient = step.free(-(after - before) / h)
+        after = step.evaluate(x + h * direction, maps)
+        quotient = -(after.residual - before.residual) / h
         product = preconditioner.tangent(direction)
         assert body.norm(quotient - product) <= 1e-5 * body.norm(product)
 
@@ -57,8 +57,8 @@ def test_block_is_solved_exactly(mu, p):
     """The correction of the layers leaves no residual there, on any number of ranks."""
     step, maps, _, x = linearised("return", mu=mu, p=p)
     body = step.body
-    layer = SurfaceLayer(body, step.contacts, "block_")
-    layer.linearise(step.derivatives(x, maps))
+    layer = SurfaceLayer(body, [contact.points for contact in step.contacts], "block_")
+    layer.linearise(step, step.derivatives(step.evaluate(x, maps), maps))
     residual = np.random.default_rng(scenes.COMM.rank).normal(size=x.size)
     residual[body.fixed] = 0.0
     correction, left = layer.correct(residual)
@@ -135,33 +135,31 @@ def test_replaced_solvers_give_their_memory_back(monkeypatch):
     assert resident() - before < 4 * factor
 
 
-class _Errors:
-    """A step whose errors are a list, one for each displacement ``[k]``."""
+class _State:
+    """A state with an error."""
 
-    tol, contacts = 1e-10, ()
+    is_far, nodes = False, ()
 
-    def __init__(self, errors):
-        self.errors = errors
-
-    def residual(self, x, maps, forces):
-        error = self.errors[int(x[0])]
+    def __init__(self, error):
         errors = dict(largest=error, balance=error, change=0.0, acts=True)
-        return x, SimpleNamespace(**errors, within=lambda tol: False)
+        self.errors = self.balance = SimpleNamespace(**errors, within=lambda tol: False)
 
 
 def test_an_attempt_has_a_best_state_of_its_own():
     """A search that begins anew goes on from the best state since then, not from that of a lost attempt, and returns the best of all."""
-    search = Search(_Errors([1e-3, 1e-5, 1e-2, 1e-1, 1e-4]), np.array([0.0]), math.inf)
+    states = [_State(error) for error in (1e-3, 1e-5, 1e-2, 1e-1, 1e-4)]
+    step = SimpleNamespace(tol=1e-10, tell=lambda state: None)
+    search = Search(step, states[0], math.inf)
 
     def seen(*places):
         for k in places:
-            search.residual(np.array([float(k)]), (), np.zeros(1))
+            search.see(states[k])
             search.count(1)
 
     search.begin(search.best, 400, 2)
     seen(0, 1, 2, 3, 3)
-    assert not search.goes_on and search.best == search.nearest == 1
-    search.begin(np.array([3.0]), 400, 2)
-    assert search.goes_on and search.nearest == 3
+    assert not search.goes_on and search.best is search.nearest is states[1]
+    search.begin(states[3], 400, 2)
+    assert search.goes_on and search.nearest is states[3]
     seen(3, 2, 4)
-    assert search.goes_on and search.nearest == 4 and search.best == 1
+    assert search.goes_on and search.nearest is states[4] and search.best is states[1]

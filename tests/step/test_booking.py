@@ -101,7 +101,7 @@ def at_line(k, act):
 
     def calls(frame, event, _):
         code = frame.f_code
-        seen.booking |= code.co_name == "advance" and code.co_filename.endswith("problem_states.py")
+        seen.booking |= code.co_name == "accept" and code.co_filename.endswith("problem_states.py")
         return lines if seen.booking and "dolfinx_contact" in code.co_filename else None
 
     sys.settrace(calls)

@@ -205,15 +205,17 @@ def test_unloaded_to_next_to_nothing(solver):
 class Nothing:
     """A solver that moves nothing."""
 
-    def bind(self, body, contacts, stiffness, memory):
-        self._size = body.size
+    def bind(self, step):
         return self
 
-    def destroy(self):
+    def update(self, step):
         pass
 
-    def solve(self, step):
-        return SolverResult(np.zeros(self._size), 0, 0.0, "nothing")
+    def close(self):
+        pass
+
+    def solve(self, step, starts):
+        return SolverResult(step.measure(np.zeros(step.body.size)), 0, 0.0, "nothing")
 
 
 def test_supports_that_are_not_where_they_should_be_are_an_error():

@@ -94,6 +94,7 @@ def test_geometry_error_is_what_the_exact_geometry_says(tol):
     """Normals and gaps at the end, taken from the circle itself, are off by no more than the tolerance over forces."""
     scene, step = on_a_circle([0.4], tol)
     contact = scene.contact
+    contact.set_metric(scene.problem.body.K)
     r, there = contact.reaction, contact.x[:, :2] + scene.u.x.array[contact.points.dofs]
     arms = there - scene.surface.point
     length = np.linalg.norm(arms, axis=1, keepdims=True)

@@ -98,7 +98,6 @@ def test_an_interrupt_leaves_the_last_state(solver, monkeypatch):
                 W, q = endless(300)
                 return dc.solve_condensed(W, q, dc.Friction((0.9, 0.3), p=(0.01, 1.0)))
 
-        scene.problem.load_step()
         monkeypatch.setattr(scene.problem.bound(), "operator", Slow())
     else:  # no error is small enough: it goes on for ever
         monkeypatch.setattr(search.Search, "goes_on", property(lambda self: True))

@@ -89,22 +89,26 @@ class Reluctant:
     def __init__(self, scene, most):
         self.scene, self.most, self.refused = scene, most, 0
 
-    def bind(self, *arguments):
-        self.bound = dc.CondensedNewton().bind(*arguments)
+    def bind(self, step):
+        self.bound = dc.CondensedNewton().bind(step)
         return self
 
-    def solve(self, step):
+    def update(self, step):
+        self.bound.update(step)
+
+    def solve(self, step, starts):
         far = np.abs(self.scene.held.x.array - self.scene.u.x.array)[self.scene.problem.body.fixed]
         if COMM.allreduce(far.max(initial=0.0), op=scenes.MPI.MAX) > self.most:
             self.refused += 1
-            found = self.bound.solve(step)
-            free = np.setdiff1d(np.arange(found.x.size), step.body.fixed)
-            found.x[free] *= 1.5
-            return found
-        return self.bound.solve(step)
+            found = self.bound.solve(step, starts)
+            x = found.state.x.copy()
+            free = np.setdiff1d(np.arange(x.size), step.body.fixed)
+            x[free] *= 1.5
+            return found._replace(state=step.measure(x))
+        return self.bound.solve(step, starts)
 
-    def destroy(self):
-        self.bound.destroy()
+    def close(self):
+        self.bound.close()
 
 
 def test_increments_are_halved_and_grow_again(caplog):

@@ -153,14 +153,14 @@ def test_errors_see_friction_that_is_missing():
     problem.solve()
     push.value = 0.1
     problem.solve()
-    stiffness = contact.nodal_stiffness(problem.body.K)
+    step = contact.in_step(contact.nodal_stiffness(problem.body.K))
     good, moved = contact.reaction, np.isclose(contact.x[:, 0], 0.0)
-    assert np.abs(contact_defects(contact, stiffness)[0]).max(initial=0.0) < 1e-9
+    assert np.abs(contact_defects(step, contact.present)[0]).max(initial=0.0) < 1e-9
     for factor in (0.0, -1.0):
         wrong = good.copy()
         wrong[moved, 0] *= factor
-        contact.take(reaction=wrong)
-        missing = np.abs(contact_defects(contact, stiffness)[0])
+        state = contact.present._replace(reaction=wrong)
+        missing = np.abs(contact_defects(step, state)[0])
         assert (missing[moved, 0] > 0.9 * 0.3 * good[moved, 1]).all()
 
 

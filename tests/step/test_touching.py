@@ -119,4 +119,4 @@ def test_what_rounding_is_does_not_depend_on_whose_a_node_is():
     contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), MU)
     at_rest = np.zeros(2 * V.dofmap.index_map.size_local)
     assert not any(COMM.allgather(contact.may_land(at_rest)))
-    assert len(set(COMM.allgather(contact.gap_rounding(at_rest)))) == 1
+    assert len(set(COMM.allgather(contact.in_step().gap_rounding(at_rest)))) == 1

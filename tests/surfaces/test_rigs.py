@@ -198,9 +198,9 @@ def test_a_platen_that_is_lost_is_in_no_state(far, monkeypatch):
     scene, plane = platen(("n", "r1", "r2"))
     scene.step(0, 0, 0)
     step, x = scene.problem.load_step(), scene.u.x.array[: scene.problem.body.size].copy()
-    monkeypatch.setattr(SurfaceBalance, "reach", lambda self: None)  # it stays there
-    step.surfaces.move_to(far * np.array([0.0, 0.0, -1.0]))
-    assert not step.measure(x).error < 1e-3
+    monkeypatch.setattr(SurfaceBalance, "reached", lambda self, c: c)  # it stays there
+    state = step.measure(x, c=far * np.array([0.0, 0.0, -1.0]))
+    assert not state.errors.error < 1e-3
 
 
 @pytest.mark.parametrize("solver", [None, pytest.param(dc.FixedPoint(), marks=pytest.mark.slow)])

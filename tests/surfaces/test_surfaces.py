@@ -171,7 +171,7 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
         surface.displacement = 0.1 * rng.normal(size=d)
         surface.rotation = rng.normal(size=surface.rotation.size)
         contact.follow(given(contact, where))
-        contact.move(given(contact, where))
+        contact.take(**contact.at(given(contact, where))._asdict())
         assert contact.gap == pytest.approx(distance(surface, x + where), abs=1e-13)
         frames = np.broadcast_to(contact.frame, (len(x), d, d))
         assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(d), atol=1e-14)
@@ -179,7 +179,7 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
             slope = distance(surface, x + where + shift) - distance(surface, x + where - shift)
             assert slope / 2e-6 == pytest.approx(frames[:, -1, j], abs=1e-9)
         where = where + 0.1 * rng.normal(size=x.shape)
-        contact.move(given(contact, where))
+        contact.take(**contact.at(given(contact, where))._asdict())
         contact.advance()
 
 
@@ -189,7 +189,7 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
     rng, surface = np.random.default_rng(k), surfaces(d)[k]
     contact = block(surface).contact
     x = contact.x[:, :d]
-    contact.move(given(contact, 0.0 * x))
+    contact.take(**contact.at(given(contact, 0.0 * x))._asdict())
     contact.advance()
     gap, frame = contact.gap, contact.frame
     for _ in range(3):
@@ -198,7 +198,7 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
         R = rotation(surface)
         moved = surface.point + surface.displacement + (x - surface.point) @ R.T - x
         contact.follow(given(contact, moved))
-        contact.move(given(contact, moved))
+        contact.take(**contact.at(given(contact, moved))._asdict())
         assert contact.gap == pytest.approx(gap, abs=1e-13)
         assert np.abs(contact.slip_increment).max(initial=0) < 1e-13
         assert contact.frame == pytest.approx(frame @ R.T, abs=1e-13)
@@ -425,7 +425,7 @@ def test_waviness_is_a_gap():
         scene.step(slide, 0, -0.01)
     contact.follow(scene.u.x.array[: contact.points.size])
     u = scene.u.x.array[contact.points.dofs]
-    contact.move(scene.u)
+    contact.take(**contact.at(scene.u)._asdict())
     there = contact.x + u - plane.displacement
     assert contact.gap == pytest.approx(there[:, 2] - wave(there.T), abs=1e-14)
     assert "height=..." in repr(plane)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
@@ -17,7 +16,7 @@ from scipy import sparse
 from dolfinx_contact.contact.interface import components
 from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.petsc.linear_solver import LinearSolver
-from dolfinx_contact.solvers.base import ASTRAY, KEPT, SolverName, SolverResult
+from dolfinx_contact.solvers.base import ASTRAY, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Responses,
     Rows,
@@ -34,11 +33,11 @@ from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.interface import NodalStiffness
+    from dolfinx_contact.contact.state import State
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations for a loose body that seems to slide away, and for any other.
 FEW, MANY = 3000, 6000
@@ -60,42 +59,54 @@ class BoundCondensedNewton:
 
     Args:
         options: ``CondensedNewton``, which solves the condensed problem.
-        body: The elastic body, its stiffness assembled.
-        contacts: Its contacts.
-        stiffness: ``NodalStiffness`` of each contact, in which errors are measured.
-        memory: Keeps earlier steps, from which the next ones start.
-
-    Attributes:
-        past: The last steps' q and forces, flat, and how many of these are of anchors.
+        step: The first step.
 
     Raises:
         MemoryError: on all ranks, if ``W`` and what Newton's method needs beside it would not fit.
     """
 
-    def __init__(
-        self,
-        options: CondensedNewton,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-        memory: dict[str, Any],
-    ):
-        self._options, self.past = options, memory.setdefault("past", deque(maxlen=KEPT))
-        self._memory = memory
-        self.comm, self._body, self._contacts = body.comm, body, list(contacts)
-        self.dim = components(self._contacts)
-        self._held_by, self._shared = body.anchors or body, self._any_shared()
+    def __init__(self, options: CondensedNewton, step: LoadStep):
+        self._options, self.comm, self._body = options, step.body.comm, step.body
         self._own = None  # factors, where the body has multigrid for a solver that goes first
-        self._stiffness = stiffness
-        self._set_up()
+        self._kept: tuple[int, Responses] | None = None
+        self._moved = [np.zeros(contact.points.count, dtype=bool) for contact in step.contacts]
+        self._bind(step)
 
-    def _set_up(self) -> None:
-        """``W`` and the law, as supports move nodes at present.  Collective."""
-        body, contacts, stiffness = self._body, self._contacts, self._stiffness
+    def _bind(self, step: LoadStep) -> None:
+        """Set everything up for a step but what belongs to the stiffness alone.  Collective."""
+        self._stamps, self._contacts = step.stamps, step.contacts
+        self.dim = components(step.contacts)
+        self._held_by = self._body.anchors or self._body
+        self._shared = self._any_shared()
+        self._set_up(self._moved)
+
+    def update(self, step: LoadStep) -> None:
+        """See ``BoundSolver``: ``W`` is along the principal directions, and has no slip without friction."""
+        new, old = step.stamps, self._stamps
+        if new.stiffness != old.stiffness:
+            self._free_factors()
+        if new[:2] != old[:2] or new.parts != old.parts:
+            self._bind(step)
+            return
+        self._stamps, self._contacts = new, step.contacts
+        if new.law == old.law:
+            return
+        laws = self._acting(self._moved)
+        turned = not all(np.array_equal(a.axes, b.axes) for a, b in zip(laws, self._laws))
+        if self.comm.allreduce(turned, op=MPI.LOR) or components(step.contacts) != self.dim:
+            self._bind(step)
+            return
+        self._laws = laws
+        self.friction = joint_friction(laws, self._contacts, self.gather)
+
+    def _set_up(self, moved: list[np.ndarray]) -> None:
+        """``W`` and the law, where supports move nodes across their free direction.  Collective."""
+        body, contacts = self._body, self._contacts
+        stiffness = [contact.stiffness for contact in contacts]
         guided = any(contact.points.along.any() for contact in contacts)
         self._guided = self.dim == 3 and self.comm.allreduce(guided, op=MPI.LOR)
-        self._moved = [moved_across(contact) for contact in contacts]
-        self._laws = self._acting()
+        self._moved = moved
+        self._laws = self._acting(moved)
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
@@ -122,7 +133,7 @@ class BoundCondensedNewton:
                     W = self._surfaces.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
-                slides = any(c.changes and c.surface.deformable for c in contacts)
+                slides = any(c.given.changes and c.surface.deformable for c in contacts)
                 if not slides:  # else the next solution has other rows
                     self.operator.prepare()  # pays after some ten iterations
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
@@ -138,20 +149,22 @@ class BoundCondensedNewton:
 
         return CondensedSurfaces(self._body, self._contacts, self._turns, normal)
 
-    def _move_surfaces(self, step: LoadStep, force: np.ndarray) -> None:
-        """Let surfaces that force drives be where forces of all rows have them."""
-        if self._surfaces is not None:
-            self._surfaces.move(step, force)
+    def _motions(self, step: LoadStep, force: np.ndarray) -> np.ndarray:
+        """Motions of surfaces that forces of all rows make."""
+        return step.no_motions if self._surfaces is None else self._surfaces.moved(force)
 
-    def _driving(self, step: LoadStep) -> np.ndarray:
-        """Forces that drive the surfaces of the tied rows at present."""
-        return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step)
+    def _driving(self, step: LoadStep, c: np.ndarray) -> np.ndarray:
+        """Forces that drive the surfaces of the tied rows."""
+        return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step, c)
 
-    def destroy(self) -> None:
-        """Free factors that the body does not own.  Collective."""
+    def close(self) -> None:
+        """Free the factors.  Collective."""
+        self._free_factors()
+
+    def _free_factors(self) -> None:
         if self._own is not None:
             self._own.destroy()
-        self._own = None
+        self._own = self._kept = None
 
     def _factors(self) -> Any:
         """What has the linear solver for many right-hand sides as its ``ksp``.  Collective."""
@@ -162,9 +175,9 @@ class BoundCondensedNewton:
             self._own = LinearSolver(A, None, f"{self._body.prefix}condensed_", None)
         return self._own
 
-    def _acting(self) -> list[Friction]:
+    def _acting(self, moved: list[np.ndarray]) -> list[Friction]:
         """Friction of each contact as it acts on this problem.  Collective."""
-        laws = [acting(contact, moved) for contact, moved in zip(self._contacts, self._moved)]
+        laws = [acting(*both) for both in zip(self._contacts, moved)]
         if not self._shared:
             return laws
         from dolfinx_contact.contact.shared import mean_laws
@@ -179,108 +192,111 @@ class BoundCondensedNewton:
 
         return any_shared(self._contacts)
 
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``: W is along the principal directions, and has no slip without friction."""
-        now = self._acting()
-        turned = not all(np.array_equal(a.axes, b.axes) for a, b in zip(now, self._laws))
-        if self.comm.allreduce(turned, op=MPI.LOR) or components(self._contacts) != self.dim:
-            return False
-        self._laws = now
-        self.friction = joint_friction(self._laws, self._contacts, self.gather)
-        return True
-
-    def _begin(self, step: LoadStep) -> np.ndarray:
-        """The displacement without reactions, planes near it; set up anew if supports move other nodes.  Collective."""
+    def _begun(self, step: LoadStep) -> tuple[np.ndarray, np.ndarray]:
+        """The displacement without reactions, and surfaces near it; set up anew if supports move other nodes.  Collective."""
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
-        if self._surfaces is not None:
-            self._surfaces.begin(step, free)
+        c = step.no_motions if self._surfaces is None else self._surfaces.begun(step, free)
         if self._guided:
-            for contact in self._contacts:
-                contact.move(free)
-            now = map(moved_across, self._contacts)
+            now = [moved_across(contact, contact.at(free, c)) for contact in step.contacts]
             if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):
-                self._set_up()
+                self._set_up(now)
                 if self._surfaces is not None:  # made anew
-                    self._surfaces.begin(step, free)
-        return free
+                    c = self._surfaces.begun(step, free)
+        return free, c
 
-    def solve(self, step: LoadStep, start: np.ndarray | None = None, fallbacks: bool = True) -> SolverResult:  # fmt: skip
+    def solve(
+        self,
+        step: LoadStep,
+        starts: Sequence[Any] = (),
+        start: StepState | None = None,
+        fallbacks: bool = True,
+    ) -> SolverResult:
         """One load step by Newton's method on the condensed problem.
 
         Args:
-            step, start: The ``LoadStep``; not used: reactions of earlier steps are better starts.
+            step: The ``LoadStep``.
+            starts: q and forces of all rows of earlier steps, and how many of these are tied.
+            start: Not used: reactions of earlier steps are better starts.
             fallbacks: Whether a body that may slide is searched by all methods where Newton's fails.
         """
         self._until = perf_counter() + self._options.max_seconds  # of all searches together
-        held, first, free = self._held_by.solve, self.dim * self.nodes, self._begin(step)
+        held, first, (free, c) = self._held_by.solve, self.dim * self.nodes, self._begun(step)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
-        q = rows = self._motion(step, free)
-        placed, starts = np.zeros(q.size), self._starts(q)
+        q = rows = self._motion(step, free, c)
+        placed, near = np.zeros(q.size), self._starts(q, starts)
         if step.statics is not None:
-            q, placed, starts = self._placed(step, free, starts)
-        iterations, error, rounding, best = 0, np.inf, 0.0, None
+            q, placed, near = self._placed(step, free, c, near)
+        iterations, error, rounding, best, state = 0, np.inf, 0.0, None, None
         base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
         for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
             previous = error
             for limits in _searches(step, fallbacks):
-                goal = factor * step.tol
-                if not limits and step.statics is not None:
-                    limits = self._limited(step)
-                near = [start - placed for start in starts]
-                result = self._reactions(step, q + rounding, goal, near, acting, limits)
+                goal, given = factor * step.tol, [one - placed for one in near]
+                limits = limits or self._limited(step, state)
+                result = self._reactions(step, q + rounding, goal, given, acting, limits)
                 iterations += result.iterations
                 force = placed + np.concatenate((result.reaction.ravel(), result.tied))
                 x = self.displacement(base, force - known)
-                self._move_surfaces(step, force)
-                if self._shared:
-                    self._tell_shares(result.reaction)
-                error = step.measure(x).largest
+                state = self._measured(step, x, force, result.reaction, state)
+                error = state.errors.largest
                 solved = max(result.error, result.slip_error) <= max(goal, result.rounding)
-                if solved or (step.surfaces is not None and step.surfaces.beyond()):
+                if solved or step.pushed_off(state):
                     break
             if best is not None and not error < previous:
                 break
             change = result.change
-            if self._shared and error <= step.tol < change:
-                # The kernel's moves reactions between contacts of a node, which changes nothing else.
-                change = min(change, _next_change(step, x))
-            best = x, force, result, change
+            if self._shared and error <= step.tol < change:  # moves reactions within nodes, too
+                change = min(change, _next_change(state))
+            best = state, force, result, change
             lost = step.may_slide and result.error > max(ASTRAY, goal)
             if lost or max(error, change) <= step.tol:
                 break
             # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
             # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
-            left = step.b + self._nodal(force) - self._held_by.multiply(x)
+            left = step.b + self._nodal(force) - self._held_by.multiply(state.x)
             left[self._body.fixed] = 0.0
-            base, known, starts = x + held(left), force, [force]
-            self._move_surfaces(step, force)
+            base, known, near = state.x + held(left), force, [force]
             anchored = force[anchors] / self._scales["tied_stiffness"][: self._anchored]
-            moved = (result.displacement.ravel(), anchored, self._driving(step))
-            rounding = rounding + self._motion(step, base) - np.concatenate(moved)
-        x, force, result, change = best
-        self._move_surfaces(step, force)
-        forward = max(change, step.measure(x).largest)
-        if fallbacks or forward <= step.tol:  # else another search follows, from the same steps
-            self.past.append((rows, force, self._tied))
-        return SolverResult(x, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried)
+            moved = (result.displacement.ravel(), anchored, self._driving(step, state.c))
+            rounding = rounding + self._motion(step, base, state.c) - np.concatenate(moved)
+        state, force, result, change = best
+        forward = max(change, state.errors.largest)
+        found = state, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried
+        kept = fallbacks or forward <= step.tol  # else another search follows, from the same steps
+        return SolverResult(*found, start=(rows, force, self._tied) if kept else None)
 
-    def _limited(self, step: LoadStep) -> dict:
-        """Limits of the search for a loose body.  Collective."""
-        most = FEW if step.statics.slides(step) else MANY
+    def _measured(
+        self,
+        step: LoadStep,
+        x: np.ndarray,
+        force: np.ndarray,
+        reaction: np.ndarray,
+        before: StepState | None,
+    ) -> StepState:
+        """The state of a displacement, to which forces of all rows and reactions belong.  Collective."""
+        near = self._shares(reaction) if self._shared else None
+        state = step.measure(x, c=self._motions(step, force), before=before, near=near)
+        step.tell(state)
+        return state
+
+    def _limited(self, step: LoadStep, state: StepState | None) -> dict:
+        """Limits of the search for a loose body, none for others.  Collective."""
+        if step.statics is None:
+            return {}
+        most = FEW if state is not None and step.statics.slides(state) else MANY
         return {"max_iterations": min(most, self._options.max_iterations or most)}
 
-    def _tell_shares(self, reaction: np.ndarray) -> None:
-        """Give contacts their reactions: at nodes of several ``x`` tells no more than the sums."""
+    def _shares(self, reaction: np.ndarray) -> list[np.ndarray]:
+        """The reactions of each contact: at nodes of several ``x`` tells no more than the sums."""
         counts = self.comm.allgather(len(self._turns))
         first = sum(counts[: self.comm.rank])
         mine = reaction[first : first + len(self._turns)]
-        local, of = np.einsum("nij,ni->nj", self._turns, mine), 0
-        for contact in self._contacts:
-            contact.take(reaction=local[of : of + contact.points.count])
-            of += contact.points.count
+        local = np.einsum("nij,ni->nj", self._turns, mine)
+        ends = np.cumsum([contact.points.count for contact in self._contacts])
+        return np.split(local, ends[:-1])
 
     def _placed(
-        self, step: LoadStep, free: np.ndarray, starts: Sequence[np.ndarray]
+        self, step: LoadStep, free: np.ndarray, c: np.ndarray, starts: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, list]:
         """Of a loose body: q where it stands at first, the forces of all rows that hold it there, and starts moved there."""
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
@@ -290,14 +306,14 @@ class BoundCondensedNewton:
         placed[anchors] = stiffness[: self._anchored] * held
         if starts:  # of the last one anchors tell where it left the body
             moved[anchors] = placed[anchors] - starts[0][anchors]
-        q = self._motion(step, self.displacement(free, placed))
+        q = self._motion(step, self.displacement(free, placed), c)
         q[anchors] -= held
         starts = [start + moved for start in starts]
         return q, placed, starts + [step.statics.share() * last for last in starts[:1]]
 
     def compliance(self) -> np.ndarray:
         """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
-        changes = any(contact.changes for contact in self._contacts)
+        changes = any(contact.given.changes for contact in self._contacts)
         if changes and not self._body.nonlinear:
             kept = self._responses()
             if 2 * kept.bytes_needed(self._parts) <= available_first(self.comm):
@@ -306,13 +322,12 @@ class BoundCondensedNewton:
 
     def _responses(self) -> Responses:
         """Columns of ``K^-1`` that rows whose frames or nodes change have needed so far, of the present stiffness.  Collective."""
-        made, kept = self._memory.get("responses", (None, None))
-        if made != self._body.assemblies:
+        if self._kept is None or self._kept[0] != self._stamps.stiffness:
             reach = [contact.points.reach for contact in self._contacts]
             anchored = self._parts[1].sums.indices
-            kept = Responses(np.unique(np.concatenate([*self.comm.allgather(np.concatenate(reach)), anchored])))  # fmt: skip
-            self._memory["responses"] = self._body.assemblies, kept
-        return kept
+            columns = np.concatenate([*self.comm.allgather(np.concatenate(reach)), anchored])
+            self._kept = self._stamps.stiffness, Responses(np.unique(columns))
+        return self._kept[1]
 
     def _rows(self) -> Rows:
         """One row per local direction of a node: its global components, none at fixed dofs."""
@@ -350,17 +365,17 @@ class BoundCondensedNewton:
         sums = sparse.csr_matrix(rows, (dofs.size, whole))
         return Rows(self.comm, sparse.eye(dofs.size, format="csr"), sums, first, size)
 
-    def _motion(self, step: LoadStep, displacement: np.ndarray) -> np.ndarray:
+    def _motion(self, step: LoadStep, displacement: np.ndarray, c: np.ndarray) -> np.ndarray:
         """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
         rows = [np.zeros((0, self._turns.shape[2]))]
-        for contact, moved in zip(self._contacts, self._moved):
-            contact.move(displacement)
-            slip = contact.slip_increment - np.where(moved[:, None], 0.0, contact.known_slip)
-            rows.append(np.column_stack((slip, contact.present.gap)))
+        for contact, moved in zip(step.contacts, self._moved):
+            state = contact.at(displacement, c)
+            known = np.where(moved[:, None], 0.0, contact.known_slip(state))
+            rows.append(np.column_stack((state.slip_increment - known, state.gap)))
         local = np.einsum("nij,nj->ni", self._turns, np.concatenate(rows)).ravel()
         nodes, anchored = self._parts
         held = anchored.of(displacement)
-        return np.concatenate((nodes.gather(local), held, self._driving(step)))
+        return np.concatenate((nodes.gather(local), held, self._driving(step, c)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Displacement of owned dofs with more forces of all rows than ``base`` has."""
@@ -393,22 +408,23 @@ class BoundCondensedNewton:
             given = self.operator, self.friction, q, max(tol, 1e-14), starts, monitor
             return options.search(*given, external=acting, **self._scales)[0]
 
-        return by_first_rank(self.comm, solve, step.tell if step.monitored else None)
+        tell = None if step.monitor is None else step.monitor.tell
+        return by_first_rank(self.comm, solve, tell)
 
     # -- starts ----------------------------------------------------------------------------------
 
-    def _starts(self, q: np.ndarray) -> list[np.ndarray]:
+    def _starts(self, q: np.ndarray, starts: Sequence[Any]) -> list[np.ndarray]:
         """Reactions to start from: last step's, extrapolated, those of the most similar step, and last
         step's with the change that led to the most similar one."""
-        past = [(a, b) for a, b, _ in self.past if a.size == q.size]
+        past = [(a, b) for a, b, _ in starts if a.size == q.size]
         if not past:
             return []
         last = past[-1]
         before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
-        starts = [last[1], 2 * last[1] - before]
+        near = [last[1], 2 * last[1] - before]
         tied = 0 if self._surfaces is None else self._surfaces.tied
         if tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
-            starts.append(q[-1] / last[0][-1] * last[1])
+            near.append(q[-1] / last[0][-1] * last[1])
         scale, others = np.abs(q[: q.size - tied]).max(), np.array([other for other, _ in past])
         if tied:
             distances = self._surfaces.distances(others, q)
@@ -416,10 +432,10 @@ class BoundCondensedNewton:
             distances = np.abs(others - q).max(axis=1)
         similar = int(np.argmin(distances))
         if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
-            starts.append(past[similar][1])
+            near.append(past[similar][1])
             if similar > 0:
-                starts.append(last[1] + past[similar][1] - past[similar - 1][1])
-        return starts
+                near.append(last[1] + past[similar][1] - past[similar - 1][1])
+        return near
 
     # -- gathered from all ranks -----------------------------------------------------------------
 
@@ -443,15 +459,15 @@ def _searches(step: LoadStep, fallbacks: bool) -> tuple[dict, ...]:
     return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
 
 
-def moved_across(contact: Contact) -> np.ndarray:
+def moved_across(contact: ContactStep, state: State) -> np.ndarray:
     """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
     points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
     rows = points.supported
-    moved[rows] = points.along.any(axis=1) & contact.known_slip[rows].any(axis=1)
+    moved[rows] = points.along.any(axis=1) & contact.known_slip(state)[rows].any(axis=1)
     return moved
 
 
-def acting(contact: Contact, moved: np.ndarray) -> Friction:
+def acting(contact: ContactStep, moved: np.ndarray) -> Friction:
     """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
     free, whole = contact.free_friction, contact.friction
     if free is whole or not moved.any():
@@ -461,7 +477,7 @@ def acting(contact: Contact, moved: np.ndarray) -> Friction:
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=np.where(moved[:, None], axes, free.axes))
 
 
-def _next_change(step: LoadStep, x: np.ndarray) -> float:
+def _next_change(state: StepState) -> float:
     from dolfinx_contact.solvers.newton.contact_tangent import next_change
 
-    return next_change(step, x)
+    return next_change(state)

@@ -16,7 +16,7 @@ from dolfinx_contact.support.checks import finite, free_memory
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
 
 # Compliance over the mean one that counts as none, as the kernel has it (Tuning::negligible).
 NEGLIGIBLE = 1e-14
@@ -122,7 +122,7 @@ def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
 
 
 def joint_friction(
-    laws: Sequence[Friction], contacts: Sequence[Contact], gather: Callable
+    laws: Sequence[Friction], contacts: Sequence[ContactStep], gather: Callable
 ) -> Friction:
     """The law of all nodes; contacts with the same coefficients stay one uniform law.
 

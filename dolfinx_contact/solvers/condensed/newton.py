@@ -26,6 +26,7 @@ from dolfinx_contact.support.checks import RoundingWarning, positive
 
 if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import BoundSolver
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 UNLIMITED = 200_000  # iterations; methods have limits of their own
@@ -149,13 +150,13 @@ class CondensedNewton:
         )  # fmt: skip
         return result, bool(found.converged)
 
-    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+    def bind(self, step: LoadStep) -> BoundSolver:
         """See ``Solver``."""
         from dolfinx_contact.solvers.condensed.body import (
             BoundCondensedNewton,  # arrays alone do without DOLFINx
         )
 
-        return BoundCondensedNewton(self, body, contacts, stiffness, memory)
+        return BoundCondensedNewton(self, step)
 
 
 def solve_condensed(

@@ -13,7 +13,7 @@ from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.step.load_step import LoadStep
 
 
@@ -36,7 +36,7 @@ class CondensedSurfaces:
     def __init__(
         self,
         body: ElasticBody,
-        contacts: Sequence[Contact],
+        contacts: Sequence[ContactStep],
         turns: np.ndarray,
         stiffness: np.ndarray,
     ):
@@ -65,24 +65,24 @@ class CondensedSurfaces:
         bordered[size:, size:] = -np.diag(self._springs[loose])
         return bordered
 
-    def begin(self, step: LoadStep, free: np.ndarray) -> None:
-        """Planes begin where they were; where springs are not stretched if these are eliminated; all near the body.
+    def begun(self, step: LoadStep, free: np.ndarray) -> np.ndarray:
+        """Where planes begin: where they were; where springs are not stretched if these are eliminated; all near the body.
 
         Args:
+            step: The step.
             free: Displacement of owned degrees of freedom without reactions.
         """
-        step.surfaces.move_to(np.zeros(step.surfaces.count))
-        step.surfaces.move_to(step.surfaces.at_rest(self._stiffest))
-        step.surfaces.touch(free)
-        self._at_first = step.surfaces.moved
+        c = step.surfaces.at_rest(step.no_motions, self._stiffest)
+        self._at_first = step.surfaces.touched(step.contacts, free, c)
+        return self._at_first
 
-    def move(self, step: LoadStep, force: np.ndarray) -> None:
-        """Move the planes where forces of all rows have them, the tied rows' last."""
-        moved, stiff = np.zeros(step.surfaces.count), self._stiff
+    def moved(self, force: np.ndarray) -> np.ndarray:
+        """Where forces of all rows, the tied rows' last, have the planes."""
+        moved, stiff = np.zeros(len(self._springs)), self._stiff
         moved[~stiff] = force[len(force) - self.tied :]
         reactions = force[: len(self._axes)]
         moved[stiff] = -(reactions @ self._pulled[:, stiff]) / self._springs[stiff]
-        step.surfaces.move_to(self._at_first + moved)
+        return self._at_first + moved
 
     def distances(self, others: np.ndarray, q: np.ndarray) -> np.ndarray:
         """How far steps are from that of ``q``, length units; forces that drive planes count by their part of the largest."""
@@ -91,9 +91,9 @@ class CondensedSurfaces:
         apart[:, -self.tied :] *= np.abs(lengths).max() / largest
         return apart.max(axis=1)
 
-    def driving(self, step: LoadStep) -> np.ndarray:
-        """Forces that drive the planes of the tied rows at present."""
-        return step.surfaces.driving()[~self._stiff]
+    def driving(self, step: LoadStep, c: np.ndarray) -> np.ndarray:
+        """Forces that drive the planes of the tied rows, in motions of all."""
+        return step.surfaces.driving(c)[~self._stiff]
 
 
 def _turned(turns: np.ndarray, axes: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def _turned(turns: np.ndarray, axes: np.ndarray) -> np.ndarray:
     return rows.reshape(-1, rows.shape[2])
 
 
-def _past_held(contact: Contact, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _past_held(contact: ContactStep, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``D``, and what of it the reactions without those along held directions pull by: friction there goes with the normal one."""
     if contact.dragged is None:
         return axes, axes

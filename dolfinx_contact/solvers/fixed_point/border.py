@@ -4,18 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import block_diag
 
-from dolfinx_contact.step.load_step import driven_surfaces
-
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.step.load_step import LoadStep
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
 STEPS, LEFT = 50, 1e-6
@@ -34,26 +31,18 @@ class Border:
     ``s = D^T S D + k``.  Springs ``a`` of anchors in ``A`` are undone by ``C = E a`` and ``s = a``.
 
     Args:
-        body: The body.
-        contacts: Its contacts.
+        step: The step: its body, contacts and surfaces.
         A: The stiffness plus springs, a PETSc matrix.
         stiffened: What applies a preconditioner of A.
         springs: ``S`` of each contact, ``shape=(n, gdim)``, force per length.  Collective.
     """
 
-    def __init__(
-        self,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        A: PETSc.Mat,
-        stiffened: Any,
-        springs: Any,
-    ):
+    def __init__(self, step: LoadStep, A: PETSc.Mat, stiffened: Any, springs: Any):
+        body, surfaces = step.body, step.surfaces
         self._body, self._loose = body, body.loose is not None
-        surfaces = driven_surfaces(body, contacts)
         columns, s = [], np.zeros((0, 0))
         if surfaces is not None:
-            columns.append(surfaces.columns(springs))
+            columns.append(surfaces.columns(step.contacts, springs))
             pairs = zip(surfaces.axes, springs)
             stiffness = sum(np.einsum("nim,ni,nik->mk", axes, S, axes) for axes, S in pairs)
             s = np.diag(surfaces.springs) + body.total(stiffness)

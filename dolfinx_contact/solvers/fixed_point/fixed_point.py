@@ -17,10 +17,7 @@ from dolfinx_contact.support.anderson import Anderson
 from dolfinx_contact.support.checks import positive
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
@@ -92,78 +89,74 @@ class FixedPoint:
         positive("max_iterations", self.max_iterations, whole=True)
         positive("max_seconds", self.max_seconds)
 
-    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+    def bind(self, step: LoadStep) -> BoundSolver:
         """See ``Solver``."""
-        return BoundFixedPoint(self, body, contacts, stiffness)
+        return BoundFixedPoint(self, step)
 
 
-def _slides(step: LoadStep, x: np.ndarray, tried: bool = False) -> bool:
+def _slides(state: StepState, tried: bool = False) -> bool:
     """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
+    step = state.step
     if step.surfaces is None and not (tried and step.statics is not None):
         return False
-    step.measure(x)
-    return step.slides() if tried else bool(step.surfaces.beyond())
+    state = step.measure(state.x, before=state)
+    return step.slides(state) if tried else step.pushed_off(state)
 
 
 class BoundFixedPoint:
-    """The fixed point for one body; keeps the preconditioner of the rho used last."""
+    """The fixed point for the steps of a problem; keeps the preconditioner of the rho used last."""
 
-    def __init__(
-        self,
-        options: FixedPoint,
-        body: ElasticBody,
-        contacts: Sequence[Contact],
-        stiffness: Sequence[NodalStiffness],
-    ):
-        self._options, self._body, self._contacts = options, body, contacts
-        self._stiffness = stiffness
+    def __init__(self, options: FixedPoint, step: LoadStep):
+        self._options, self._stamps = options, step.stamps
         self.preconditioner: ContactPreconditioner | None = None
         self._factor = 0.0
 
-    def destroy(self) -> None:
+    def close(self) -> None:
         """Free the preconditioner.  Collective."""
         if self.preconditioner is not None:
             self.preconditioner.destroy()
         self.preconditioner, self._factor = None, 0.0
 
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``: of the law the preconditioner knows its springs alone."""
-        if self.preconditioner is not None and not self.preconditioner.same_springs():
-            self.destroy()
-        return True
+    def update(self, step: LoadStep) -> None:
+        """See ``BoundSolver``: within a step springs of nearly the same rows do as well, but not those of motions that follow."""
+        new, old, self._stamps = step.stamps, self._stamps, step.stamps
+        if self.preconditioner is None:
+            return
+        stale = new.stiffness != old.stiffness or new.parts != old.parts
+        if new.rows != old.rows:
+            stale = stale or new.step != old.step or self.preconditioner.followed
+        if stale or (new.law != old.law and not self.preconditioner.same_springs(step.contacts)):
+            self.close()
 
-    def renew_rows(self, stiffness: Sequence[NodalStiffness]) -> bool:
-        """See ``BoundSolver``: springs of nearly the same rows do as well, but not those of motions that follow."""
-        self._stiffness = stiffness
-        return self.preconditioner is not None and not self.preconditioner.followed
-
-    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 
         Args:
             step: The ``LoadStep``.
+            starts: Not used.
             start: Where to begin; None asks the step.
         """
-        options = self._options
         start = step.start() if start is None else start
-        search, attempts = Search(step, start, options.max_seconds), []
-        for name, factor, every, x in self._attempts(search, start):
+        search, attempts = Search(step, start, self._options.max_seconds), []
+        for name, factor, every, state in self._attempts(search, start):
             attempts.append(f"{name} ({search.iterations})")
-            self._fall(search, factor, every, x)
-            if search.over or _slides(step, search.best):
+            self._fall(search, factor, every, state)
+            if search.over or _slides(search.best):
                 break
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
+        if not search.within and search.strayed is not None:
+            found = search.strayed.judged, search.iterations, 0.0, SolverName.FIXED_POINT
         said = []
-        if not search.within and not _slides(step, search.best, tried=True):
+        if not search.within and not _slides(search.best, tried=True):
             from dolfinx_contact.solvers.fixed_point.put_back import wrong
             from dolfinx_contact.step.stalled import stalled
 
-            said += stalled(self._body, self._contacts, search.statuses, wrong(step, search.best))
+            said += stalled(step.body, step.contacts, search.statuses, wrong(search.best))
         if len(attempts) > 1:
             said.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
         return SolverResult(*found, reason="; ".join(said))
 
-    def _attempts(self, search: Search, start: np.ndarray) -> Iterator[tuple]:
+    def _attempts(self, search: Search, start: StepState) -> Iterator[tuple]:
         """The attempts in their order: a name, rho, every how many iterations there is a tangent, and where it begins.  Collective."""
         options = self._options
         again = AGAIN if options.max_iterations > EVERY else ()
@@ -179,40 +172,40 @@ class BoundFixedPoint:
                 else:
                     from dolfinx_contact.solvers.fixed_point.put_back import put_back
 
-                    yield "nodes put back", factor, every, put_back(search.step, search.best, where)
-            if _slides(search.step, search.best, tried=True):
+                    yield "nodes put back", factor, every, put_back(search.best, where)
+            if _slides(search.best, tried=True):
                 return
 
-    def _half_way(self, search: Search, factor: float) -> np.ndarray:
+    def _half_way(self, search: Search, factor: float) -> StepState:
         """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
         step, half = search.step, search.step.half_way()
         other = Search(half, half.start(), self._options.max_seconds)
         self._fall(other, factor, EVERY, other.best, 2 * EVERY)
         search.count(other.iterations)
-        x = other.nearest.copy()
-        x[self._body.fixed] = step.b[self._body.fixed]
-        return x
+        x = other.nearest.x.copy()
+        x[step.body.fixed] = step.b[step.body.fixed]
+        return step.evaluate(x, step.measuring_maps, c=other.nearest.c)
 
-    def _fall(self, search: Search, factor: float, every: int, x: np.ndarray, most: int = 10**9) -> None:  # fmt: skip
-        """Iterate from ``x`` with one rho while the errors fall, with a tangent every so many iterations; ``most`` of them."""
+    def _fall(self, search: Search, factor: float, every: int, state: StepState, most: int = 10**9) -> None:  # fmt: skip
+        """Iterate from a state with one rho while the errors fall, with a tangent every so many iterations; ``most`` of them."""
         first = search.iterations == 0
-        search.begin(x, min(most, self._options.max_iterations), PATIENCE)
-        near, growth = NEAR if first and self._contacts else 0.0, GROWTH
+        search.begin(state, min(most, self._options.max_iterations), PATIENCE)
+        near, growth = NEAR if first and search.step.contacts else 0.0, GROWTH
         while search.goes_on:
             known = search.step.continues and search.iterations == 0
-            maps = self._set(factor, known)
+            maps = self._set(search.step, factor, known)
             near = 0.0 if known and self.preconditioner.linearised else near
             self._accelerate(search, maps, search.nearest, every, near, growth)
             near, growth = 0.0, GROWTH * growth
 
-    def _set(self, factor: float, known: bool) -> list:
+    def _set(self, step: LoadStep, factor: float, known: bool) -> list:
         """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
         bipotential = self._options.map == "bipotential"
-        parameters = [factor * of.normal for of in self._stiffness]
+        parameters = [factor * contact.stiffness.normal for contact in step.contacts]
         maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]
         if self._factor != factor:
-            self.destroy()  # one factorisation at a time: memory counts more than time
-            self.preconditioner = ContactPreconditioner(self._body, self._contacts, maps)
+            self.close()  # one factorisation at a time: memory counts more than time
+            self.preconditioner = ContactPreconditioner(step, maps)
             self._factor = factor
         if not known:
             self.preconditioner.forget_tangent()
@@ -222,22 +215,24 @@ class BoundFixedPoint:
         self,
         search: Search,
         maps: Sequence[NodalMap],
-        x: np.ndarray,
+        start: StepState,
         every: int,
         near: float,
         growth: float,
     ) -> None:
-        """Anderson's method from ``x``, until the search ends or the error is ``growth`` times that at the last tangent; with one at once if it is below ``near``."""
+        """Anderson's method from a state, until the search ends or the error is ``growth`` times that at the last tangent; with one at once if it is below ``near``."""
         step, tangent = search.step, np.inf  # error at the last tangent
+        x, before = start.x, start.as_start
         anderson = Anderson(x.size, self._options.depth, step.total)
         smallest, due, limit = np.inf, search.left - every, growth
         while True:
-            x, forces = self.preconditioner.rigid.balanced(x, step, maps)
-            residual = search.residual(x, maps, forces)
+            x, forces, c = self.preconditioner.rigid.balanced(x, step, maps, before)
+            state = step.evaluate(x, maps, forces=forces, c=c, before=before)
+            before = search.see(state)
             if not search.goes_on or search.error > limit * tangent:
                 return
             if search.left <= due or search.error < near:
-                search.error = step.errors_in_full(x).largest
+                search.error = before.errors.largest
             if search.left <= due or search.error < near:
                 limit = growth if near == 0.0 else 1.0  # one at once has to help at once
                 due, near = search.left - every, 0.0
@@ -246,14 +241,14 @@ class BoundFixedPoint:
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
                     self.preconditioner.forget_tangent()
                     if not useless:
-                        self.preconditioner.linearise(step.derivatives(x, maps, forces))
+                        self.preconditioner.linearise(step, step.derivatives(state, maps))
                     anderson.restart()
                     smallest = np.inf
                 tangent = np.inf if useless else search.error
-            following, norm = anderson.step(x, self.preconditioner.correct(residual))
+            following, norm = anderson.step(x, self.preconditioner.correct(state.residual))
             search.count(1)
             if norm > ASTRAY * smallest:  # the differences mislead: start again from the best
                 anderson.restart()
-                following, smallest = search.nearest, np.inf
+                following, smallest = search.nearest.x, np.inf
             smallest = min(smallest, norm)
             x = following

@@ -17,17 +17,16 @@ from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patc
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.law.maps import NodalMap
+    from dolfinx_contact.step.load_step import LoadStep
 
 
 class ContactPreconditioner:
     """Corrects a displacement for forces out of balance; every application is one cycle or back-solve.
 
     Args:
-        body: The body, its stiffness assembled.
-        contacts: Its contacts.
+        step: The step: its body, rows and laws of its contacts.
         maps: Of each contact; their springs are added to the stiffness.  Collective.
 
     Attributes:
@@ -37,22 +36,23 @@ class ContactPreconditioner:
         followed: Whether motions of surfaces or anchors follow the body.
     """
 
-    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], maps: Sequence[NodalMap]):
-        self._body, self._contacts, self._maps = body, contacts, maps
-        self._spring_rates = self._rates()
+    def __init__(self, step: LoadStep, maps: Sequence[NodalMap]):
+        body, self._maps = step.body, maps
+        self._body, self._points = body, [contact.points for contact in step.contacts]
+        self._spring_rates = self._rates(step.contacts)
         self._layer, self.linearised = None, False
         with stage("contact: set-up of springs"):
-            S, how = self._springs(), structure([contact.points for contact in contacts])
+            S, how = self._springs(), structure(self._points)
             A, self.stiffened = body.stiffened(S, how)
-            self.rigid = RigidBalance(body, contacts, A, body.rigid_modes())
+            self.rigid = RigidBalance(body, A, body.rigid_modes())
             self._softened = False
         self._A = A
-        self.followed = body.loose is not None or any(c.surface.motions for c in contacts)
+        self.followed = body.loose is not None or step.surfaces is not None
         self._border = None
         if self.followed:
             from dolfinx_contact.solvers.fixed_point.border import Border
 
-            self._border = Border(body, contacts, A, self.stiffened, self._spring_rates)
+            self._border = Border(step, A, self.stiffened, self._spring_rates)
         S.destroy()
 
     def soften(self) -> bool:
@@ -60,8 +60,8 @@ class ContactPreconditioner:
         if self._softened:
             return False
         self._softened, known = True, len(self.rigid)
-        modes = (self._body.rigid_modes(), patch_motions(self._body, self._contacts))
-        rigid = RigidBalance(self._body, self._contacts, self._A, np.concatenate(modes, axis=1))
+        modes = (self._body.rigid_modes(), patch_motions(self._body, self._points))
+        rigid = RigidBalance(self._body, self._A, np.concatenate(modes, axis=1))
         self.rigid = rigid if len(rigid) > known else self.rigid
         return len(rigid) > known
 
@@ -72,38 +72,38 @@ class ContactPreconditioner:
         if self._layer is not None:
             self._layer.destroy()
 
-    def _rates(self) -> list[np.ndarray]:
-        """The maps' springs under the present laws, of each contact."""
-        both = zip(self._contacts, self._maps)
+    def _rates(self, contacts: Sequence[ContactStep]) -> list[np.ndarray]:
+        """The maps' springs under the laws of each contact."""
+        both = zip(contacts, self._maps)
         return [map.springs(contact.friction, contact.points.dim) for contact, map in both]
 
-    def same_springs(self) -> bool:
-        """Whether the present laws have the springs that are set up.  Collective."""
-        same = all(map(np.array_equal, self._rates(), self._spring_rates))
+    def same_springs(self, contacts: Sequence[ContactStep]) -> bool:
+        """Whether the laws of contacts have the springs that are set up.  Collective."""
+        same = all(map(np.array_equal, self._rates(contacts), self._spring_rates))
         return self._body.comm.allreduce(same, op=MPI.LAND)
 
     def _springs(self):
         """The maps' springs, a PETSc matrix with entries at contact nodes alone."""
         K, S = self._body.K, None
-        for contact, springs in zip(self._contacts, self._spring_rates):
-            blocks = springs[:, :, None] * np.eye(contact.points.dim)
-            matrix = contact.points.matrix(blocks)
+        for points, springs in zip(self._points, self._spring_rates):
+            matrix = points.matrix(springs[:, :, None] * np.eye(points.dim))
             S = matrix if S is None else S + matrix
         if S is None:
             S = sparse.csr_matrix((self._body.size, K.getSize()[1]))
         return like(K, S)
 
-    def linearise(self, derivatives: Sequence[tuple]) -> None:
-        """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.
+    def linearise(self, step: LoadStep, derivatives: Sequence[tuple]) -> None:
+        """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.  Collective.
 
         Args:
+            step: The step, whose rows count.
             derivatives: As ``LoadStep.derivatives`` returns them.
         """
         if self._layer is None:
             prefix = f"{self._body.prefix}layer_"
-            self._layer = SurfaceLayer(self._body, self._contacts, prefix)
+            self._layer = SurfaceLayer(self._body, self._points, prefix)
         with stage("contact: surface layer"):
-            self._layer.linearise(derivatives)
+            self._layer.linearise(step, derivatives)
         self.linearised = True
 
     def forget_tangent(self) -> None:

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.interface import ContactPoints
     from dolfinx_contact.law.maps import NodalMap
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
 # (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
@@ -47,7 +47,6 @@ class RigidBalance:
 
     Args:
         body: The elastic body, its stiffness assembled.
-        contacts: Its contacts.
         A: The stiffness plus springs of the preconditioner, a PETSc matrix.
         modes: Motions that may be soft, ``shape=(owned dofs, k)``.  Collective.
 
@@ -56,10 +55,8 @@ class RigidBalance:
         forces: ``K Z``, of the same shape.
     """
 
-    def __init__(
-        self, body: ElasticBody, contacts: Sequence[Contact], A: PETSc.Mat, modes: np.ndarray
-    ):
-        self._body, self._contacts = body, contacts
+    def __init__(self, body: ElasticBody, A: PETSc.Mat, modes: np.ndarray):
+        self._body = body
         forces = np.array([body.multiply(z) for z in modes.T]).T
         right, left = A.createVecs()
         stiffened = np.empty_like(modes)
@@ -83,36 +80,37 @@ class RigidBalance:
         return len(self._energy)
 
     def balanced(
-        self, x: np.ndarray, step: LoadStep, maps: Sequence[NodalMap]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """``x``, moved along the soft motions, or as it was if there is no way down; and the step's ``forces`` there.
+        self, x: np.ndarray, step: LoadStep, maps: Sequence[NodalMap], before: StepState
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """``x``, moved along the soft motions, or as it was if there is no way down; the step's ``forces`` there, and motions of surfaces.
 
         Args:
             x: Displacement of owned degrees of freedom.
             step: The ``LoadStep``.
             maps: Of the contacts.
+            before: A state nearby.
         """
-        start = (x, step.forces(x))
+        start = (x, step.forces(x), before.c)
         if len(self) == 0:
             return start
-        (x, forces), (left, slope, size) = start, self.left(*start, step, maps)
+        x, forces, _ = start
+        left, slope, size, before = self.left(x, forces, step, maps, before)
         for _ in range(NEWTON):
             if np.linalg.norm(left) <= SMALL * size:
                 break
             direction = self._limited(np.linalg.lstsq(slope, left, rcond=1e-13)[0])
             for length in halves(SHORTEST):
-                c = length * direction
-                trial = x + self.modes @ c, forces - self.forces @ c
-                result = self.left(*trial, step, maps)
+                way = length * direction
+                trial = x + self.modes @ way, forces - self.forces @ way
+                result = self.left(*trial, step, maps, before)
                 if np.linalg.norm(result[0]) < np.linalg.norm(left):
                     break
             else:
-                trial, result = self._across((x, forces), left, slope, step, maps)
+                trial, result = self._across((x, forces), left, slope, step, maps, before)
                 if trial is None:
-                    x, forces = start
-                    break
-            (x, forces), (left, slope, size) = trial, result
-        return x, forces
+                    return start
+            (x, forces), (left, slope, size, before) = trial, result
+        return x, forces, before.c
 
     def _across(
         self,
@@ -121,6 +119,7 @@ class RigidBalance:
         slope: np.ndarray,
         step: LoadStep,
         maps: Sequence[NodalMap],
+        near: StepState,
     ) -> tuple:
         """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
 
@@ -141,7 +140,7 @@ class RigidBalance:
             if not c.any() or (self._limited(c) != c).any():
                 break
             trial = start[0] + self.modes @ c, start[1] - self.forces @ c
-            result = self.left(*trial, step, maps)
+            result = self.left(*trial, step, maps, near)
             if np.linalg.norm(result[0]) < TURNED * before:
                 return trial, result
             low, high = (length, high) if result[0] @ way > 0.0 else (low, length)
@@ -157,16 +156,21 @@ class RigidBalance:
         )
 
     def left(
-        self, x: np.ndarray, forces: np.ndarray, step: LoadStep, maps: Sequence[NodalMap]
-    ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Forces along the motions, minus their derivative, and the norm of the forces on all nodes.
+        self,
+        x: np.ndarray,
+        forces: np.ndarray,
+        step: LoadStep,
+        maps: Sequence[NodalMap],
+        before: StepState,
+    ) -> tuple[np.ndarray, np.ndarray, float, StepState]:
+        """Forces along the motions, minus their derivative, the norm of the forces on all nodes, and the state.
 
         All in roots of energy: each force over the root of its node's stiffness in A.
         """
         n, surfaces = len(self), step.surfaces
         slope, pushed, pushing = np.zeros((n, n)), 0.0, 0.0
-        derivatives = step.derivatives(x, maps, forces)
-        for k, (contact, both) in enumerate(zip(self._contacts, derivatives)):
+        state, derivatives = step.linearise(x, maps, forces=forces, c=before.c, before=before)
+        for k, (contact, both) in enumerate(zip(step.contacts, derivatives)):
             Z, KZ = contact.points.motion(self.modes), contact.points.reactions(self.forces)
             change = both[0] @ KZ + both[1] @ Z
             slope -= np.tensordot(Z, change, ((0, 1), (0, 1)))
@@ -176,24 +180,26 @@ class RigidBalance:
                 pushing = pushing + np.tensordot(Z, both[1] @ axes, ((0, 1), (0, 1)))
         if surfaces is not None:  # which follow
             pushed = self._body.total(pushed)
-            slope -= pushing @ np.linalg.solve(surfaces.tangent(derivatives), pushed)
-        left = step.free(step.with_reactions(forces))
+            resisting = surfaces.tangent(step.contacts, derivatives)
+            slope -= pushing @ np.linalg.solve(resisting, pushed)
+        left = state.residual
         scaled = self._scale * left
         sums = np.concatenate((self.modes.T @ left, slope.ravel(), [scaled @ scaled]))
         sums = self._body.total(sums)  # one reduction
-        return sums[:n], self._energy + sums[n:-1].reshape(n, n), np.sqrt(sums[-1])
+        slope = self._energy + sums[n:-1].reshape(n, n)
+        return sums[:n], slope, np.sqrt(sums[-1]), state
 
 
-def patch_motions(body: ElasticBody, contacts: Sequence[Contact]) -> np.ndarray:
+def patch_motions(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
     """What the body gives way to forces and moments on each of its contacts, ``shape=(owned dofs, m)``.
 
     The bending of a slender body is among them.  One solve with the stiffness for each.  Collective.
     """
     rigid, motions = body.rigid_modes(), [np.zeros((body.size, 0))]
-    for contact in contacts:
+    for one in points:
         for z in rigid.T:
             forces = np.zeros(body.size)
-            contact.points.add_forces(contact.points.motion(z), forces)
+            one.add_forces(one.motion(z), forces)
             forces[body.fixed] = 0.0
             if body.norm(forces) > 0.0:
                 motions.append(body.solve(forces, rough=True)[:, None])

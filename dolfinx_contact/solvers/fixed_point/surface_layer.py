@@ -13,11 +13,11 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
 from dolfinx_contact.solvers.newton.contact_tangent import change_of
-from dolfinx_contact.step.load_step import driven_surfaces
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.interface import ContactPoints
+    from dolfinx_contact.step.load_step import LoadStep
 
 LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
@@ -32,16 +32,16 @@ class SurfaceLayer:
 
     Args:
         body: The elastic body, its stiffness assembled.
-        contacts: Its contacts.
+        points: ``ContactPoints`` of its contacts.
         prefix: Of the PETSc options of the factorisation, MUMPS by default.
 
     Attributes:
         dofs: Owned free degrees of freedom of the layers.
     """
 
-    def __init__(self, body: ElasticBody, contacts: Sequence[Contact], prefix: str):
-        self._body, self._contacts, self._prefix = body, contacts, prefix
-        self.dofs = _near(body, contacts)
+    def __init__(self, body: ElasticBody, points: Sequence[ContactPoints], prefix: str):
+        self._body, self._prefix = body, prefix
+        self.dofs = _near(body, points)
         first, last = body.K.getOwnershipRange()
         rows, layer = (
             PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), body.comm)
@@ -52,8 +52,7 @@ class SurfaceLayer:
         self._near, self._forces = self._columns.createVecs()
         self._layer, self._block = layer, body.K.createSubMatrix(layer, layer)
         self._solver = None
-        self._surfaces = driven_surfaces(body, contacts)
-        self._pushing = None if self._surfaces is None else self._surfaces.columns()
+        self._pushing: np.ndarray | None = None
 
     def destroy(self) -> None:
         """Free the factorisation and the columns of K.  Collective."""
@@ -62,19 +61,20 @@ class SurfaceLayer:
         if self._solver is not None:
             self._solver.destroy()
 
-    def linearise(self, derivatives: Sequence[tuple]) -> None:
+    def linearise(self, step: LoadStep, derivatives: Sequence[tuple]) -> None:
         """Factorise the block at new derivatives of the nodal maps.  Collective.
 
         Args:
+            step: The step, whose rows and surfaces count.
             derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
         """
         self._derivatives = derivatives
-        self._points = [contact.points for contact in self._contacts]
-        if self._surfaces is not None:
-            none = np.zeros(self._body.size)
+        self._points = [contact.points for contact in step.contacts]
+        if step.surfaces is not None:
+            none, self._pushing = np.zeros(self._body.size), step.surfaces.columns(step.contacts)
             pushed = [response(self._points, derivatives, none, way) for way in self._pushing.T]
             self._pushed = np.array(pushed).T
-            self._resisting = self._surfaces.tangent(derivatives)
+            self._resisting = step.surfaces.tangent(step.contacts, derivatives)
         whole = [
             like(self._body.K, part) for part in responses(self._body.K, self._points, derivatives)
         ]
@@ -105,20 +105,20 @@ class SurfaceLayer:
         """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
         change = response(self._points, self._derivatives, forces, x)
         product = forces - change
-        if self._surfaces is not None:  # which follow
+        if self._pushing is not None:  # surfaces that follow
             pushed = self._body.total(self._pushing.T @ change)
             product -= self._pushed @ np.linalg.solve(self._resisting, pushed)
         product[self._body.fixed] = 0.0
         return product
 
 
-def _near(body: ElasticBody, contacts: Sequence[Contact]) -> np.ndarray:
+def _near(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
     of = body.displacements
     gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)
-    for contact in contacts:
+    for one in points:
         touched = np.zeros(body.size)
-        contact.points.add_magnitudes(np.ones_like(contact.reaction), touched)
+        one.add_magnitudes(np.ones((one.count, one.dim)), touched)
         rows = of.rows(touched).any(axis=1)
         near.x.array[gdim * np.flatnonzero(rows)[:, None] + np.arange(gdim)] = 1.0
     for _ in range(LAYERS - 1):

@@ -11,13 +11,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.contact.interface import like, response, responses, structure
-from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.contact.interface import ContactPoints
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 
 class ContactTangent:
@@ -28,11 +27,11 @@ class ContactTangent:
 
     Args:
         body: The body; its ``K`` may change its values, not its pattern.
-        contacts: Its contacts.
+        points: ``ContactPoints`` of its contacts.
     """
 
-    def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
-        self._body, self._points = body, [contact.points for contact in contacts]
+    def __init__(self, body: ElasticBody, points: Sequence[ContactPoints]):
+        self._body, self._points = body, points
         self._A = self._solver = None
         self._free = np.ones(body.size)
         self._free[body.fixed] = 0.0
@@ -141,45 +140,53 @@ def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> P
     return change
 
 
-def next_change(step: LoadStep, x: np.ndarray) -> float:
+def next_change(state: StepState) -> float:
     """How much Newton's next step would still change the sums of reactions at nodes, over the forces that act.  Collective.
 
     Args:
-        step: A ``LoadStep`` without planes that force drives, else infinite.
-        x: Displacement of owned degrees of freedom.
+        state: Of a step without planes that force drives, else infinite.
     """
+    step, body = state.step, state.step.body
     if step.surfaces is not None:
         return np.inf
-    body, tangent = step.body, ContactTangent(step.body, step.contacts)
-    maps = [ReturnMap(of.normal, of.normal) for of in step.stiffness]
+    tangent = ContactTangent(body, [contact.points for contact in step.contacts])
     try:
-        forces = step.forces(x)
-        tangent.linearise(step.derivatives(x, maps, forces))
-        dx = tangent.solve(step.free(step.out_of_balance(x, maps, forces)))
+        near = step.evaluate(state.x, step.measuring_maps, before=state)
+        tangent.linearise(step.derivatives(near, step.measuring_maps))
+        dx = tangent.solve(near.residual)
     except (LinearSolverError, PETSc.Error):
         return np.inf
     finally:
         tangent.destroy()
-    acting = max(step.size(forces), body.norm(step.external))
+    acting = max(step.size(near.forces), body.norm(step.external))
     return step.size(body.multiply(dx)) / acting if acting > 0.0 else np.inf
 
 
 class OnTangent:
     """A solver on the tangent of one body, bound; keeps its ordering."""
 
-    def __init__(self, options: Any, body: ElasticBody, contacts: Sequence[Contact]):
-        if any(contact.surface.motions for contact in contacts):
+    def __init__(self, options: Any, step: LoadStep):
+        if step.surfaces is not None:
             raise ValueError(
                 f"{type(options).__name__}() does not know planes driven by force: use solver=None, dc.CondensedNewton() or "
                 "dc.FixedPoint()."
             )
-        self._options, self._body = options, body
-        self._tangent = ContactTangent(body, contacts)
+        self._options, self._body = options, step.body
+        self._bind(step)
 
-    def destroy(self) -> None:
+    def _bind(self, step: LoadStep) -> None:
+        self._stamps = step.stamps
+        self._tangent = ContactTangent(step.body, [contact.points for contact in step.contacts])
+
+    def update(self, step: LoadStep) -> None:
+        """See ``BoundSolver``: nothing that is kept knows the law, and of a nonlinear body the stiffness is new in every iteration."""
+        new, old = step.stamps, self._stamps
+        stiffness = new.stiffness != old.stiffness and not self._body.nonlinear
+        if stiffness or new.rows != old.rows:
+            self.close()
+            self._bind(step)
+        self._stamps = new
+
+    def close(self) -> None:
         """Free the tangent.  Collective."""
         self._tangent.destroy()
-
-    def renew_law(self) -> bool:
-        """See ``BoundSolver``: nothing that is kept knows the law."""
-        return True

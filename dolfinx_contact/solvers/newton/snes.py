@@ -21,7 +21,7 @@ from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
 from dolfinx_contact.solvers.search import Search
 
 if TYPE_CHECKING:
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 DEFAULT = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
 MOST = 10_000  # iterations, far more than snes_max_it
@@ -57,33 +57,36 @@ class SNES:
                 f'petsc_options must be a dictionary such as {{"snes_monitor": None}}, got {self.petsc_options!r}.'
             )
 
-    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+    def bind(self, step: LoadStep) -> BoundSolver:
         """See ``Solver``."""
-        return BoundSNES(self, body, contacts)
+        return BoundSNES(self, step)
 
 
 class BoundSNES(OnTangent):
     """SNES for one body."""
 
-    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
         """Let SNES iterate until the errors are at most the tolerance, or it gives up.
 
         Args:
             step: The ``LoadStep``.
+            starts: Not used.
             start: Where to begin; None asks the step.
         """
-        x = step.start() if start is None else start
-        search = Search(step, x, math.inf)
+        state = step.start() if start is None else start
+        search = Search(step, state, math.inf)
         search.begin(search.best, MOST)
-        maps = [ReturnMap(NORMAL * of.normal, of.normal) for of in step.stiffness]
+        kappa = [contact.stiffness.normal for contact in step.contacts]
+        maps = [ReturnMap(NORMAL * of, of) for of in kappa]
         said = "converged at its start"
         with np.errstate(all="ignore"):  # a trial may turn elements inside out
-            if step.held(x):
-                search.residual(x, maps, step.forces(x))
+            state = step.evaluate(state.x, maps, before=state.as_start)
+            if step.held(state.x):
+                search.see(state)
             if not search.over:
                 try:
-                    x = self._supports_moved(step, x, maps, search, stands=start is None)
-                    said = self._iterate(_Equations(step, self._tangent, maps, search), x)
+                    state = self._supports_moved(step, state, maps, search, stands=start is None)
+                    said = self._iterate(_Equations(self._tangent, maps, search, state), state.x)
                 except LinearSolverError as failure:
                     said = str(failure)
         return SolverResult(
@@ -91,16 +94,21 @@ class BoundSNES(OnTangent):
         )
 
     def _supports_moved(
-        self, step: LoadStep, x: np.ndarray, maps: Sequence[ReturnMap], search: Search, stands: bool
-    ) -> np.ndarray:
-        """What Newton's method makes of ``x`` until supports are where they should be, after one step as a rule."""
-        descent, forces, length = Descent(step, self._tangent, stands), step.forces(x), 1.0
+        self,
+        step: LoadStep,
+        state: StepState,
+        maps: Sequence[ReturnMap],
+        search: Search,
+        stands: bool,
+    ) -> StepState:
+        """What Newton's method makes of a state until supports are where they should be, after one step as a rule."""
+        descent, length = Descent(step, self._tangent, stands), 1.0
         descent.begin(maps)
         while length > 0.0:
-            x, forces, length = descent.advance(x, forces, chord=False)
+            state, length = descent.advance(state, chord=False)
             search.count(1)
-            if step.held(x):
-                return x
+            if step.held(state.x):
+                return state
         raise LinearSolverError("no part of Newton's step brings the supports to their places.")
 
     def _iterate(self, equations: _Equations, x: np.ndarray) -> str:
@@ -138,11 +146,15 @@ class _Equations:
     """
 
     def __init__(
-        self, step: LoadStep, tangent: ContactTangent, maps: Sequence[ReturnMap], search: Search
+        self,
+        tangent: ContactTangent,
+        maps: Sequence[ReturnMap],
+        search: Search,
+        state: StepState,
     ):
         self.search, self.failure = search, None
-        self._step, self._tangent, self._maps = step, tangent, maps
-        self._last: tuple | None = None  # a displacement, and the step's forces there
+        self._step, self._tangent, self._maps = search.step, tangent, maps
+        self._seen = self._last = state
 
     def calls(self, work: Callable) -> Callable:
         """A callback of PETSc that leaves what it raises in ``failure``."""
@@ -156,28 +168,25 @@ class _Equations:
 
         return call
 
-    def _at(self, X: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
-        """The displacement and its forces, which PETSc asks for several times."""
-        if self._last is None or not self._step.body.same(X.array_r, self._last[0]):
-            x = X.array_r.copy()
-            self._last = x, self._step.forces(x)
+    def _at(self, X: PETSc.Vec) -> StepState:
+        """The state of a displacement, which PETSc asks for several times."""
+        if not self._step.body.same(X.array_r, self._last.x):
+            self._last = self._step.evaluate(X.array_r.copy(), self._maps, before=self._seen)
         return self._last
 
     def function(self, snes: PETSc.SNES, X: PETSc.Vec, residual: PETSc.Vec) -> None:
         """Forces that are too much; zero at fixed degrees of freedom."""
-        step, (x, forces) = self._step, self._at(X)
-        residual.array_w[:] = -step.free(step.out_of_balance(x, self._maps, forces))
+        residual.array_w[:] = -self._at(X).residual
 
     def jacobian(self, snes: PETSc.SNES, X: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         """Their derivative, written into the tangent's matrix."""
-        (x, forces), body = self._at(X), self._step.body
+        state, body = self._at(X), self._step.body
         if body.nonlinear:
-            body.linearise(x)
-        self._tangent.linearise(self._step.derivatives(x, self._maps, forces))
+            body.linearise(state.x)
+        self._tangent.linearise(self._step.derivatives(state, self._maps))
 
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
         """Judge the iterate by the errors of the step."""
-        x, forces = self._at(snes.getSolution())
-        self.search.residual(x, self._maps, forces)
+        self._seen = self.search.see(self._at(snes.getSolution()))
         done = self.search.over
         return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE if done else 0

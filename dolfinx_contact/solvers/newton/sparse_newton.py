@@ -22,7 +22,7 @@ from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.line_search import enough, halves
 
 if TYPE_CHECKING:
-    from dolfinx_contact.step.load_step import LoadStep
+    from dolfinx_contact.step.load_step import LoadStep, StepState
 
 NAME = "SparseNewton"
 
@@ -63,30 +63,32 @@ class SparseNewton:
         positive("max_iterations", self.max_iterations, whole=True)
         positive("max_seconds", self.max_seconds)
 
-    def bind(self, body: Any, contacts: Any, stiffness: Any, memory: Any) -> BoundSolver:
+    def bind(self, step: LoadStep) -> BoundSolver:
         """See ``Solver``."""
-        return BoundSparseNewton(self, body, contacts)
+        return BoundSparseNewton(self, step)
 
 
 class BoundSparseNewton(OnTangent):
     """The method for one body."""
 
-    def solve(self, step: LoadStep, start: np.ndarray | None = None) -> SolverResult:
+    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
         """Iterate until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
             step: The ``LoadStep``.
+            starts: Not used.
             start: Where to begin; None asks the step.
         """
-        x = step.start() if start is None else start
-        search = Search(step, x, self._options.max_seconds)
+        state = step.start() if start is None else start
+        search = Search(step, state, self._options.max_seconds)
         search.begin(search.best, self._options.max_iterations, PATIENCE)
-        descent, forces = Descent(step, self._tangent, stands=start is None), step.forces(x)
+        descent, self._seen = Descent(step, self._tangent, stands=start is None), state.as_start
         for tangential in cycle(TANGENTIAL):
-            maps = [ReturnMap(NORMAL * k.normal, tangential * k.normal) for k in step.stiffness]
+            parameters = [contact.stiffness.normal for contact in step.contacts]
+            maps = [ReturnMap(NORMAL * rho, tangential * rho) for rho in parameters]
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
-                    x, forces = self._fall(search, descent, x, forces, maps)
+                    state = self._fall(search, descent, state, maps)
             except LinearSolverError:
                 break
             if not search.goes_on:
@@ -96,24 +98,21 @@ class BoundSparseNewton(OnTangent):
         )
 
     def _fall(
-        self,
-        search: Search,
-        descent: Descent,
-        x: np.ndarray,
-        forces: np.ndarray,
-        maps: Sequence[ReturnMap],
-    ) -> tuple:
-        """Steps with the same maps until the search ends or one gets short: the last iterate and its forces."""
+        self, search: Search, descent: Descent, state: StepState, maps: Sequence[ReturnMap]
+    ) -> StepState:
+        """Steps with the same maps until the search ends or one gets short: the last iterate."""
         descent.begin(maps)
+        step = search.step
         while True:
-            if search.step.held(x):
-                search.residual(x, maps, forces)
+            state = step.evaluate(state.x, maps, forces=state.forces, before=self._seen)
+            if step.held(state.x):
+                self._seen = search.see(state)
                 if not search.goes_on:
-                    return x, forces
-            x, forces, length = descent.advance(x, forces, search.error <= search.step.tol)
+                    return state
+            state, length = descent.advance(state, search.error <= step.tol)
             search.count(1)
             if length < SHORT:
-                return x, forces
+                return state
 
 
 class Descent:
@@ -131,41 +130,39 @@ class Descent:
         """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
         self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
 
-    def advance(self, x: np.ndarray, forces: np.ndarray, chord: bool) -> tuple:
-        """The next iterate, its forces, and the part of the step that leads to it: 0 if none helps.
+    def advance(self, state: StepState, chord: bool) -> tuple[StepState, float]:
+        """The next iterate, and the part of the step that leads to it: 0 if none helps.
 
         Args:
-            x: Displacement of owned degrees of freedom.
-            forces: Those of the step there.
+            state: The iterate.
             chord: Whether the last tangent is good enough.
         """
-        step, maps = self._step, self._maps
+        step, maps, x = self._step, self._maps, state.x
         if not chord or self._tangent.matrix is None:
             if self._body.nonlinear and not self._stands:
                 self._body.linearise(x)
-            maps = self._following(x, forces) if self._stands else maps
+            maps = self._following(state) if self._stands else maps
             self._stands = False
             closing = self._closing(x, maps) if self._free else maps
-            self._tangent.linearise(step.derivatives(x, closing, forces))
-        left, carried = step.free(step.out_of_balance(x, maps, forces)), np.zeros_like(x)
-        missing = step.missing(x)
+            self._tangent.linearise(step.derivatives(state, closing))
+        here = step.evaluate(x, maps, forces=state.forces, before=state)
+        carried, missing = np.zeros_like(x), step.missing(x)
         if not step.held(x):
             carried = self._tangent.multiply(missing, self._body.carried(missing))
-        dx = self._tangent.solve(left - carried)
+        dx = self._tangent.solve(here.residual - carried)
         dx[self._body.fixed] = missing[self._body.fixed]
-        self._sizes.append(step.size(left - carried))
+        self._sizes.append(step.size(here.residual - carried))
         most, self._free = np.inf if self._free else max(self._sizes), False
         for length in halves(SHORTEST):
             following = x + length * dx
             if length == 1.0:
                 following[self._body.fixed] = step.b[self._body.fixed]
-            there = step.forces(following)
-            left = step.out_of_balance(following, self._maps, there) - (1 - length) * carried
-            if step.size(left) < enough(length) * most:
-                return following, there, length
-        return x, forces, 0.0
+            there = step.evaluate(following, self._maps, before=state)
+            if step.size(there.residual - (1 - length) * carried) < enough(length) * most:
+                return there, length
+        return state, 0.0
 
-    def _following(self, x: np.ndarray, forces: np.ndarray) -> list:
+    def _following(self, state: StepState) -> list:
         """Maps for which nodes under load stay pressed where their plane moves off: Newton's step closes their gaps.
 
         Let go, all would spring back at once. Where gaps close does not depend on the augmentation parameter ``rho``, as
@@ -173,10 +170,10 @@ class Descent:
         that turn back took more iterations.
         """
         asked = [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps]
-        self._step.out_of_balance(x, asked, forces)
+        state = self._step.evaluate(state.x, asked, forces=state.forces, before=state)
         maps = []
-        for contact, map in zip(self._step.contacts, self._maps):
-            pressed, gap = contact.reaction[:, -1], contact.present.gap
+        for contact, nodes, map in zip(self._step.contacts, state.nodes, self._maps):
+            pressed, gap = nodes.reaction[:, -1], nodes.gap
             off = (gap > 0.0) & (pressed > 0.0) & (pressed < 2 * map.normal * gap)
             off &= contact.friction.frictionless
             normal = np.where(off, 0.5 * pressed / np.where(off, gap, 1.0), map.normal)

@@ -1,0 +1,287 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""A contact in one load step: what follows at its nodes from a displacement of the body.
+
+Kinematics is affine in a step: frames, gaps and ways along the surface were taken for one position, see ``placement.py``.  Surfaces
+that force drives move by further unknowns ``c``, see ``surfaces/driven.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dolfinx_contact.contact.state import State, Status
+from dolfinx_contact.support.checks import EPSILON
+from dolfinx_contact.surfaces.surface import cross
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.contact.interface import ContactPoints, NodalStiffness
+    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.law.friction import Friction
+    from dolfinx_contact.law.maps import ContactLaw, NodalMap
+    from dolfinx_contact.surfaces.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class ContactStep:
+    """Frames, law and history of ``n`` nodes as a step has them.  Arrays are in the local frame; nothing in it changes.
+
+    Attributes:
+        given: The contact: nodes, surface, areas.
+        frames: Frames and gaps.
+        friction: The law at the nodes; coefficients are numbers.
+        law: The kernel's law of this friction.
+        last: State at the end of the last step, in these frames.
+        moved: Motion of the surface, ``shape=(gdim,)`` or ``(n, gdim)``, length.
+        worn: Depths of both sides that have opened gaps before the step, ``shape=(n,)``, length.
+        clear: Gap of nodes that cannot touch, at least.
+        stiffness: ``NodalStiffness`` of the nodes; None where nothing is measured.
+        depth: What the step itself wears, ``shape=(n,)``, length; None is nothing.
+        before: Slip before nodes touch, which does not count, ``shape=(n, gdim - 1)``; None is none.
+        dragged: Slip of held nodes past which force drives the surface, ``shape=(n, gdim - 1)``, a direction; None is nowhere.
+        columns: ``D``, what the unknown motions ``c`` of surfaces move at the nodes, ``shape=(n, gdim, m)``; None where there are none.
+        begun: The law as the step began, if it follows the state; else None.
+    """
+
+    given: Contact
+    frames: Placed
+    friction: Friction
+    law: ContactLaw
+    last: State
+    moved: np.ndarray
+    worn: np.ndarray
+    clear: float
+    stiffness: NodalStiffness | None = None
+    depth: np.ndarray | None = None
+    before: np.ndarray | None = None
+    dragged: np.ndarray | None = None
+    columns: np.ndarray | None = None
+    begun: Friction | None = None
+
+    def but(self, **parts: Any) -> ContactStep:
+        """The same with other parts."""
+        return replace(self, **parts)
+
+    # -- what does not depend on the step ------------------------------------------------------
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """See ``Contact``."""
+        return self.given.nodes
+
+    @property
+    def x(self) -> np.ndarray:
+        """See ``Contact``."""
+        return self.given.x
+
+    @property
+    def displacements(self) -> Displacements:
+        """See ``Contact``."""
+        return self.given.displacements
+
+    @property
+    def surface(self) -> Surface:
+        """See ``Contact``."""
+        return self.given.surface
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """MPI communicator of the mesh."""
+        return self.given.comm
+
+    @property
+    def area(self) -> np.ndarray:
+        """See ``Contact``."""
+        return self.given.area
+
+    @property
+    def points(self) -> ContactPoints:
+        """Rows of the motion, and what supports hold."""
+        return self.frames.points
+
+    @property
+    def opening(self) -> np.ndarray:
+        """Depth by which wear has opened the gap at each node, that of the step included, ``shape=(n,)``."""
+        return self.worn if self.depth is None else self.worn + self.depth
+
+    # -- motion --------------------------------------------------------------------------------
+
+    def at(self, u: np.ndarray, c: np.ndarray | None = None) -> State:
+        """The state of a displacement without reactions: gaps and slips since the last step.
+
+        Args:
+            u: Displacement of owned degrees of freedom, length units.
+            c: Motions of surfaces, ``shape=(m,)``, length units.
+        """
+        points, moved = self.points, self.moved
+        if self.columns is not None and c is not None:
+            moved = moved + self.columns @ c
+        motion = points.motion(u)
+        displacement = motion - moved
+        gap = self.frames.flat + self.opening + displacement[:, -1]
+        slip = displacement - self.last.displacement
+        if self.frames.way is not None:
+            slip[:, :-1] += self.frames.way
+        if self.before is not None:
+            slip[:, :-1] -= self.before
+        known = points.known(slip, (motion, moved, self.last.displacement))
+        slip = slip[:, :-1]
+        points.without_held(slip)
+        if known is not None:
+            slip += known
+        slip[points.alone] = 0.0  # opposite nothing
+        gap[points.closed] = np.maximum(gap[points.closed], self.clear)
+        n = len(gap)
+        return State(displacement, np.zeros((n, points.dim)), gap, slip, np.zeros(n, np.uint8), known)  # fmt: skip
+
+    def moved_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
+        """What moving the surface by one along, or turning it about an axis, moves at the nodes, ``shape=(n, gdim)``."""
+        frame, surface = self.frames.frame, self.surface
+        if turns:
+            return (frame @ cross(axis, self.frames.arms)[:, :, None])[:, :, 0]
+        along = frame @ axis
+        if not (surface.curved or surface.spins):  # the axes are those of its frame
+            along = np.rint(along)
+        return np.broadcast_to(along, (self.points.count, self.points.dim))
+
+    def gap_rounding(self, u: np.ndarray) -> float:
+        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        surface, motion = self.surface, self.points.motion(u)
+        lengths = (surface.point, surface.displacement, motion)
+        largest = max(np.abs(length).max(initial=0.0) for length in lengths)
+        return self.given.placement.gap_rounding_of(largest)
+
+    def motion_rounding(self, u: np.ndarray, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
+
+        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
+        """
+        terms = self.points.magnitudes(u) + np.abs(self.moved)
+        x, point = self.given.placement.x, self.surface.point
+        coordinates = max(np.abs(a).max(initial=0.0) for a in (x, point))
+        gap = terms[:, -1] + coordinates + self.opening
+        slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
+        if state.known is None:
+            slip[self.points.held] = 0.0
+        return EPSILON * gap, EPSILON * slip
+
+    # -- reactions -----------------------------------------------------------------------------
+
+    def required(self, forces: np.ndarray) -> np.ndarray:
+        """Reactions that balance forces on the body, owned degrees of freedom, global frame: ``shape=(n, gdim)``."""
+        reaction = self.points.reactions(-forces)
+        reaction[self.points.closed] = 0.0
+        return reaction
+
+    def respond(
+        self, u: np.ndarray, reaction: np.ndarray, map: NodalMap, c: np.ndarray | None = None
+    ) -> State:
+        """The state with the reactions that a map makes of those given, at a displacement."""
+        state = self.at(u, c)
+        law = self.law_of(self.law, state.known)
+        reaction, status = map(law, reaction, state.gap, state.slip_increment)
+        return state._replace(reaction=reaction, status=status)
+
+    def linearised(
+        self, u: np.ndarray, reaction: np.ndarray, map: NodalMap, c: np.ndarray | None = None
+    ) -> tuple[State, tuple[np.ndarray, np.ndarray]]:
+        """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
+
+        Returns:
+            The state; derivatives by the reaction before, dimensionless, and by slip and gap, force per length, ``shape=(n, gdim, gdim)`` each.
+        """
+        state = self.at(u, c)
+        law = self.law_of(self.law, state.known)
+        reaction, status, *both = map.linearised(law, reaction, state.gap, state.slip_increment)
+        return state._replace(reaction=reaction, status=status), tuple(both)
+
+    def measuring_map(self) -> NodalMap:
+        """The map by which states are measured, and which starts are chosen with."""
+        from dolfinx_contact.law.maps import ReturnMap
+
+        return ReturnMap(self.stiffness.normal, self.stiffness.normal)
+
+    # -- nodes that supports hold --------------------------------------------------------------
+
+    def law_of(self, law: Any, known: np.ndarray | None, nodes: Any = slice(None)) -> Any:
+        """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
+
+        Args:
+            law: Of the kernel, of these nodes.
+            known: Slip that supports prescribe, ``shape=(n, gdim - 1)``; None is none.
+            nodes: Their indices, ``shape=(k,)``; all of them by default.
+        """
+        if not self.points.supported.size or self.friction.frictionless:
+            return law
+        every = isinstance(nodes, slice)
+        if every and known is None and self.dragged is None:
+            return self._law_of_still_nodes
+        return self._supported(law, known, nodes, every)
+
+    @cached_property
+    def _law_of_still_nodes(self) -> Any:
+        return self._supported(self.law, None, slice(None), True)
+
+    def _supported(self, law: Any, known: np.ndarray | None, nodes: Any, every: bool) -> Any:
+        from dolfinx_contact.law.supported import supported
+
+        points = self.points
+        at_rows = np.arange(points.count)[nodes]
+        at = np.searchsorted(points.supported, at_rows)
+        at[at == points.supported.size] = 0
+        mine = points.supported[at] == at_rows
+        slip = np.zeros((points.count, points.dim - 1)) if known is None else known
+        slip, last = slip[at_rows], self.last.reaction[at_rows, :-1]
+        if self.dragged is not None:
+            slip = np.where(self.dragged[at_rows] != 0.0, self.dragged[at_rows], slip)
+        friction = self.friction if every else self.friction.at(at_rows)
+        return supported(law, friction, np.flatnonzero(mine), points.along[at[mine]], slip, last)
+
+    @cached_property
+    def free_friction(self) -> Friction:
+        """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
+        points, friction = self.points, self.friction
+        if not points.along.any() or friction.frictionless:
+            return friction
+        from dolfinx_contact.contact.friction_field import guided
+
+        return guided(friction, points.count, points.supported, points.along)
+
+    def known_slip(self, state: State) -> np.ndarray:
+        """Part of a state's slip that supports prescribe, ``shape=(n, gdim - 1)``."""
+        return np.zeros_like(state.slip_increment) if state.known is None else state.known
+
+    # -- results -------------------------------------------------------------------------------
+
+    def bipotential_gap(self, state: State) -> np.ndarray:
+        """See ``Contact``."""
+        gap = np.maximum(state.gap, 0.0)
+        return self.law.bipotential_gap(state.reaction, gap, state.slip_increment)
+
+    def opened(self, state: State) -> np.ndarray:
+        """Nodes that touched at the end of the last step and are open now, ``shape=(n,)``, booleans."""
+        return (self.last.reaction[:, -1] > 0.0) & (state.reaction[:, -1] == 0.0)
+
+    def still(self, state: State, unknown: float) -> np.ndarray:
+        """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
+
+        On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
+
+        Args:
+            state: The state.
+            unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
+        """
+        slips = state.status == int(Status.SLIP)
+        if not slips.any():
+            return slips
+        slip = self.given.slip_kept + state.slip_increment  # else what is slow would never slip
+        made = np.linalg.norm(np.einsum("nij,nj->ni", self.stiffness.tangential, slip), axis=1)
+        return slips & (made <= unknown) & (self.friction.mu > 0.0).any(axis=-1)
