@@ -68,11 +68,16 @@ class Projections:
     """Processor seconds and number of projections, since the last ``take``."""
 
     def __init__(self):
-        self._seconds, self._count, self._placed, self._last = 0.0, 0, MortarPlacement.placed, None
-        MortarPlacement.placed = lambda placement, u: self._timed(placement, u)
+        self._seconds, self._count, self._placed, self._last = (
+            0.0,
+            0,
+            MortarPlacement.projected,
+            None,
+        )
+        MortarPlacement.projected = lambda *given: self._timed(*given)
 
-    def _timed(self, placement, u):
-        seconds, found = timed(self._placed, placement, u)
+    def _timed(self, *given):
+        seconds, found = timed(self._placed, *given)
         self._seconds += seconds
         self._count += found is not self._last  # else it was known
         self._last = found

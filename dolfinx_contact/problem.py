@@ -27,12 +27,13 @@ from dolfinx_contact.problem_input import (
     checked_conditions,
     checked_contacts,
     checked_internal,
+    checked_lagged,
     checked_options,
     checked_solver,
     checked_tolerance,
     checked_undetermined,
     crowded,
-    follow,
+    frames_of_step,
     hold,
     support,
     take_contacts,
@@ -62,6 +63,8 @@ from dolfinx_contact.support.collective import agree, raised_together, uninterru
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.internal_variables import InternalVariables
     from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.step.staggered import Lagged
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 LOG = logging.getLogger("dolfinx_contact")
@@ -102,6 +105,7 @@ class ContactProblem(Guarded):
             surfaces, see docs/surfaces.md.
 
     Attributes:
+        lagged: What a step takes for known beside this package's quantities, of classes of your own, see docs/extending.md; none at first.
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number in the
             step, largest error and ``Counts``; far from ``tol`` the error of equilibrium alone.  For iterates of the condensed
             problem, the error is the residual over the largest reaction; the errors of the body follow.
@@ -126,7 +130,7 @@ class ContactProblem(Guarded):
     """
 
     monitor: Callable[[int, float, Counts], object] | None
-    _settable = ("bcs", "monitor", "solver", "tol", "undetermined", "geometry_tol")
+    _settable = ("bcs", "monitor", "solver", "tol", "undetermined", "geometry_tol", "lagged")
     _remedy = "bcs, monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
@@ -166,7 +170,7 @@ class ContactProblem(Guarded):
             )
             self._variables = checked_internal(internal)
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
-        self.u, self.monitor = u, None
+        self.u, self.monitor, self.lagged = u, None, ()
         self._agree(comm)
         of = self.contacts[0].displacements if self.contacts else None
         before = None if internal is None else internal.before_residual
@@ -181,7 +185,8 @@ class ContactProblem(Guarded):
         self._turned = False  # the same of slip that turns
         self._bound = self._bound_to = None
         self._stamps, self._stiffness, self._unit = Stamps(), [], 1.0
-        self._laws, self._freedom = self._present_laws(), self._present_freedom()
+        self._laws = [contact.friction for contact in self.contacts]
+        self._freedom = self._present_freedom()
         take_contacts(self, self.contacts)
         self._states = ProblemStates(self.body, self.contacts, self._variables)
         self.number = next(NUMBERS)
@@ -245,6 +250,15 @@ class ContactProblem(Guarded):
     @undetermined.setter
     def undetermined(self, choice: str) -> None:
         self._undetermined = checked_undetermined(choice)
+
+    @property
+    def lagged(self) -> tuple[Lagged, ...]:
+        """Lagged quantities of your own; others may be assigned between steps, on all ranks."""
+        return self._lagged
+
+    @lagged.setter
+    def lagged(self, quantities: Sequence[Lagged]) -> None:
+        self._lagged = checked_lagged(quantities)
 
     def close(self) -> None:
         """Free PETSc's matrices, factors and multigrid levels; results stay, but no step can follow.  Collective."""
@@ -340,7 +354,7 @@ class ContactProblem(Guarded):
         """A converged state with what only its end tells: gaps of open nodes, slip of those that have left or opened.  Collective."""
         both, nodes = zip(state.step.contacts, state.nodes), []
         for contact, one in both:
-            one = contact.given.with_slip_past_edges(one, state.x)
+            one = contact.given.with_slip_past_edges(contact, one, state.x)
             nodes.append(contact.given.with_own_gaps(contact, one, state.x))
         opens = any(c.opened(one).any() for c, one in zip(state.step.contacts, nodes))
         if self.body.comm.allreduce(opens, op=MPI.LOR):
@@ -355,40 +369,44 @@ class ContactProblem(Guarded):
         self._states.accept(found.state, found.start)
 
     def load_step(
-        self, holding: HeldSurfaces | None = None, at: np.ndarray | None = None
+        self,
+        at: np.ndarray | None = None,
+        before: LoadStep | None = None,
+        holding: HeldSurfaces | None = None,
     ) -> LoadStep:
         """The next step as solvers see it, with the present loads, boundary values and surfaces.  Collective.
 
         For your own solvers and for measurements; ``solve`` makes its own.
 
         Args:
-            holding: Planes that held nodes hold, or cannot hold, if that is known.
             at: Displacement at which tangent planes and lever arms are taken, owned degrees of freedom; None takes the last one.
+            before: The same step, solved before with other frames; None where it begins.
+            holding: Planes that held nodes cannot hold, if that has turned out.
 
         Returns:
             A ``LoadStep``, for a nonlinear body a ``NonlinearStep``.
         """
-        body, here = self.body, self._states.last if at is None else at
-        assembled = body.refresh(self._states.last)
+        body, start = self.body, self._states.last
+        assembled = body.refresh(start)
         driven = [contact for contact in self.contacts if contact.surface.free]
         if any(contact.surface.curved for contact in driven):
             from dolfinx_contact.surfaces.driven import approach
 
-            approach(body, self.contacts, here)
+            approach(body, self.contacts, start if at is None else at)
         b, external = body.load()
-        if at is None:
-            here = self._predicted(b)
-        turned = follow(self.contacts, body, here, self._states.last, self._points)
-        self._stamp(assembled, turned, begins=at is None and holding is None)
-        given = dict(b=b, external=external, tol=self.tol, unit=self._unit, last=self._states.last)
-        last, before = self._states.last, self._states.before
-        starts = (body.taken(self.u.x.array), 2 * last - before) if at is None else (at,)
-        contacts = self._in_step()
-        if holding is None and driven:
+        likely, known = self._predicted(b) if at is None else at, self._points
+        old = [None] * len(self.contacts) if before is None else [k.frames for k in before.contacts]
+        frames, turned = frames_of_step(self.contacts, body, start, likely, old, known)
+        contacts = self._in_step(assembled, frames, turned, begins=before is None)
+        given = dict(b=b, external=external, tol=self.tol, unit=self._unit, last=start)
+        guess = body.taken(self.u.x.array), 2 * start - self._states.before
+        starts = guess if at is None else (at,)
+        holding = None if before is None else holding or before.holding
+        if before is None and driven:
             from dolfinx_contact.surfaces.held import held_surfaces
 
-            holding = held_surfaces(body, contacts, last, b)
-            contacts = self._in_step()  # planes have gone with the nodes that hold them
+            holding = held_surfaces(body, contacts, start, b)
+            contacts = [k.where_it_stands() for k in contacts]  # planes go with what holds them
         given |= self._parts(contacts, holding)
         kind = LoadStep
         if body.nonlinear:
@@ -396,32 +414,27 @@ class ContactProblem(Guarded):
         monitor = None if self.monitor is None else Monitor(self.monitor, body.comm)
         return kind(body, starts=starts, stamps=self._stamps, monitor=monitor, **given)
 
-    def _stamp(self, assembled: int, turned: bool, begins: bool) -> None:
-        """Take note of what is another one than in the last step: stiffness, rows, laws.  Collective."""
-        old = self._stamps
+    def _in_step(
+        self, assembled: int, frames: Sequence[Placed], turned: bool, begins: bool
+    ) -> list[ContactStep]:
+        """The contacts as the step has them, and notes of what is another one than in the last: stiffness, rows, laws.  Collective."""
+        old, body = self._stamps, self.body
         if turned or assembled != old.stiffness:
-            self._stiffness = [contact.nodal_stiffness(self.body.K) for contact in self.contacts]
-            size = self.body.largest(np.abs(self.body.displacements.x))
+            both = zip(self.contacts, frames)
+            self._stiffness = [c.nodal_stiffness(body.K, of.points) for c, of in both]
+            size = body.largest(np.abs(body.displacements.x))
             # Any unit that keeps squares within the range of double precision.
-            unit = self.body.largest(self.body.cancelling(np.full(self.body.size, size)))
-            self._unit = unit or 1.0
-        for contact in self.contacts:
-            contact.renew_friction()  # in the frames of this step
-        laws = self._present_laws()
+            self._unit = body.largest(body.cancelling(np.full(body.size, size))) or 1.0
+        given = zip(self.contacts, self._stiffness, frames)
+        contacts = [contact.in_step(*of, begins=True) for contact, *of in given]
+        laws = [contact.friction for contact in contacts]
         changed = any(one is not other for one, other in zip(laws, self._laws))
-        changed = self.body.comm.allreduce(changed, op=MPI.LOR)
+        changed = body.comm.allreduce(changed, op=MPI.LOR)
         self._laws = laws
-        self._stamps = Stamps(
-            assembled,
-            new_stamp() if turned else old.rows,
-            new_stamp() if changed else old.law,
-            old.parts,
-            new_stamp() if begins else old.step,
-        )
-
-    def _in_step(self) -> list[ContactStep]:
-        """The contacts where surfaces stand."""
-        return [contact.in_step(k) for contact, k in zip(self.contacts, self._stiffness)]
+        rows, law = new_stamp() if turned else old.rows, new_stamp() if changed else old.law
+        begun = new_stamp() if begins else old.step
+        self._stamps = Stamps(assembled, rows, law, old.parts, begun)
+        return contacts
 
     def _parts(self, contacts: Sequence[ContactStep], holding: HeldSurfaces | None) -> dict:
         """Contacts and optional parts of a step, by their names there.  Collective."""
@@ -444,19 +457,18 @@ class ContactProblem(Guarded):
             self._stamps = self._stamps._replace(parts=new_stamp())
         return parts | {"contacts": tuple(contacts)}
 
-    def _predicted(self, b: np.ndarray) -> np.ndarray:
+    def _predicted(self, b: np.ndarray) -> np.ndarray | None:
         """Where a step is likely to end, for rows between bodies that slide: under the new loads, with the last reactions.  Collective.
 
-        Where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts, it is
-        the last displacement.
+        None where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts.
         """
         body, last = self.body, self._states.last
         sliding = [c for c in self.contacts if c.surface.deformable and c.changes and c.has_history]
         if not sliding or body.nonlinear or body.loose is not None:
-            return last
+            return None
         known = self._states.snapshot().known  # without contact, under the last loads
         if known is None or body.displacements.mixed:  # of which checkpoints do not have it
-            return last
+            return None
         given = np.zeros_like(last)
         given[body.fixed] = (b - last)[body.fixed]
         x = 2 * last - self._states.before  # friction and what deforms go on, too
@@ -467,11 +479,9 @@ class ContactProblem(Guarded):
             x = last + more
             if not exact:  # six digits
                 x += body.solve(load - body.multiply(more), rough=True)
-        slid = body.largest(np.array([contact.placement.slid(x - last) for contact in sliding]))
+        slid = body.largest(np.array([c.placement.slid(x - last, c.history) for c in sliding]))
         if slid < self.geometry_tol or body.farthest(x - last) > FARTHER * body.farthest(given):
-            return last
-        for contact in sliding:
-            contact.placement.begin(last)
+            return None
         return x
 
     def _may_land(self) -> bool:
@@ -520,9 +530,10 @@ class ContactProblem(Guarded):
         """What the step takes for known, level by level, the fastest first; imported where there is any.  Collective."""
         contacts, levels = self.contacts, []
         if any(contact.follows_pressure for contact in contacts):
-            from dolfinx_contact.lagged.pressure import PressureFriction
+            from dolfinx_contact.lagged.friction import PressureFriction
 
             levels.append([PressureFriction()])
+        levels += [[quantity] for quantity in self.lagged]
         if any(contact.wears_within for contact in contacts):
             from dolfinx_contact.lagged.wear import WearOfStep
 
@@ -539,15 +550,13 @@ class ContactProblem(Guarded):
             levels.append([end, SlipBeforeLanding(self.geometry_tol)])
         return levels
 
-    def _with_planes(self, holding: HeldSurfaces) -> LoadStep:
+    def _with_planes(self, step: LoadStep, holding: HeldSurfaces) -> LoadStep:
         """The step anew, with other planes held.  Collective."""
-        for contact in self.contacts:
-            contact.restore()
-        return self.load_step(holding)
+        return self.load_step(None, step, holding)
 
     def _step_at(self, step: LoadStep, at: np.ndarray) -> LoadStep:
         """The step anew, with frames of a displacement.  Collective."""
-        return self.load_step(step.holding, at)
+        return self.load_step(at, step)
 
     def _digits_later(self) -> bool:
         """Whether the step is solved to as many digits as its geometry needs first: all digits take cycles of multigrid."""
@@ -676,10 +685,7 @@ class ContactProblem(Guarded):
 
     def _agree(self, comm: MPI.Comm) -> None:
         """Raise a ``ValueError`` on all ranks if what may change between steps differs between them.  Collective."""
-        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, monitor=self.monitor is not None)  # fmt: skip
-
-    def _present_laws(self) -> list:
-        return [contact.friction for contact in self.contacts]
+        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, lagged=len(self.lagged), monitor=self.monitor is not None)  # fmt: skip
 
     def _present_freedom(self) -> list:
         """Free motions and springs of each contact's surface."""

@@ -14,7 +14,7 @@ from ufl.classes import Indexed, Product, ScalarValue, SpatialCoordinate, Sum
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.forms import check_meshes, derivative_of
+from dolfinx_contact.bodies.input import check_meshes, derivative_of
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.interface import components
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.contact.interface import ContactPoints
+    from dolfinx_contact.contact.placement import Placed
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.solvers.base import Solver
 
@@ -190,6 +192,17 @@ def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> b
     return isinstance(solver, (Automatic, FixedPoint)) and nodes > most
 
 
+def checked_lagged(quantities: Any) -> tuple:
+    """Lagged quantities, each with the methods of ``Lagged``."""
+    quantities = (quantities,) if hasattr(quantities, "renewed") else tuple(quantities)
+    for one in quantities:
+        if not (hasattr(one, "change") and hasattr(one, "renewed")):
+            raise ValueError(
+                f"problem.lagged must be a list of objects of classes derived from dolfinx_contact.extend.Lagged, see docs/extending.md; got {one!r}."
+            )
+    return quantities
+
+
 def checked_tolerance(tol: Any) -> float:
     """A tolerance that rounding allows to reach."""
     try:
@@ -232,9 +245,7 @@ def checked_options(name: str, options: Any) -> dict | None:
 
 
 def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: float = 0) -> None:
-    """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.
-
-    Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
+    """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.  Collective.
 
     Args:
         contacts: The contacts.
@@ -242,13 +253,27 @@ def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: f
         level: Of the caller in whose name is warned.
         told: Number of nodes left out of which a warning has told before.
     """
-    left_out = [np.zeros((0, 3))]
     for contact in contacts:
         contact.meet(body.fixed)
+    hold_points(contacts, [contact.points for contact in contacts], body, level + 1, told)
+
+
+def hold_points(
+    contacts: Sequence[Contact],
+    points: Sequence[ContactPoints],
+    body: ElasticBody,
+    level: int = 3,
+    told: float = 0,
+) -> None:
+    """The same of contact points of these contacts.
+
+    Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
+    """
+    left_out = [np.zeros((0, 3))]
     with raised_together(body.comm):
-        for contact in contacts:
-            held = _held_directions(contact, body.fixed)
-            contact.hold(*held)
+        for contact, of in zip(contacts, points):
+            held = _held_directions(contact, of, body.fixed)
+            of.hold(*held)
             left_out.append(contact.x[held[1]])
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
@@ -290,9 +315,9 @@ def support(body: ElasticBody, contacts: Sequence[Contact], bcs: Any) -> None:
         raise
 
 
-def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
+def _held_directions(contact: Contact, points: ContactPoints, fixed: np.ndarray) -> tuple:
     """What boundary conditions fix, as ``ContactPoints.hold`` takes it."""
-    left = contact.points.free_of(fixed)
+    left = points.free_of(fixed)
     closed = left[:, -1] < 1e-12
     # What is left of each local direction without its fixed components: all, nothing, or a part.
     partly = (left > 1e-12) & (left < 1 - 1e-12) & ~closed[:, None]
@@ -306,33 +331,38 @@ def _held_directions(contact: Contact, fixed: np.ndarray) -> tuple:
         )
     if partly.any():
         nodes = np.flatnonzero(partly.any(axis=1))
-        free = contact.points.tangents_free_of(fixed)[nodes]
+        free = points.tangents_free_of(fixed)[nodes]
         longest = free[np.arange(len(nodes)), np.diagonal(free, axis1=1, axis2=2).argmax(axis=1)]
         held[nodes], guided = False, (nodes, longest / np.linalg.norm(longest, axis=1)[:, None])
-    return held, closed, guided, np.isin(contact.points.dofs, fixed)
+    return held, closed, guided, np.isin(points.dofs, fixed)
 
 
-def follow(
-    contacts: Sequence[Contact], body: ElasticBody, u: np.ndarray, start: np.ndarray, known: list
-) -> bool:
-    """Let frames and gaps of contacts follow their nodes and surfaces; whether frames changed.  Collective.
+def frames_of_step(
+    contacts: Sequence[Contact],
+    body: ElasticBody,
+    start: np.ndarray,
+    at: np.ndarray | None,
+    before: Sequence[Placed | None],
+    known: list,
+) -> tuple[list[Placed], bool]:
+    """Frames and gaps of contacts for a step, and whether rows are others.  Collective.
 
     Args:
         contacts: The contacts.
         body: The body.
-        u: Displacement for which they are taken, owned degrees of freedom.
-        start: The last converged one.
+        start: The last converged displacement, owned degrees of freedom.
+        at: The one for which they are taken; None is the last.
+        before: Frames with which the same step was solved before.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
-    for contact in contacts:
-        if contact.follows:
-            contact.follow(u, start)
-    changed = [c for c, points in zip(contacts, known) if c.points is not points]
+    frames = [c.frames_of_step(start, at, of) for c, of in zip(contacts, before)]
+    changed = [k for k, (of, old) in enumerate(zip(frames, known)) if of.points is not old]
     if changed:
-        closed = [points.closed.sum() for c, points in zip(contacts, known) if c in changed]
-        hold(changed, body, told=body.comm.allreduce(int(sum(closed))))
-    known[:] = [contact.points for contact in contacts]
-    return bool(changed)
+        told = body.comm.allreduce(sum(int(known[k].closed.sum()) for k in changed))
+        of = [contacts[k] for k in changed], [frames[k].points for k in changed]
+        hold_points(*of, body, told=told)
+    known[:] = [of.points for of in frames]
+    return frames, bool(changed)
 
 
 def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
@@ -361,7 +391,8 @@ def _check_through(contact: Contact, body: ElasticBody) -> None:
     part, parts = body.parts
     sides = contact.nodes, contact.placement.opposite
     here = body.total([np.bincount(part[nodes], minlength=parts) for nodes in sides])
-    depth = body.largest(np.array([contact.placement.depth]))
+    depth = contact.placement.depth(contact.history.frames)
+    depth = body.largest(np.array([depth]))
     if (here > 0).all(axis=0).any() and depth > 1.0:
         raise ValueError(
             f"both sides of {contact!r} belong to one part of the mesh, and stand inside each other by {depth:.3g} times the smallest facet, "

@@ -64,11 +64,16 @@ class ProblemStates:
 
     def _keep(self, before: Kept | None) -> None:
         """Keep the present state to go back to, and the one before, if there is one."""
-        histories = [part.history() for part in self._parts]
+        histories = self._histories()
         places, displacements = self.places(), (self.last, self.before)
         known = self._body.known
         self._kept = Kept(displacements, histories, places, known, self.starts, self._mine)
         self._before = before
+
+    def _histories(self) -> list:
+        """Of contacts and internal variables."""
+        own = [] if self._variables is None else [self._variables.history()]
+        return [*(contact.history for contact in self._contacts), *own]
 
     def places(self) -> list[tuple]:
         """Displacement and rotation of each contact's surface, and the rotation of its guides."""
@@ -89,7 +94,7 @@ class ProblemStates:
         """Let a state be the last converged one, and keep a start for later steps.  Collective."""
         self.last, self.before = state.x, self.last
         for contact, nodes in zip(state.step.contacts, state.nodes):
-            contact.given.accept(contact, nodes)
+            contact.given.accept(contact, nodes, state.x)
         if self._variables is not None:
             self._variables.advance()
         if start is not None:
@@ -101,12 +106,12 @@ class ProblemStates:
     def restore(self) -> None:
         """Show the last converged state."""
         self._body.show(self.last)
-        for part in self._parts:
-            part.restore()
+        if self._variables is not None:
+            self._variables.restore()
 
     def standing(self) -> tuple:
         """Where a step begins, for ``stand_again``: this state, the one before, and surfaces where the user has put them."""
-        histories = [part.history() for part in self._parts]
+        histories = self._histories()
         return self._kept._replace(histories=histories), self._before, self.places()
 
     def stand_again(self, stood: tuple) -> None:
@@ -141,6 +146,8 @@ class ProblemStates:
         (self.last, self.before), self._body.known = kept.displacements, kept.known
         for part, history in zip(self._parts, kept.histories):
             part.go_back(history)
+        for contact in self._contacts:  # supports may be others now
+            contact.meet(self._body.fixed)
         self._put_surfaces(kept.surfaces)
         self._take(kept.past)
 

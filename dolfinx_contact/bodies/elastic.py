@@ -12,8 +12,17 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.bodies import rigid_motion, stiffness_checks
-from dolfinx_contact.bodies.forms import digest_of, same_values, values_of
+from dolfinx_contact.bodies import rigid_motion
+from dolfinx_contact.bodies.input import (
+    agree_on_values,
+    check_diagonal,
+    check_dilation,
+    check_finite,
+    digest_of,
+    same_values,
+    values_of,
+    warn_of_unread,
+)
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver, preconditioner
 from dolfinx_contact.support.collective import OverRanks, raised_together
@@ -141,7 +150,7 @@ class ElasticBody(OverRanks):
             How often it was assembled so far: a number that changes with the matrix.
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
-        stiffness_checks.agree_on_values(given, self.comm)
+        agree_on_values(given, self.comm)
         fixed = self._digest is not None and np.array_equal(self.fixed, self._assembled_fixed)
         if self._all_same(fixed and same_values(self._parameters, self._assembled_with)):
             return self.assemblies
@@ -149,8 +158,8 @@ class ElasticBody(OverRanks):
         self._assembled_with, self._assembled_fixed = values_of(self._parameters), self.fixed
         self._assemble()
         with raised_together(self.comm):
-            stiffness_checks.check_diagonal(self.diagonal(), self.displacements)
-        stiffness_checks.check_dilation(self)
+            check_diagonal(self.diagonal(), self.displacements)
+        check_dilation(self)
         self._hold()
         self.soft, self.loose = rigid_motion.soft_motions(self)
         own = digest_of(self._parameters, self.fixed)
@@ -272,7 +281,7 @@ class ElasticBody(OverRanks):
             self._loaded_with = values_of(self._load_parameters)
         external = self._external.copy()
         b = external - self.carried(lift)
-        stiffness_checks.check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)
+        check_finite({"boundary values": lift, "loads": [external, b]}, self.comm)
         external[self.fixed] = 0.0
         b[self.fixed] = lift[self.fixed]
         return b, external
@@ -334,7 +343,7 @@ class ElasticBody(OverRanks):
             self._elastic = self.anchors.solver if self.loose else self.solver(self.K)
             if self.options is not None and not self._said:
                 self._said = True
-                stiffness_checks.warn_of_unread(self._elastic.unread)
+                warn_of_unread(self._elastic.unread)
         return self._elastic
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:

@@ -4,10 +4,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import ufl
+from dolfinx import fem
 from scipy.linalg import block_diag
+
+from dolfinx_contact import compat
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.displacements import Displacements
 
 # What is smaller than this part of the largest component is not said of a motion.
 SAID = 3e-3
@@ -108,3 +115,21 @@ def _rotation(amounts: np.ndarray) -> np.ndarray:
 def _rounded(vector: np.ndarray) -> str:
     vector = vector / np.linalg.norm(vector)
     return f"({', '.join(f'{x:.3g}' for x in np.where(np.abs(vector) < SAID, 0.0, vector))})"
+
+
+def times_volume(of: Displacements, modes: np.ndarray) -> np.ndarray:
+    """Integrals of displacements times each shape function over the body's volume, ``shape=(owned dofs, m)``.  Collective.
+
+    Args:
+        of: ``Displacements``.
+        modes: Values of owned degrees of freedom, of the same shape.
+    """
+    z, integral = fem.Function(of.V), fem.Function(of.V)
+    form = fem.form(ufl.inner(z, ufl.TestFunction(of.V)) * ufl.dx)
+    columns, size = [], of.count * of.dim
+    for mode in modes.T:
+        z.x.array[:size] = of.rows(mode).ravel()
+        z.x.scatter_forward()
+        compat.assemble_into(integral.x, form)
+        columns.append(integral.x.array[:size].reshape(of.count, of.dim).copy())
+    return of.vectors(np.stack(columns, axis=-1))

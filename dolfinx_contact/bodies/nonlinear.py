@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.stiffness_checks import agree_on_values, check_diagonal, check_finite
+from dolfinx_contact.bodies.input import agree_on_values, check_diagonal, check_finite
 from dolfinx_contact.petsc.linear_solver import preconditioner
 from dolfinx_contact.support.collective import raised_together
 

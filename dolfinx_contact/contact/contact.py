@@ -29,9 +29,8 @@ from dolfinx_contact.contact.input import (
 )
 from dolfinx_contact.contact.interface import ContactPoints, NodalStiffness, add_to
 from dolfinx_contact.contact.laws import Laws, rows
-from dolfinx_contact.contact.placement import Placement, carried
-from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
-from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
+from dolfinx_contact.contact.placement import Placed, Placement
+from dolfinx_contact.contact.state import KEPT, OPPOSITE, SUMS, History, State, Status
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.law.maps import BipotentialMap, ContactLaw, ReturnMap
 from dolfinx_contact.support.attributes import Guarded, frozen
@@ -119,9 +118,7 @@ class Contact(Guarded):
         self._area: np.ndarray | None = None
         self._opposite_area: np.ndarray | None = None
         self._repeats = 1.0
-        self._bare: np.ndarray | None = None  # nodes opposite nothing where the last step has ended
         self._axial: bool | None = None
-        self._landed_after: np.ndarray | None = None
         x, dofs = self.x[:, :gdim], self.displacements.dofs(self.nodes)
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
@@ -133,7 +130,8 @@ class Contact(Guarded):
             self._placement = MortarPlacement(self, facets, owned, extent)
         else:
             self._placement = Placement(surface, x, dofs, self.points_in, extent, mesh.comm)
-        self._laws, self._history, self.rho = Laws(), History(), None
+        self._laws, self.rho = Laws(), None
+        self._begin(self._placement.standing(surface.varies))
         self._laws.assign(self, friction, empty=True)
         self.wear = wear
         total = mesh.comm.allreduce(self.nodes.size, op=MPI.SUM)
@@ -163,7 +161,7 @@ class Contact(Guarded):
     @property
     def has_history(self) -> bool:
         """Whether a step was made since the contact was, or since it was reset; the same on all ranks."""
-        return self._history.settled_by is not None
+        return self.history.friction is not None
 
     def mesh_has_moved(self) -> bool:
         """Whether the mesh has been moved or scaled since the contact was made, on this rank."""
@@ -201,7 +199,7 @@ class Contact(Guarded):
                 from dolfinx_contact.contact.friction_field import wear_on_nodes
 
                 field = wear_on_nodes(self, wear)
-        self._laws.wear, self._wear_field = wear, field
+        self._laws.wear, self._laws.wear_field = wear, field
 
     @property
     def repeats(self) -> float:
@@ -223,17 +221,10 @@ class Contact(Guarded):
         """Whether friction follows the pressure at the end of the step."""
         return self._laws.follow_pressure
 
-    def renew_friction(self) -> None:
-        """Let fields have their present values: a step begins here, with frames of its own.  Collective."""
-        self._laws.renew(self)
-
-    def under_pressures_of(self, step: ContactStep, state: State) -> ContactStep:
-        """The contact in a step with the law of the pressures in a state, that itself if the law stays.  Collective."""
+    def friction_under(self, step: ContactStep, state: State) -> Friction:
+        """The law of the pressures in a state, that of the step itself if it stays.  Collective."""
         pressure = fields.per_area(state.reaction[:, -1], self.area)
-        friction = self._laws.under(self, pressure, step.friction)
-        if friction is step.friction:
-            return step
-        return step.but(friction=friction, law=friction.law(self.V.mesh.geometry.dim))
+        return self._laws.under(self, pressure, step.friction, step.frames)
 
     def check(self) -> None:
         """Raise a ``ValueError`` on all ranks if a law does not fit their nodes, or surface or laws differ.  Collective."""
@@ -244,38 +235,46 @@ class Contact(Guarded):
 
     # -- nodes that supports hold --------------------------------------------------------------
 
-    def hold(
-        self,
-        held: np.ndarray,
-        closed: np.ndarray,
-        guided: tuple | None = None,
-        fixed: np.ndarray | None = None,
-    ) -> None:
-        """Take note of what boundary conditions fix, see ``ContactPoints.hold``."""
-        self.points.hold(held, closed, guided, fixed)
-
     def meet(self, fixed: np.ndarray) -> None:
         """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
-        if self._placement.meet(fixed):
-            self._history.last = self._placement.turned(self._settled, self.opening)
-            self._history.restore()
-            self._settle_here()
+        history = self.history
+        frames = self._placement.met(fixed, history.frames)
+        if frames is not history.frames:
+            last = self._placement.turned(frames, history, self.opening)
+            self.go_back(history.but(last=last, frames=frames))
 
     # -- in a step -----------------------------------------------------------------------------
 
-    def in_step(self, stiffness: NodalStiffness | None = None, **parts: Any) -> ContactStep:
-        """The contact as a step has it, with its present frames, laws and last state, where the surface stands.
+    def in_step(
+        self,
+        stiffness: NodalStiffness | None = None,
+        frames: Placed | None = None,
+        begins: bool = False,
+    ) -> ContactStep:
+        """The contact as a step has it that begins at its last state, where the surface stands.  Collective on deformable surfaces.
 
         Args:
             stiffness: Of the nodes.
-            **parts: Others of ``ContactStep``.
+            frames: Of the step; None are those of the last one.
+            begins: Whether fields get their present values.  Collective.
         """
-        placement, laws = self._placement, self._laws
-        given = placement.now, laws.friction, laws.kernel, self.last, placement.surface_moved()
-        opening = self.opening
-        return ContactStep(
-            self, *given, opening, placement.clear, stiffness, begun=laws.begun, **parts
-        )
+        placement, laws, history = self._placement, self._laws, self.history
+        frames = history.frames if frames is None else frames
+        friction, begun = laws.at_start(self, frames) if begins else (laws.friction, None)
+        same = friction is laws.friction
+        law = laws.kernel if same else friction.law(self.displacements.dim)
+        last, moved = placement.last_in(frames, history), placement.surface_moved(frames)
+        given = frames, friction, law, last, moved, self.opening_at(frames.points)
+        return ContactStep(self, *given, placement.clear, stiffness, begun=begun)
+
+    def frames_of_step(
+        self, start: np.ndarray, at: np.ndarray | None = None, before: Placed | None = None
+    ) -> Placed:
+        """Frames and gaps of a step, where the surface is at present, see ``Placement.following``.  Collective."""
+        history, wanders = self.history, self._wanders
+        if not self._placement.follows(wanders, history):
+            return history.frames
+        return self._placement.following(start, at, wanders, history, before)
 
     def at(self, u: fem.Function | np.ndarray) -> State:
         """Gaps and slip increments at a displacement, as a state without reactions; slip counts from the last converged step.
@@ -291,12 +290,12 @@ class Contact(Guarded):
     @property
     def frame(self) -> np.ndarray:
         """Rows (t1, t2, n), in 2-D (t, n), of the last step: ``shape=(gdim, gdim)``; on curved surfaces ``(n, gdim, gdim)``."""
-        return self._placement.now.frame
+        return self.history.frames.frame
 
     @property
     def points(self) -> ContactPoints:
         """The ``ContactPoints``: the motion as a sparse operator, and the directions that supports hold."""
-        return self._placement.now.points
+        return self.history.frames.points
 
     def points_in(self, frames: np.ndarray) -> ContactPoints:
         """The contact points with these frames, on rigid surfaces: the nodes.  A subclass may have others, see docs/extending.md.
@@ -308,19 +307,9 @@ class Contact(Guarded):
         return ContactPoints(of.dofs(self.nodes), frames, of.owned)
 
     @property
-    def home(self) -> np.ndarray:
-        """Positions relative to the surface for which frames and gaps were taken, in its axes, ``shape=(n, gdim)``."""
-        return self._placement.now.home
-
-    @property
-    def own_frame(self) -> np.ndarray:
-        """As ``frame``, in the axes of the surface."""
-        return self._placement.now.own
-
-    @property
     def arms(self) -> np.ndarray:
         """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, at the end of the last step."""
-        return self._placement.arms(self.displacement)
+        return self._placement.arms(self.displacement, self.history.frames)
 
     @property
     def _wanders(self) -> bool:
@@ -328,14 +317,10 @@ class Contact(Guarded):
         return self.surface.varies or self._laws.textured
 
     @property
-    def follows(self) -> bool:
-        """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
-        return self._placement.follows(self._wanders)
-
-    @property
     def changes(self) -> bool:
         """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
-        return self._placement.changes or (self._laws.textured and not self.surface.deformable)
+        changes = self._placement.changes(self.history)
+        return changes or (self._laws.textured and not self.surface.deformable)
 
     @property
     def body_has_axes(self) -> bool:
@@ -343,21 +328,19 @@ class Contact(Guarded):
         return self._laws.body_has_axes and not self.surface.deformable
 
     def axes_turned(
-        self, at: np.ndarray, frame: np.ndarray, points: ContactPoints | None = None
+        self,
+        used: ContactStep,
+        at: np.ndarray,
+        frame: np.ndarray,
+        points: ContactPoints | None = None,
     ) -> np.ndarray | float:
         """By how much axes at other positions differ from those in use, see ``Laws.turned``."""
-        return self._laws.turned(self, at, frame, points)
+        return self._laws.turned(used, at, frame, points)
 
     @property
     def placement(self) -> Placement:
         """Frames, gaps and motions relative to the surface."""
         return self._placement
-
-    def follow(self, u: np.ndarray, start: np.ndarray | None = None) -> None:
-        """Take frames and gaps for the next step, where the surface is at present; see ``Placement.follow``."""
-        self._placement.follow(u, u if start is None else start, self._wanders, self._settled)
-        self._history.last = self._placement.carried(self._settled)
-        self._history.restore()
 
     def may_land(self, u: np.ndarray) -> bool:
         """Whether nodes of this rank are open at the last displacement, and there is friction if they land.
@@ -376,21 +359,21 @@ class Contact(Guarded):
 
         It does not count as slip if that changes friction.
         """
-        before = self._landed_after
+        before = self.history.landed_after
         return np.zeros_like(self.slip_increment) if before is None else before
 
     def with_own_gaps(self, step: ContactStep, state: State, u: np.ndarray) -> State:
         """A state whose open nodes on a deformable surface have the gaps of a displacement, not of the rows that a step used.  Collective."""
         if not (self.surface.deformable and self.changes):
             return state
-        gap, points = self._placement.gap_at(u)
+        gap, points = self._placement.gap_at(u, step.frames)
         gap = gap + self.opening_at(points, step.depth)
-        self._bare = points.alone
         return state._replace(gap=np.where(state.reaction[:, -1] > 0.0, state.gap, gap))
 
     def take(self, **arrays: np.ndarray) -> None:
         """Replace parts of the present state."""
-        self._history.take(**arrays)
+        given = {k: a if a is None else frozen(a) for k, a in arrays.items()}
+        self._present = self._present._replace(**given)
 
     # -- one iteration -------------------------------------------------------------------------
 
@@ -402,16 +385,17 @@ class Contact(Guarded):
         """
         self.rho = self.nodal_stiffness(K).normal
 
-    def nodal_stiffness(self, K: PETSc.Mat) -> NodalStiffness:
+    def nodal_stiffness(self, K: PETSc.Mat, points: ContactPoints | None = None) -> NodalStiffness:
         """Normal and tangential blocks of the stiffness at the contact nodes, local frame.
 
         Args:
             K: Assembled PETSc stiffness matrix on ``V``.  Collective.
+            points: Of a step; None are those of the last one.
 
         Raises:
             ValueError: on all ranks, if a node does not resist being moved along the normal.
         """
-        stiffness = self.points.stiffness(K)
+        stiffness = (self.points if points is None else points).stiffness(K)
         with raised_together(self.comm):
             if not (stiffness.normal > 0.0).all():
                 node = int(np.argmin(stiffness.normal))
@@ -477,51 +461,71 @@ class Contact(Guarded):
 
     def reset(self) -> None:
         """Clear the history: undeformed, unworn body, no reactions, the surface in its present position."""
-        if self.follows:
-            self._placement.stand(self._wanders)
-        self._history.begin(self._placement.at_rest())
-        self._bare = None
-        self._settle_here()
+        frames = self.history.frames
+        if self._placement.follows(self._wanders, self.history):
+            frames = self._placement.standing(self._wanders, frames)
+        self._begin(frames)
 
-    def _settle_here(self) -> None:
-        """The last state of the history is that of the last converged step, in the present frames."""
-        self._placement.settle(self._history.sums.get(OPPOSITE))
-        self._settled = self._history.last
+    def _begin(self, frames: Placed) -> None:
+        self.go_back(History.of(self._placement.at_rest(frames), frames))
+
+    def go_back(self, history: History) -> None:
+        """Let this be the history; of a law of fields the numbers go along."""
+        self._history, self._present = history, history.last
+        if self._laws.field and history.friction is not None:
+            self._laws.take(self, history.friction)
 
     def advance(self) -> None:
         """Accept the present state as the last converged one, from which the next slip counts."""
-        self.accept(self.in_step(), self.present)
+        self.accept(self.in_step(), self._present)
 
-    def accept(self, step: ContactStep, state: State) -> None:
-        """Let a state in a step be the last converged one.  Collective."""
-        self._laws.take(self, step.friction)
-        self._history.take(**state._asdict())
-        self._landed_after = step.before
-        law, slip = step.friction, self.slip_kept + self.slip_increment
-        sticks = (law.mu.any(axis=-1) & (self.status == int(Status.STICK)))[:, None]
-        slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
-        pressed = np.maximum(self.last.reaction[:, -1], self.reaction[:, -1])
-        # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
-        path = ((pressed > 0.0) & (self.covered > 0.0)) * np.linalg.norm(slip, axis=1)
-        work, turned = self._work(slip)
-        work, path, turned = (self.repeats * part for part in (work, path, turned))
-        self._doubtful = float(np.abs(turned.sum(axis=1)).sum()) if self.may_turn else 0.0
-        if step.depth is not None:
-            depth = step.depth
-        else:
-            depth = np.zeros_like(path) if self.wear is None else self._depth(work)
-        self._unloads = depth, pressed
-        if self.wear is not None and self.wear.opposite.any():
-            other = depth * self.wear.opposite_share(work, self._wear_field)
-            taken = self._placement.taken(self.whole_area * other, self.opposite_area)
-            self._history.wear_opposite(taken)
-            depth = depth - other
+    def accept(self, step: ContactStep, state: State, u: np.ndarray | None = None) -> None:
+        """Let a state in a step be the last converged one.  Collective.
+
+        Args:
+            step: The contact in the step.
+            state: The state.
+            u: Its displacement, owned degrees of freedom; needed between bodies.
+        """
+        placement, frames, before = self._placement, step.frames, self.history
         if self.surface.spin is not None:
-            self.take(displacement=self._placement.turned_past(self.displacement))
-        self._history.settle(law, work.sum(axis=1), path, depth, kept)
-        self._placement.end()
+            turned = placement.turned_past(state.displacement, frames)
+            state = state._replace(displacement=turned)
+        state = State(*(None if a is None else frozen(a) for a in state))
+        self._history = self._advanced(step, state).but(frames=placement.ended(frames))
+        if self.surface.deformable and u is not None and self._placement.changes(before):
+            bare = placement.gap_at(u, frames)[1].alone
+            self._history = self._history.but(bare=bare)
+        self._laws.take(self, step.friction)
+        self._present = state
         self._renew_area()
-        self._settle_here()
+
+    def _advanced(self, step: ContactStep, state: State) -> History:
+        """The history with what a step has worked, slipped and worn.  Collective where the other side wears."""
+        history, law = self.history, step.friction
+        slip = history.slip_kept + state.slip_increment
+        sticks = (law.mu.any(axis=-1) & (state.status == int(Status.STICK)))[:, None]
+        slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
+        pressed = np.maximum(step.last.reaction[:, -1], state.reaction[:, -1])
+        # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
+        covered = self._placement.covered(step.frames) > 0.0
+        path = ((pressed > 0.0) & covered) * np.linalg.norm(slip, axis=1)
+        work, turned = step.work(slip, state.reaction)
+        work, path, turned = (self.repeats * part for part in (work, path, turned))
+        depth = step.depth
+        if depth is None:
+            depth = np.zeros_like(path) if self.wear is None else self._depth(work)
+        added, more, worn = dict(zip(SUMS, (work.sum(axis=1), path, depth))), {}, history.worn
+        if self.wear is not None and self.wear.opposite.any():
+            other = depth * self.wear.opposite_share(work, self._laws.wear_field)
+            given = self.whole_area * other, self.opposite_area, step.frames, history
+            more[OPPOSITE] = history.sums.get(OPPOSITE, 0.0) + self._placement.taken(*given)
+            added["wear_depth"], worn = depth - other, self._placement.everywhere(more[OPPOSITE])
+        more |= {name: history.sums[name] + part for name, part in added.items()}
+        sums = history.sums | {name: frozen(part) for name, part in (more | {KEPT: kept}).items()}
+        doubtful = float(np.abs(turned.sum(axis=1)).sum()) if self.may_turn else 0.0
+        last, unloads = state._replace(known=None), (depth, pressed)
+        return History(last, step.frames, sums, law, worn, None, step.before, doubtful, unloads)
 
     # -- wear within the step ------------------------------------------------------------------
 
@@ -544,12 +548,12 @@ class Contact(Guarded):
             Length, and length per force, ``shape=(n,)`` each.
         """
         if u is not None:
-            state = self.with_slip_past_edges(state, u)
+            state = self.with_slip_past_edges(step, state, u)
         slips = (state.status != int(Status.STICK))[:, None]
-        slip = slips * (self.slip_kept + state.slip_increment)
-        unit = np.zeros_like(self.reaction)
+        slip = slips * (self.history.slip_kept + state.slip_increment)
+        unit = np.zeros_like(state.reaction)
         unit[:, -1] = 1.0
-        works = self._works(slip, unit, step.friction)[:2]
+        works = step.works(slip, unit)[:2]
         start, end = (2.0 * self.repeats * work for work in works)  # a half each
         begun = 1.0
         if self.wear.threshold:
@@ -557,9 +561,9 @@ class Contact(Guarded):
             begun = self._begun(0.5 * (start + force * end))
         return begun * self._rate(start), begun * self._rate(end)
 
-    def with_slip_past_edges(self, state: State, u: np.ndarray) -> State:
+    def with_slip_past_edges(self, step: ContactStep, state: State, u: np.ndarray) -> State:
         """A state in which nodes that have left what was opposite have slipped past its edge.  Collective between bodies."""
-        found = self._placement.slip_past_edge(u)
+        found = self._placement.slip_past_edge(u, step.frames, self.history)
         if found is None:
             return state
         left, slip = found
@@ -570,37 +574,8 @@ class Contact(Guarded):
         """Whether slip may turn between directions of different friction; the same on all ranks."""
         return self.points.dim == 3 and (self.friction.mu.ndim > 1 or not self.friction.isotropic)
 
-    @property
-    def doubtful_work(self) -> float:
-        """Of the frictional work of the last step, on this rank: by how much slip that went straight on would have another one."""
-        return self._doubtful
-
-    def _work(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Frictional work of the step along each principal direction, for its slip, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each."""
-        if self._laws.begun is not None:
-            start, end, turned = self._works(slip, self.reaction, self.friction)
-            return start + end, turned
-        law, before = self.law_before, self.last.reaction
-        return work_of_friction(self.friction, before, self._slipped(law), self.reaction, slip, law)
-
-    def _slipped(self, law: Friction | None) -> np.ndarray:
-        """See ``slipped_last``, of the last step and its law."""
-        slips = self.last.status == int(Status.SLIP)
-        return slipped_last(law or self.friction, self.last.reaction, slips)
-
-    def _works(
-        self, slip: np.ndarray, reaction: np.ndarray, at_end: Friction
-    ) -> tuple[np.ndarray, ...]:
-        """Shares of the frictional work of a step that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
-        none, before = np.zeros_like(reaction), self.last.reaction
-        law_before = self.law_before
-        slipped = self._slipped(law_before)
-        law = at_end if self._laws.begun is None else self._laws.begun
-        start, turned = work_of_friction(law, before, slipped, none, slip, law_before)
-        return start, work_of_friction(at_end, none, slipped, reaction, slip)[0], turned
-
     def _rate(self, work: np.ndarray) -> np.ndarray:
-        return self.wear.depth(work, self.whole_area, self._wear_field)
+        return self.wear.depth(work, self.whole_area, self._laws.wear_field)
 
     def _depth(self, work: np.ndarray) -> np.ndarray:
         """Depth that the work of a step wears, ``shape=(n,)``."""
@@ -612,80 +587,53 @@ class Contact(Guarded):
         return self.wear.part(work.sum(axis=1), self.dissipation, self.whole_area)
 
     @property
-    def law_before(self) -> Friction | None:
-        """The law by which the last step was settled, its axes carried in space to the frames of this one; None before the first."""
-        law, settled = self._history.settled_by, self._placement.settled
-        n, gdim = self.points.count, self.points.dim
-        turns = gdim == 3 and settled.points is not self.points
-        if law is None or not turns or (law.axes is None and law.isotropic):
-            return law
-        along = (
-            np.tile([1.0, 0.0], (n, 1)) if law.axes is None else law.axes
-        )  # grooves turn with the surface
-        axes = np.column_stack((along, np.zeros(n)))
-        axes = carried(axes, settled.frame, self.frame)[:, :2]
-        return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
-
-    @property
     def sums(self) -> dict[str, np.ndarray]:
         """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
-        return {name: of for name, of in self._history.sums.items() if name != KEPT}
+        return {name: of for name, of in self.history.sums.items() if name != KEPT}
 
     def take_sums(self, sums: dict[str, np.ndarray]) -> None:
         """Let the next step start from other ``sums``, none of them negative."""
-        self._history.sums = self._history.sums | {name: frozen(of) for name, of in sums.items()}
-        self._settle_here()
-
-    def restore(self) -> None:
-        """Return to the last converged state, its frames and, where friction is a field, its law."""
-        self._placement.restore()
-        self._history.last = self._settled
-        self._history.restore()
-        self._laws.restore(self)
-
-    def history(self) -> tuple:
-        """All that a step leaves to the next one, for ``go_back``."""
-        return self._placement.now, self._bare, self._history.kept()
-
-    def go_back(self, history: tuple) -> None:
-        """Take back what ``history`` returned."""
-        placed, self._bare, kept = history
-        self._placement.restore(placed)
-        self._history.go_back(kept)
-        self._laws.restore(self)
-        self._settle_here()
+        sums = self.history.sums | {name: frozen(of) for name, of in sums.items()}
+        worn = self._placement.everywhere(sums[OPPOSITE]) if OPPOSITE in sums else None
+        self.go_back(self.history.but(sums=sums, worn=worn))
 
     def save(self) -> dict[str, np.ndarray]:
         """All that the next step starts from, and the laws, as arrays by name; this rank's nodes."""
-        saved = self._history.save() | self._laws.save(self) | {"plane": self.surface.displacement}
-        if self._history.settled_by is not None:
-            saved["law_of_last_step"] = rows(self._history.settled_by, self.nodes.size)
+        history = self.history
+        saved = history.saved() | self._laws.save(self) | {"plane": self.surface.displacement}
+        if history.friction is not None:
+            saved["law_of_last_step"] = rows(history.friction, self.nodes.size)
         if self.surface.placed.any():
             saved["placed_rotation_of_plane"] = self.surface.placed
-        return saved | self._placement.save()
+        return saved | self._placement.save(history.frames)
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size, or another law or surface was saved."""
-        self._history.check_saved(saved)
+        self.history.check_saved(saved)
         self._laws.check_saved(self, saved)
         if self.surface.varies and "home" not in saved:
             raise ValueError(f"checkpoint: it was written with another plane: here {self.surface}.")
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take back what ``save`` returned, with the same nodes on this rank; see ``check_saved``."""
-        surface = self.surface
+        surface, placement = self.surface, self._placement
         rotation = saved.get("rotation_of_plane", np.zeros_like(surface.rotation))
         surface.place(
             rotation, frozen(np.array(saved.get("placed_rotation_of_plane", surface.placed)))
         )
-        if self.follows:
-            self._placement.back_to(saved["home"] if surface.varies else saved.get("at"))
-        self._history.load(saved)
+        frames = self.history.frames
+        if placement.follows(self._wanders, self.history):
+            frames = placement.saved_at(
+                saved["home"] if surface.varies else saved.get("at"), frames
+            )
+        history = self.history.loaded(saved)
         surface.displacement = saved["plane"]
-        self._history.settled_by = self._laws.load(self, saved)
         found = saved.get("found_rotation_of_plane", surface.rotation)
-        self._placement.end(found)
-        self._settle_here()
+        frames = placement.ended(frames, found)
+        worn = history.sums.get(OPPOSITE)
+        worn = None if worn is None else placement.everywhere(worn)
+        self.go_back(history.but(frames=frames, worn=worn))
+        self._history = self._history.but(friction=self._laws.load(self, saved))
         surface.turn_to(found)
 
     # -- results -------------------------------------------------------------------------------
@@ -693,22 +641,22 @@ class Contact(Guarded):
     @property
     def present(self) -> State:
         """The present state; another object as soon as any part of it is replaced."""
-        return self._history.present
+        return self._present
+
+    @property
+    def history(self) -> History:
+        """The ``History``: what the next step gets from those before."""
+        return self._history
 
     @property
     def last(self) -> State:
-        """The state at the end of the last step that converged."""
-        return self._history.last
+        """The state at the end of the last step that converged, in its frames."""
+        return self.history.last
 
     @property
     def displacement(self) -> np.ndarray:
         """Displacement of the nodes relative to the surface, ``shape=(n, gdim)``, local frame, length."""
         return self.present.displacement
-
-    @property
-    def settled(self) -> State:
-        """The last converged state in the frames of its own step; ``last`` is in those of the present one."""
-        return self._settled
 
     @property
     def reaction(self) -> np.ndarray:
@@ -723,7 +671,7 @@ class Contact(Guarded):
     @property
     def gap(self) -> np.ndarray:
         """Distance to the surface, ``shape=(n,)``, length units; negative is penetration, infinite where nothing is opposite."""
-        bare = self.points.alone if self._bare is None else self._bare
+        bare = self.points.alone if self.history.bare is None else self.history.bare
         return frozen(np.where(bare, np.inf, self.present.gap)) if bare.any() else self.present.gap
 
     @property
@@ -739,22 +687,22 @@ class Contact(Guarded):
     @property
     def dissipation(self) -> np.ndarray:
         """Frictional work since the start, ``shape=(n,)``, force times length; it never decreases."""
-        return self._history.sums["dissipation"]
+        return self.history.sums["dissipation"]
 
     @property
     def slip_path(self) -> np.ndarray:
         """Length of the path slipped while in contact since the start, ``shape=(n,)``, length units."""
-        return self._history.sums["slip_path"]
+        return self.history.sums["slip_path"]
 
     @property
     def wear_depth(self) -> np.ndarray:
         """Depth worn off the contact's own nodes, ``shape=(n,)``, length; never decreases, zero without ``wear``.  Times ``whole_area`` it is volume."""
-        return self._history.sums["wear_depth"]
+        return self.history.sums["wear_depth"]
 
     @property
     def opposite_wear_depth(self) -> np.ndarray:
         """Depth worn off a deformable surface, at its nodes ``opposite``, ``shape=(k,)``, length.  Times ``opposite_area`` it is volume."""
-        return self._history.sums.get(OPPOSITE, np.zeros(self.opposite.size))
+        return self.history.sums.get(OPPOSITE, np.zeros(self.opposite.size))
 
     @property
     def opening(self) -> np.ndarray:
@@ -763,7 +711,7 @@ class Contact(Guarded):
 
     def opening_at(self, points: ContactPoints, depth: np.ndarray | None = None) -> np.ndarray:
         """The same with nodes opposite others, and what a step wears, ``shape=(n,)``."""
-        own, other = self.wear_depth, self._placement.opened(points)
+        own, other = self.wear_depth, self._placement.opened(points, self.history.worn)
         worn = own if depth is None else own + depth
         return worn if other is None else worn + other
 
@@ -773,7 +721,7 @@ class Contact(Guarded):
 
         A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
         """
-        return self._history.sums[KEPT]
+        return self.history.slip_kept
 
     def penetration_between(self, u: np.ndarray) -> float:
         """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
@@ -904,7 +852,7 @@ class Contact(Guarded):
     @property
     def covered(self) -> np.ndarray:
         """Part of each node's area that is opposite a deformable surface, ``shape=(n,)``; one on rigid ones."""
-        return self._placement.covered
+        return self._placement.covered(self.history.frames)
 
     @property
     def pressure(self) -> np.ndarray:
@@ -969,7 +917,7 @@ class Contact(Guarded):
         Args:
             stiffness: Of the nodes.  Collective.
         """
-        depth, carried = self._unloads
+        depth, carried = self.history.unloads
         taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)  # fmt: skip
         k = int(taken.argmax()) if taken.size else None
         mine = (0.0, 0.0, []) if k is None else (float(taken[k]), float(depth[k]), self.x[k].tolist())  # fmt: skip

@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dolfinx_contact.contact.placement import Placed, carried
 from dolfinx_contact.contact.state import State, Status
+from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
+from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.support.checks import EPSILON
 from dolfinx_contact.surfaces.surface import cross
 
@@ -24,8 +27,6 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.displacements import Displacements
     from dolfinx_contact.contact.interface import ContactPoints, NodalStiffness
-    from dolfinx_contact.contact.placement import Placed
-    from dolfinx_contact.law.friction import Friction
     from dolfinx_contact.law.maps import ContactLaw, NodalMap
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -69,6 +70,16 @@ class ContactStep:
     def but(self, **parts: Any) -> ContactStep:
         """The same with other parts."""
         return replace(self, **parts)
+
+    def where_it_stands(self) -> ContactStep:
+        """The same with the surface where it stands now."""
+        return self.but(moved=self.given.placement.surface_moved(self.frames))
+
+    def with_friction(self, friction: Friction) -> ContactStep:
+        """The same with another law."""
+        if friction is self.friction:
+            return self
+        return self.but(friction=friction, law=friction.law(self.points.dim))
 
     # -- what does not depend on the step ------------------------------------------------------
 
@@ -282,6 +293,50 @@ class ContactStep:
         slips = state.status == int(Status.SLIP)
         if not slips.any():
             return slips
-        slip = self.given.slip_kept + state.slip_increment  # else what is slow would never slip
+        kept = self.given.history.slip_kept
+        slip = kept + state.slip_increment  # else what is slow would never slip
         made = np.linalg.norm(np.einsum("nij,nj->ni", self.stiffness.tangential, slip), axis=1)
         return slips & (made <= unknown) & (self.friction.mu > 0.0).any(axis=-1)
+
+    # -- work ----------------------------------------------------------------------------------
+
+    def work(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frictional work of the step along each principal direction, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each.
+
+        Args:
+            slip: Of the step, ``shape=(n, gdim - 1)``.
+            reaction: At its end, ``shape=(n, gdim)``.
+        """
+        if self.begun is not None:
+            start, end, turned = self.works(slip, reaction)
+            return start + end, turned
+        before = self.last.reaction, self._slipped
+        return work_of_friction(self.friction, *before, reaction, slip, self._friction_before)
+
+    def works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Shares of that work that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
+        none, before, slipped = np.zeros_like(reaction), self.last.reaction, self._slipped
+        law = self.friction if self.begun is None else self.begun
+        start, turned = work_of_friction(law, before, slipped, none, slip, self._friction_before)
+        end = work_of_friction(self.friction, none, slipped, reaction, slip)[0]
+        return start, end, turned
+
+    @cached_property
+    def _slipped(self) -> np.ndarray:
+        """See ``slipped_last``, of the last step and its law."""
+        slips = self.last.status == int(Status.SLIP)
+        return slipped_last(self._friction_before or self.friction, self.last.reaction, slips)
+
+    @cached_property
+    def _friction_before(self) -> Friction | None:
+        """The law of the last step, its axes carried in space to the frames of this one; None before the first."""
+        law, before = self.given.history.friction, self.given.history.frames
+        n, gdim = self.points.count, self.points.dim
+        turns = gdim == 3 and before.points is not self.points
+        if law is None or not turns or (law.axes is None and law.isotropic):
+            return law
+        # grooves turn with the surface
+        along = np.tile([1.0, 0.0], (n, 1)) if law.axes is None else law.axes
+        axes = np.column_stack((along, np.zeros(n)))
+        axes = carried(axes, before.frame, self.frames.frame)[:, :2]
+        return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)

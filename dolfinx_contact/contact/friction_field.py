@@ -18,6 +18,7 @@ from dolfinx_contact.support.checks import finite, place
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.placement import Placed
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -36,14 +37,19 @@ def followed(friction: Friction) -> list[str]:
 
 
 def on_nodes(
-    contact: Contact, friction: Friction, state: dict[str, np.ndarray], axes: Any = None
+    contact: Contact,
+    friction: Friction,
+    state: dict[str, np.ndarray],
+    frames: Placed,
+    axes: Any = None,
 ) -> Friction:
-    """The law with coefficients and axes for each owned node of a contact, as its frames are at present.
+    """The law with coefficients and axes for each owned node of a contact.
 
     Args:
         contact: The contact.
         friction: A law with fields.
         state: Arrays of the contact that the fields follow, by name.
+        frames: Of the nodes.
         axes: Those of the nodes, if they are known.
 
     Raises:
@@ -52,7 +58,8 @@ def on_nodes(
     """
     given, k = friction.given(), friction.exponent
     mu, p = (_coefficients(contact, name, given[name], state) for name in ("mu", "p"))
-    return Friction(mu, p, k=k, axes=_axes(contact, friction) if axes is None else axes)
+    axes = _axes(contact, friction, frames) if axes is None else axes
+    return Friction(mu, p, k=k, axes=axes)
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
@@ -126,11 +133,11 @@ def directions(contact: Contact, friction: Friction) -> np.ndarray:
     return (values / np.linalg.norm(values, axis=0)).T.copy()
 
 
-def _axes(contact: Contact, friction: Friction):
+def _axes(contact: Contact, friction: Friction, frames: Placed):
     if not is_field(friction.given()["axes"]):
         return friction.given()["axes"]
-    frame = contact.own_frame if friction.of == "surface" else contact.frame
-    return axes_at(contact, friction, contact.home, frame, contact.points)
+    frame = frames.own if friction.of == "surface" else frames.frame
+    return axes_at(contact, friction, frames.home, frame, frames.points)
 
 
 def axes_at(
@@ -147,7 +154,7 @@ def axes_at(
     Raises:
         ValueError: values of another shape, or along the normal.  On this rank alone.
     """
-    n, gdim = contact.nodes.size, contact.points.dim
+    n, gdim = contact.nodes.size, contact.displacements.dim
     given, of = friction.given()["axes"], friction.of
     values = _values(contact, "axes", given, {}, at if of == "surface" else None)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):

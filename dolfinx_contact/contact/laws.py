@@ -16,6 +16,8 @@ from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.placement import Placed
     from dolfinx_contact.law.wear import Wear
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -34,17 +36,16 @@ class Laws:
         friction: The law at the nodes; fields are evaluated.
         kernel: The kernel's law of this friction.
         wear: The law of wear, or None.
-        begun: The law as the step began, if it follows the state; else None.
+        wear_field: Its coefficients at the nodes, if they are a field.
     """
 
     friction: Friction
     kernel: Any
     wear: Wear | None = None
-    begun: Friction | None = None
+    wear_field: Any = None
 
     def __init__(self) -> None:
         self._field: Friction | None = None  # the law given, if anything in it is a field
-        self._rested: Friction | None = None  # a field's law in the last converged state
 
     def assign(self, contact: Contact, friction: Friction | float, empty: bool = False) -> None:
         """Take another law; fields as before anything has touched if ``empty``.  Collective where there are fields."""
@@ -59,7 +60,7 @@ class Laws:
             field
         ):  # what follows the pressure may be large without any
             warn_of_percent(friction)
-        self._field, self.begun, self._rested = field, None, None
+        self._field = field
         self.take(contact, friction)
 
     def _evaluated(
@@ -69,17 +70,24 @@ class Laws:
         empty: bool = False,
         axes: Any = None,
         pressure: np.ndarray | None = None,
+        frames: Placed | None = None,
     ) -> Friction:
-        """A law of fields at the nodes: of the present state, or as before anything has touched if ``empty``.  Collective."""
+        """A law of fields at the nodes in some frames: of the present state, or as before anything has touched if ``empty``.  Collective."""
+        frames = contact.history.frames if frames is None else frames
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
         names = _fields().followed(field)
         state = {name: none if empty else getattr(contact, name) for name in names}
         if pressure is not None:
             state["pressure"] = pressure
         with raised_together(contact.comm):
-            friction = _fields().on_nodes(contact, field, state, axes)
+            friction = _fields().on_nodes(contact, field, state, frames, axes)
             check_law(contact.surface, friction, gdim, _fields().directed(field, gdim))
         return at_most_rough(friction)
+
+    @property
+    def field(self) -> bool:
+        """Whether anything in the law is a field."""
+        return self._field is not None
 
     def take(self, contact: Contact, friction: Friction) -> None:
         """These are the numbers at the nodes."""
@@ -101,57 +109,53 @@ class Laws:
         return self._axes_vary and self._field.of == "body"
 
     def turned(
-        self, contact: Contact, at: np.ndarray, frame: np.ndarray, points: Any = None
+        self, used: ContactStep, at: np.ndarray, frame: np.ndarray, points: Any = None
     ) -> np.ndarray | float:
         """Radians by which axes at other positions differ from those in use, ``shape=(n,)``: of a texture of the surface, or of bodies.
 
         Args:
-            contact: The contact.
+            used: The contact in a step.
             at: Positions relative to the surface, ``shape=(n, gdim)``.
             frame: Frames there, in its axes.
             points: Rows there, of a deformable surface.
         """
-        used, deformable = self.friction.axes, contact.surface.deformable
-        if not (self.textured or deformable) or self.friction.isotropic or contact.points.dim == 2:
+        contact, friction = used.given, used.friction
+        axes, deformable = friction.axes, contact.surface.deformable
+        if not (self.textured or deformable) or friction.isotropic or used.points.dim == 2:
             return 0.0
-        new = used
+        new = axes
         if self._axes_vary:
             new = _fields().axes_at(contact, self._field, at, frame, points)
         if deformable:  # their frames turn as well
-            old = contact.frame
+            old = used.frames.frame
             new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
             new = times(old[:, :2], np.einsum("ni,nij->nj", new, frame[:, :2]))
-            used = (1.0, 0.0) if used is None else used
-        used = np.broadcast_to(used, new.shape)
-        return np.abs(new[:, 0] * used[:, 1] - new[:, 1] * used[:, 0])
+            axes = (1.0, 0.0) if axes is None else axes
+        axes = np.broadcast_to(axes, new.shape)
+        return np.abs(new[:, 0] * axes[:, 1] - new[:, 1] * axes[:, 0])
 
     @property
     def follow_pressure(self) -> bool:
         """Whether friction follows the pressure at the end of the step."""
         return self._field is not None and "pressure" in _fields().followed(self._field)
 
-    def renew(self, contact: Contact) -> None:
-        """Let fields have their present values: a step begins here, with frames of its own.  Collective."""
+    def at_start(self, contact: Contact, frames: Placed) -> tuple[Friction, Friction | None]:
+        """The law with which a step begins in some frames, and that itself where it follows the state; else None.  Collective."""
         if self._field is None:
-            return
-        before, friction = self.friction, self._evaluated(contact, self._field)
-        if not _same(friction, before):
-            self.take(contact, friction)
-        self._rested = before
-        if _fields().followed(self._field):
-            self.begun = self.friction
+            return self.friction, None
+        friction = self._evaluated(contact, self._field, frames=frames)
+        friction = self.friction if _same(friction, self.friction) else friction
+        return friction, friction if _fields().followed(self._field) else None
 
-    def under(self, contact: Contact, pressure: np.ndarray, before: Friction) -> Friction:
+    def under(
+        self, contact: Contact, pressure: np.ndarray, before: Friction, frames: Placed
+    ) -> Friction:
         """The law of other pressures, ``shape=(n,)``, with the axes of the one before, or that itself if nothing changes.  Collective."""
         if not self.follow_pressure:
             return before
-        friction = self._evaluated(contact, self._field, axes=before.axes, pressure=pressure)
+        given = dict(axes=before.axes, pressure=pressure, frames=frames)
+        friction = self._evaluated(contact, self._field, **given)
         return before if _same(friction, before) else friction
-
-    def restore(self, contact: Contact) -> None:
-        """Return to the last converged state."""
-        if self._rested is not None:
-            self.take(contact, self._rested)
 
     def described(self, surface: Surface) -> dict[str, str]:
         """Surface and laws, but coefficients per node, in words, which have to be the same on all ranks."""

@@ -31,7 +31,7 @@ from dolfinx_contact.contact.interface import (
 )
 from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
 from dolfinx_contact.contact.placement import CLEAR, Placed, Placement, carried, times, turned_back
-from dolfinx_contact.contact.state import State
+from dolfinx_contact.contact.state import History, State
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import frames_along
@@ -61,25 +61,25 @@ class MortarPlacement(Placement):
         self._slave.keep(self._mine)
         self._at_nodes = [at_nodes(side, nodes.size) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
-        # A displacement with the nodes that have left, and what was placed for it.
+        # A displacement with the nodes that have left, and what was placed for it; one at the start of a step, and how both sides have turned.
         self._projected: tuple = (None, None)
-        self._start, self._left = np.zeros(owned[0]), np.zeros(nodes.size, dtype=bool)
-        self._leaving = False  # whether nodes of any rank leave the other side in the step
-        self._began: list | None = None  # how both sides have turned at its start
+        self._began: tuple = (None, None)
         self._planes: list = []  # directions and places along which supports hold nodes in one plane
         self._owned = owned
         super().__init__(
             contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
         )
 
-    def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
+    def standing(self, wanders: bool, before: Placed | None = None) -> Placed:
         """See ``Placement``: where the undeformed bodies stand.  Collective."""
-        self.now = self.placed(np.zeros(self._owned[0]))
-        self._undeformed = self.now.frame
+        found = self.projected(np.zeros(self._owned[0]))
+        self._undeformed = found.frame
+        return found
 
-    def placed(self, u: np.ndarray) -> Placed:
-        """Frames, gaps and rows of the state with a displacement of owned degrees of freedom.  Collective."""
-        (known, found), key = self._projected, np.append(u, self._left)
+    def projected(self, u: np.ndarray, left: np.ndarray | None = None) -> Placed:
+        """Frames, gaps and rows of the state with a displacement of owned degrees of freedom, without nodes that have left.  Collective."""
+        left = np.zeros(len(self.x), dtype=bool) if left is None else left
+        (known, found), key = self._projected, np.append(u, left)
         if self._comm.allreduce(known is not None and np.array_equal(known, key), op=MPI.LAND):
             return found
         compat.free_garbage(self._comm)  # rows of earlier steps
@@ -87,7 +87,7 @@ class MortarPlacement(Placement):
         masters, there = self._master.moved(u)
         with raised_together(self._comm):
             rows = rows_of(slaves, masters, len(self.x), len(there))
-            rows = rows._replace(covered=rows.covered & ~self._left)
+            rows = rows._replace(covered=rows.covered & ~left)
             normals = _without(self._supported, self._mean_normals(slaves))
             turns = self._turns(moved, there)
             axis = self.surface.axis
@@ -102,7 +102,9 @@ class MortarPlacement(Placement):
         points.met, points.turns, points.sides = self._supported, turns, (moved, there)
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
-        found = Placed(home, still, frames, frames, flat, points, None, None, still, at=at)
+        found = Placed(
+            home, still, frames, frames, flat, points, None, None, still, at=at, left=left
+        )
         self._projected = key, found
         return found
 
@@ -138,110 +140,118 @@ class MortarPlacement(Placement):
             lines[points.alone] = points.turns[1]
         return np.einsum("nij,jn->in", lines, given)
 
-    def twist(self, u: np.ndarray) -> float:
+    def twist(self, u: np.ndarray, start: np.ndarray) -> float:
         """Radians by which one side has turned against the other since the start of the step.  Collective."""
-        ends = self._turns(*(side.moved(u)[1] for side in (self._slave, self._master)))
-        return _between(*self._since_start(ends))[2]
+        return _between(*self._since(start, self._turns_at(u)))[2]
 
-    def _since_start(self, turns: list[np.ndarray]) -> list[np.ndarray]:
-        """Rotations of both sides in the step.  Collective the first time."""
-        if self._began is None:
-            began = (side.moved(self._start)[1] for side in (self._slave, self._master))
-            self._began = self._turns(*began)
-        return [new @ old.T for new, old in zip(turns, self._began)]
+    def _turns_at(self, u: np.ndarray) -> list[np.ndarray]:
+        """Rotations of both sides as a whole at a displacement.  Collective."""
+        return self._turns(*(side.moved(u)[1] for side in (self._slave, self._master)))
 
-    def _way(self, placed: Placed) -> np.ndarray:
-        """By what slip past what is opposite is more than its chord, ``shape=(n, gdim - 1)``, local frame.  Collective the first time.
+    def _since(self, start: np.ndarray, turns: list[np.ndarray]) -> list[np.ndarray]:
+        """Rotations of both sides since a displacement.  Collective."""
+        known, began = self._began
+        if not self._comm.allreduce(
+            known is not None and np.array_equal(known, start), op=MPI.LAND
+        ):
+            began = self._turns_at(start)
+            self._began = start, began
+        return [new @ old.T for new, old in zip(turns, began)]
+
+    def _way(self, placed: Placed, start: np.ndarray) -> np.ndarray:
+        """By what slip past what is opposite is more than its chord, ``shape=(n, gdim - 1)``, local frame.  Collective.
 
         What was apart by ``d`` at the start has slipped by it as both sides see it: turned by the half of what each has, and as long as
         the arc on which the sides turn against each other.
         """
-        mean, axis, angle = _between(*self._since_start(placed.points.turns))
+        mean, axis, angle = _between(*self._since(start, placed.points.turns))
         apart = self.x - placed.home
-        apart = apart + turned_back(placed.frame, placed.points.motion(self._start))
+        apart = apart + turned_back(placed.frame, placed.points.motion(start))
         turned = apart @ mean.T
         along = (turned @ axis)[:, None] * axis
         arc = angle / 2 / np.sin(angle / 2) if angle > 0.0 else 1.0
         return times(placed.frame, apart - along - arc * (turned - along))[:, :-1]
 
-    def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
-        """See ``Placement``; rows are those where the step is likely to end, then those where it has ended."""
-        if u is start:
-            self.begin(start)
-            self.now = self.settled
-            return
-        self.now, self._renewed = self.placed(u), self._renewed + 1
-        alone = self.now.points.alone
-        if self._renewed > LEAVES:
-            self._left |= alone & ~self._used.alone
-        self._used = self.now.points
-        self.now = self.now._replace(way=frozen(self._way(self.now)))
-        left = alone & ~self.settled.points.alone
-        self._leaving = bool(self._comm.allreduce(left.any(), op=MPI.LOR))
+    def following(
+        self,
+        start: np.ndarray,
+        at: np.ndarray | None,
+        wanders: bool,
+        history: History,
+        before: Placed | None,
+    ) -> Placed:
+        """See ``Placement``; rows are those of the last step, or of where the step is likely to end, then of where it has ended."""
+        none = np.zeros(len(self.x), dtype=bool)
+        begun = history.frames._replace(start=start, left=none, renewed=-1, leaving=False)
+        if at is None:
+            return begun
+        before = begun if before is None else before
+        found, renewed, left = self.projected(at, before.left), before.renewed + 1, before.left
+        alone = found.points.alone
+        if renewed > LEAVES:
+            left = left | (alone & ~before.points.alone)
+        leaving = (alone & ~history.frames.points.alone).any()
+        leaving = bool(self._comm.allreduce(leaving, op=MPI.LOR))
+        way = frozen(self._way(found, start))
+        return found._replace(start=start, left=left, renewed=renewed, leaving=leaving, way=way)
 
-    def begin(self, start: np.ndarray) -> None:
-        """A step begins at a displacement, and its first rows are no renewal."""
-        (key, last), self._began = self._projected, None
-        known = last is not None and np.array_equal(key[: start.size], start)
-        if self._comm.allreduce(known, op=MPI.LAND):
-            self._began = last.points.turns
-        self._start, self._used, self._renewed = start, self.settled.points, -1
-        self._left[:], self._leaving = False, False
-
-    def carried(self, last: State) -> State:
+    def last_in(self, frames: Placed, history: History) -> State:
         """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
-        before, now = self.settled, self.now
-        if now.points is before.points:
+        before, last = history.frames, history.last
+        if frames.points is before.points:
             return last
-        moved = frozen(now.points.motion(self._start))
-        turned = frozen(carried(last.reaction, before.frame, now.frame))
+        moved = frozen(frames.points.motion(frames.start))
+        turned = frozen(carried(last.reaction, before.frame, frames.frame))
         # What comes in from the side does not land.
         gap = frozen(np.where(before.points.alone, 0.0, last.gap))
         return last._replace(displacement=moved, reaction=turned, gap=gap)
 
-    def slip_past_edge(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def slip_past_edge(
+        self, u: np.ndarray, frames: Placed, history: History
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """See ``Placement``: by the rows of the start."""
-        if not self._leaving:
+        if not frames.leaving:
             return None
-        before, alone = self.settled, self.now.points.alone
-        slip = before.points.motion(u - self._start)
+        before, alone = history.frames, frames.points.alone
+        slip = before.points.motion(u - frames.start)
         slip[:, -1] = 0.0
-        slip = times(self.now.frame, turned_back(before.frame, slip))[:, :-1]
-        self.now.points.without_held(slip)
+        slip = times(frames.frame, turned_back(before.frame, slip))[:, :-1]
+        frames.points.without_held(slip)
         return alone & ~before.points.alone, slip
 
-    def back_to(self, at: np.ndarray | None) -> None:
+    def saved_at(self, at: np.ndarray | None, before: Placed) -> Placed:
         """See ``Placement``: rows of a displacement that was saved."""
-        self.now = self.placed(np.zeros(self._owned[0]) if at is None else at)
+        return self.projected(np.zeros(self._owned[0]) if at is None else at)
 
-    def ended(self, state: State, u: np.ndarray) -> Ended:
+    def end_of(self, frames: Placed, state: State, u: np.ndarray) -> Ended:
         """What a state would be with the rows of its own displacement ``u``, owned degrees of freedom.  Collective."""
-        now, there = self.now, self.placed(u)
-        slip, used = (of.points.motion(u - self._start) for of in (there, now))
-        slip[:, :-1] += self._way(there)
-        used[:, :-1] += 0.0 if now.way is None else now.way
+        start, there = frames.start, self.projected(u, frames.left)
+        slip, used = (of.points.motion(u - start) for of in (there, frames))
+        slip[:, :-1] += self._way(there, start)
+        used[:, :-1] += 0.0 if frames.way is None else frames.way
         slip[:, -1] = used[:, -1] = 0.0
-        missed = times(now.frame, turned_back(there.frame, slip)) - used
-        reaction = carried(state.reaction, now.frame, there.frame)
+        missed = times(frames.frame, turned_back(there.frame, slip)) - used
+        reaction = carried(state.reaction, frames.frame, there.frame)
         reaction[there.points.alone] = 0.0
         forces = np.zeros(self._owned[0])
         there.points.add_forces(reaction, forces)
-        now.points.add_forces(-state.reaction, forces)
+        frames.points.add_forces(-state.reaction, forces)
         gap = there.flat + there.points.motion(u)[:, -1]
         return Ended(
             gap, missed[:, :-1], forces, there.home, there.frame, there.points.alone, there.points
         )
 
-    def settle(self, worn: np.ndarray | None = None) -> None:
-        """See ``Placement``.  Collective where the other side is worn."""
-        super().settle()
-        self._worn = None if worn is None else self._master.everywhere(worn[:, None])[:, 0]
+    def everywhere(self, worn: np.ndarray) -> np.ndarray:
+        """See ``Placement``.  Collective."""
+        return self._master.everywhere(worn[:, None])[:, 0]
 
-    def opened(self, points: MortarPoints) -> np.ndarray | None:
+    def opened(self, points: MortarPoints, worn: np.ndarray | None) -> np.ndarray | None:
         """See ``Placement``."""
-        return None if self._worn is None else points.m @ self._worn
+        return None if worn is None else points.m @ worn
 
-    def taken(self, volume: np.ndarray, area: np.ndarray) -> np.ndarray:
+    def taken(
+        self, volume: np.ndarray, area: np.ndarray, frames: Placed, history: History
+    ) -> np.ndarray:
         """See ``Placement``: node b loses ``sum_a m_ab V_a``, but no negative volume, the sum as it is.  Collective.
 
         Vertices of triangles of second order, which have no area, are worn as the nodes beside them.
@@ -250,7 +260,7 @@ class MortarPlacement(Placement):
             volume: ``V_a``.
             area: Of this rank's nodes of the other side, ``shape=(k,)``.
         """
-        now, before = self.now.points, self.settled.points  # of what has left in the step, before
+        now, before = frames.points, history.frames.points  # of what has left in the step, before
         mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
         volumes = self._comm.allreduce(mine)
         area = self._master.everywhere(area[:, None])[:, 0]
@@ -266,20 +276,18 @@ class MortarPlacement(Placement):
             np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
-    def gap_at(self, u: np.ndarray) -> tuple[np.ndarray, MortarPoints]:
+    def gap_at(self, u: np.ndarray, frames: Placed) -> tuple[np.ndarray, MortarPoints]:
         """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length, and these; what is opposite nothing is open.  Collective."""
-        there = self.placed(u)
+        there = self.projected(u, frames.left)
         gap = there.flat + there.points.motion(u)[:, -1]
         return np.where(there.points.alone, np.maximum(gap, self._apart), gap), there.points
 
-    @property
-    def depth(self) -> float:
+    def depth(self, frames: Placed) -> float:
         """See ``Placement``."""
-        lengths = np.append(-self.now.flat[~self.now.points.alone], 0.0)
+        lengths = np.append(-frames.flat[~frames.points.alone], 0.0)
         return float(lengths.max()) / self._master.smallest
 
-    @property
-    def changes(self) -> bool:
+    def changes(self, history: History) -> bool:
         """See ``Placement``."""
         return self.surface.sliding == "large"
 
@@ -288,32 +296,31 @@ class MortarPlacement(Placement):
         """See ``Placement``."""
         return self._master.nodes
 
-    @property
-    def covered(self) -> np.ndarray:
+    def covered(self, frames: Placed) -> np.ndarray:
         """See ``Placement``."""
-        return self.now.points.share
+        return frames.points.share
 
-    def slid(self, motion: np.ndarray) -> float:
+    def slid(self, motion: np.ndarray, history: History) -> float:
         """How far a motion of owned degrees of freedom slides nodes that are opposite something, over the smallest facet.  Collective."""
-        points = self.settled.points
+        points = history.frames.points
         along = points.motion(motion)[~points.alone, :-1]
         return float(np.linalg.norm(along, axis=1).max(initial=0.0)) / self._master.smallest
 
     def strayed(self, state: State) -> tuple[float, float]:
         """See ``Placement``: from the opposite point of the undeformed state, and half of the smallest facet."""
-        if self.changes:
+        if self.surface.sliding == "large":
             return 0.0, np.inf
         slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
         slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
         return float(slid), STRAYED * self._master.smallest
 
-    def sides(self, state: State) -> tuple[float, float] | None:
+    def sides(self, state: State, points: MortarPoints) -> tuple[float, float] | None:
         """How many times the facets of the slave are as large, and its body as stiff, as those of the other side.  Collective.
 
         Medians where nodes press; None while none does.  The stiffness of a node is that of the body times its size in three dimensions.
         """
         some = state.reaction[:, -1] > 0.0
-        points, dim = self.now.points, self.x.shape[1]
+        dim = self.x.shape[1]
         size = (self._slave.size[self._mine] / np.where(some, points.m @ self._master.size, 1.0))[
             some
         ]
@@ -322,35 +329,34 @@ class MortarPlacement(Placement):
         size, stiff = np.median(found, axis=1) if found.size else (None, None)
         return None if size is None else (float(size), float(stiff))
 
-    def clamped(self, fixed: np.ndarray) -> np.ndarray:
+    def clamped(self, fixed: np.ndarray, frames: Placed) -> np.ndarray:
         """See ``Placement``: on a plane of symmetry nodes of the other side are held as well.  Collective."""
         master, found = self._master, np.zeros(len(self.x), dtype=bool)
         held = master.everywhere(np.isin(master.own, fixed))
         size = CLEAR * self._extent
         for k, axis in enumerate(np.eye(self.x.shape[1])):
-            along = np.linalg.norm(self.now.frame[:, :-1] @ axis, axis=1) > FREE
+            along = np.linalg.norm(frames.frame[:, :-1] @ axis, axis=1) > FREE
             planes = np.unique(master.x[held[:, k], k])
             beside = np.abs(self.x[:, k, None] - planes).min(axis=1, initial=np.inf) > size
             found |= self._supported[:, k] & along & beside
         return found
 
-    def follows(self, wanders: bool) -> bool:
+    def follows(self, wanders: bool, history: History) -> bool:
         """See ``Placement``."""
-        return self.changes
+        return self.changes(history)
 
-    def meet(self, fixed: np.ndarray) -> bool:
-        """Take frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
+    def met(self, fixed: np.ndarray, frames: Placed) -> Placed:
+        """Frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
         held = np.isin(self._dofs, fixed)
-        if not self._comm.allreduce(bool((held != self.now.points.met).any())):
-            return False
+        if not self._comm.allreduce(bool((held != frames.points.met).any())):
+            return frames
         self._supported, self._projected = held, (None, None)
         self._planes = []
         for k, at in enumerate(self.x.T):
             where = np.concatenate(self._comm.allgather(at[held[:, k]]))
             if where.size and np.ptp(where) <= CLEAR * self._extent:
                 self._planes.append((k, where.mean()))
-        self.now = self.placed(self.now.at)
-        return True
+        return self.projected(frames.at)._replace(start=frames.start, renewed=frames.renewed)
 
 
 class Ended(NamedTuple):

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from dolfinx_contact.contact.interface import ContactPoints
+    from dolfinx_contact.contact.state import History
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
 CLEAR = 1e-9
@@ -49,11 +50,16 @@ class Placed(NamedTuple):
         np.ndarray | None
     )  # by what the way along the surface is more than its chord, (n, gdim - 1)
     ended: np.ndarray  # rotation of the surface at the end of the step
-    at: np.ndarray | None = None  # displacement of a deformable surface, owned degrees of freedom
+    # Of a deformable surface:
+    at: np.ndarray | None = None  # its displacement, owned degrees of freedom
+    start: np.ndarray | None = None  # that at the start of the step
+    left: np.ndarray | None = None  # nodes that do not come back in the step, (n,), booleans
+    renewed: int = -1  # how often rows were renewed in the step
+    leaving: bool = False  # whether nodes of any rank leave the other side in the step
 
 
 class Placement:
-    """Frames, gaps and motions of ``n`` nodes relative to a surface.
+    """What makes frames, gaps and motions of ``n`` nodes relative to a surface; nothing in it changes.
 
     Args:
         surface: The surface.
@@ -63,13 +69,8 @@ class Placement:
         extent: Largest coordinate of the mesh, on any rank.
         comm: MPI communicator.
 
-    Attributes:
-        now: ``Placed``, of the present step.
-        settled: That of the last step that converged.
+    Methods get frames, and the ``History`` with those of the last step that converged.
     """
-
-    now: Placed
-    settled: Placed
 
     def __init__(
         self,
@@ -87,46 +88,55 @@ class Placement:
             extent,
             CLEAR * extent,
         )
-        self._place(surface.relative(x) if surface.varies else x, x, None)
-        self.settle()
 
     # -- frames --------------------------------------------------------------------------------
 
-    def stand(self, wanders: bool) -> None:
-        """Take frames and gaps where the undeformed body stands.  Collective.
+    def standing(self, wanders: bool, before: Placed | None = None) -> Placed:
+        """Frames and gaps where the undeformed body stands.  Collective.
 
         Args:
             wanders: Whether it matters where on the surface nodes are.
+            before: Frames of before, whose rows stay where they are the same.
         """
-        self._place(self.surface.relative(self.x) if wanders else self.x, self.x, self.now)
+        home = self.surface.relative(self.x) if wanders else self.x
+        return self._placed(home, self.x, before)
 
-    def follow(self, u: np.ndarray, start: np.ndarray, wanders: bool, last: State) -> None:
-        """Take frames and gaps for the next step, where the surface is at present.  Collective.
+    def following(
+        self,
+        start: np.ndarray,
+        at: np.ndarray | None,
+        wanders: bool,
+        history: History,
+        before: Placed | None,
+    ) -> Placed:
+        """Frames and gaps for a step, where the surface is at present.  Collective.
 
         Directions held by supports are not known for the new frames.
 
         Args:
-            u: Displacement of owned degrees of freedom with which nodes stand there.
-            start: That at the start of the step.
-            wanders: As in ``stand``.
-            last: The last converged state, in the frames of its step.
+            start: Displacement of owned degrees of freedom at the start of the step.
+            at: The one with which nodes stand there; None is that at the start.
+            wanders: As in ``standing``.
+            history: Of the steps before.
+            before: Frames with which the same step was solved before; None is none.
         """
-        there = self.x + u[self._dofs]
-        home = self.surface.relative(there) if wanders else self.settled.home
-        self._place(home, there, self.now)
-        if self.changes:
-            here = home if wanders else self.surface.relative(there)
-            with raised_together(self._comm):
-                distance = self.surface.distance(here)
-                way = self.way(self.surface, here, self.now.own, distance, last)
-            self.now = self.now._replace(way=frozen(way))
+        there = self.x + (start if at is None else at)[self._dofs]
+        home = self.surface.relative(there) if wanders else history.frames.home
+        frames = self._placed(home, there, before or history.frames)
+        if not self.changes(history):
+            return frames
+        here = home if wanders else self.surface.relative(there)
+        with raised_together(self._comm):
+            distance = self.surface.distance(here)
+            way = self.way(self.surface, here, frames.own, distance, history)
+        return frames._replace(way=frozen(way))
 
-    def back_to(self, home: np.ndarray | None) -> None:
-        """Take frames and gaps at positions relative to the surface that were saved; None is where they were taken last."""
-        self._place(self.now.home if home is None else home, self.x, self.now)
+    def saved_at(self, home: np.ndarray | None, before: Placed) -> Placed:
+        """Frames and gaps at positions relative to the surface that were saved; None is where they were taken before.  Collective."""
+        return self._placed(before.home if home is None else home, self.x, before)
 
-    def _place(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> None:
-        """Take frames and gaps at positions relative to the surface, ``there`` in space, for lever arms.  Collective."""
+    def _placed(self, home: np.ndarray, there: np.ndarray, before: Placed | None) -> Placed:
+        """Frames and gaps at positions relative to the surface, ``there`` in space, for lever arms.  Collective."""
         surface, x = self.surface, self.x
         with raised_together(self._comm):  # the user's functions
             own = surface.frames(home)
@@ -144,15 +154,13 @@ class Placement:
             points = self._points_in(frames)
         home, own, frame, flat = map(frozen, (home, own, frame, flat))
         turned = surface.rotation
-        self.now = Placed(home, turned, own, frame, flat, points, arms, None, turned)
+        return Placed(home, turned, own, frame, flat, points, arms, None, turned)
 
-    @property
-    def covered(self) -> np.ndarray:
+    def covered(self, frames: Placed) -> np.ndarray:
         """Part of each node's area that has a surface opposite."""
         return np.ones(len(self.x))
 
-    @property
-    def depth(self) -> float:
+    def depth(self, frames: Placed) -> float:
         """By how many of its smallest facets nodes of this rank are on the wrong side of an undeformed deformable surface."""
         return 0.0
 
@@ -165,63 +173,65 @@ class Placement:
         """How far a node has slid beyond what its frame was taken for, and how far it may: lengths.  None on rigid surfaces."""
         return 0.0, np.inf
 
-    def twist(self, u: np.ndarray) -> float:
-        """Radians by which a deformable surface has turned against the body in a step that ends at a displacement.  Collective."""
+    def twist(self, u: np.ndarray, start: np.ndarray) -> float:
+        """Radians by which a deformable surface has turned against the body in a step from one displacement to another.  Collective."""
         return 0.0
 
-    def clamped(self, fixed: np.ndarray) -> np.ndarray:
+    def clamped(self, fixed: np.ndarray, frames: Placed) -> np.ndarray:
         """Nodes without friction because supports hold them along the surface, and not as on a plane of symmetry, ``shape=(n,)``; ``fixed`` degrees of freedom."""
         return np.zeros(len(self.x), dtype=bool)
 
-    def meet(self, fixed: np.ndarray) -> bool:
-        """Frames are the surface's, whatever supports hold: whether they are others now."""
-        return False
+    def met(self, fixed: np.ndarray, frames: Placed) -> Placed:
+        """Frames that know what supports hold; they are the surface's, whatever that is.  Collective."""
+        return frames
 
-    def settle(self, worn: np.ndarray | None = None) -> None:
-        """These are the frames of the last step that converged; ``worn`` depths of the nodes of a deformable surface, ``shape=(k,)``."""
-        self.settled = self.now
+    def everywhere(self, worn: np.ndarray) -> np.ndarray:
+        """Depths of all nodes of a deformable surface, from those of this rank's.  Collective."""
+        return worn
 
-    def opened(self, points: ContactPoints) -> np.ndarray | None:
+    def opened(self, points: ContactPoints, worn: np.ndarray | None) -> np.ndarray | None:
         """By what wear of a deformable surface has opened gaps, ``shape=(n,)``, length; None is nothing."""
         return None
 
-    def taken(self, volume: np.ndarray, area: np.ndarray) -> np.ndarray:
+    def taken(
+        self, volume: np.ndarray, area: np.ndarray, frames: Placed, history: History
+    ) -> np.ndarray:
         """Depths of the nodes of a deformable surface that have lost the volumes, ``shape=(n,)``, worn off opposite contact nodes."""
         raise NotImplementedError
 
-    def end(self, rotation: np.ndarray | None = None) -> None:
-        """The step ends, and its way, where the surface has turned to at present, or to another rotation."""
+    def ended(self, frames: Placed, rotation: np.ndarray | None = None) -> Placed:
+        """Frames of a step that ends, and its way, where the surface has turned to at present, or to another rotation."""
         surface = self.surface
         if rotation is None:
             turned = surface.rotation
             rotation = turned if surface.spin is None else composed(surface.spin, turned)
-        self.now = self.now._replace(ended=rotation, way=None)
+        return frames._replace(ended=rotation, way=None)
 
-    def restore(self, placed: Placed | None = None) -> None:
-        """Return to the frames of the last step that converged, or to others that were kept."""
-        self.now = self.settled if placed is None else placed
-
-    def follows(self, wanders: bool) -> bool:
+    def follows(self, wanders: bool, history: History) -> bool:
         """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
         surface = self.surface
-        turned = not np.array_equal(surface.rotation, self.now.rotation)
+        turned = not np.array_equal(surface.rotation, history.frames.rotation)
         return wanders or surface.spins or turned
 
     # -- the way of a step ---------------------------------------------------------------------
 
-    @property
-    def changes(self) -> bool:
+    def changes(self, history: History) -> bool:
         """Whether distances, normals or arms may change within a step; the same on all ranks."""
         surface = self.surface
-        turned = not np.array_equal(surface.rotation, self.settled.ended)
+        turned = not np.array_equal(surface.rotation, history.frames.ended)
         return surface.varies or surface.spins or turned
 
-    def turned_to(self, surface: Surface) -> np.ndarray:
+    def turned_to(self, surface: Surface, history: History) -> np.ndarray:
         """Rotation vector, in 2-D angle, by which a surface has turned since the last step, in its axes."""
-        return surface.own_axes(rotation_between(self.settled.ended, surface.rotation))
+        return surface.own_axes(rotation_between(history.frames.ended, surface.rotation))
 
     def way(
-        self, surface: Surface, y: np.ndarray, own: np.ndarray, distance: np.ndarray, last: State
+        self,
+        surface: Surface,
+        y: np.ndarray,
+        own: np.ndarray,
+        distance: np.ndarray,
+        history: History,
     ) -> np.ndarray:
         """By what the way along the surface since the last step is more than its chord, ``shape=(n, gdim - 1)``, local frame.
 
@@ -233,17 +243,17 @@ class Placement:
             surface: As it stands at the end.
             y: Positions at the end, relative to the surface, in its axes, ``shape=(n, gdim)``.
             own, distance: Frames and distances there.
-            last: The last converged state, in the frames of its step.
+            history: Of the steps before.
         """
-        began = self.started(last)
+        began = self.started(history)
         n1, n0 = own[..., -1, :], surface.frames(began)[..., -1, :]
-        chord = y - began - distance[:, None] * n1 + last.gap[:, None] * n0
-        way = _round(chord, n0, n1, self.turned_to(surface))
+        chord = y - began - distance[:, None] * n1 + history.last.gap[:, None] * n0
+        way = _round(chord, n0, n1, self.turned_to(surface, history))
         return times(own[..., :-1, :], way - (y - began))
 
-    def started(self, last: State) -> np.ndarray:
+    def started(self, history: History) -> np.ndarray:
         """Positions relative to the surface at the end of the last step, in its axes, ``shape=(n, gdim)``."""
-        return self.x + turned_back(self.settled.own, last.displacement)
+        return self.x + turned_back(history.frames.own, history.last.displacement)
 
     def ended_at(self, u: np.ndarray) -> tuple[Surface, np.ndarray]:
         """The surface with what it turns in the step, and positions in space for a displacement of owned degrees of freedom."""
@@ -253,64 +263,69 @@ class Placement:
             surface.end_step()
         return surface, self.x + u[self._dofs]
 
-    def arms(self, displacement: np.ndarray) -> np.ndarray:
+    def arms(self, displacement: np.ndarray, frames: Placed) -> np.ndarray:
         """Lever arms of the nodes about the surface's point, ``shape=(n, gdim)``, global frame, as the step has them.
 
         Args:
             displacement: Relative to the surface, local frame.
+            frames: Those of the step.
         """
-        surface, now = self.surface, self.now
-        if now.arms is not None:
-            return now.arms
-        moved = turned_back(now.frame, displacement) + self.of_surface()
+        surface = self.surface
+        if frames.arms is not None:
+            return frames.arms
+        moved = turned_back(frames.frame, displacement) + self.of_surface(frames)
         return self.x + moved - surface.point - surface.displacement
 
-    def carried(self, last: State) -> State:
-        """The last state in the frames of the next step."""
-        before, now = self.settled, self.now
+    def last_in(self, frames: Placed, history: History) -> State:
+        """The last state in the frames of another step.  Collective on deformable surfaces."""
+        before, last = history.frames, history.last
         if self.surface.curved:
             moved = turned_back(before.own, last.displacement)
-            last = last._replace(displacement=frozen(times(now.own, moved)))
-        if now.points is not before.points:
-            last = last._replace(reaction=frozen(carried(last.reaction, before.frame, now.frame)))
+            last = last._replace(displacement=frozen(times(frames.own, moved)))
+        if frames.points is not before.points:
+            turned = carried(last.reaction, before.frame, frames.frame)
+            last = last._replace(reaction=frozen(turned))
         return last
 
-    def turned(self, last: State, worn: np.ndarray) -> State:
+    def turned(self, frames: Placed, history: History, worn: np.ndarray) -> State:
         """The last state in frames that supports have turned, of the same nodes opposite to the same ones; ``worn`` depths, ``shape=(n,)``."""
-        before, now = self.settled, self.now
-        moved = times(now.own, turned_back(before.own, last.displacement))
-        reaction, gap = carried(last.reaction, before.frame, now.frame), now.flat + worn + moved[:, -1]  # fmt: skip
+        before, last = history.frames, history.last
+        moved = times(frames.own, turned_back(before.own, last.displacement))
+        reaction = carried(last.reaction, before.frame, frames.frame)
+        gap = frames.flat + worn + moved[:, -1]
         return last._replace(displacement=frozen(moved), reaction=frozen(reaction), gap=frozen(gap))
 
     # -- motion --------------------------------------------------------------------------------
 
-    def of_surface(self) -> np.ndarray:
+    def of_surface(self, frames: Placed) -> np.ndarray:
         """Motion of the surface at the nodes, global frame: ``shape=(gdim,)`` if it is the same for all."""
         motion, spin = self.surface.motion(self.x), self.surface.spin
-        return motion if spin is None else motion + cross(spin, self.now.arms)
+        return motion if spin is None else motion + cross(spin, frames.arms)
 
-    def surface_moved(self) -> np.ndarray:
+    def surface_moved(self, frames: Placed) -> np.ndarray:
         """The same in the local frame."""
-        motion, frame = self.of_surface(), self.now.frame
+        motion, frame = self.of_surface(frames), frames.frame
         return frame @ motion if motion.ndim == 1 else times(frame, motion)
 
-    def at_rest(self) -> State:
+    def at_rest(self, frames: Placed) -> State:
         """The state of the undeformed body without reactions."""
         n, gdim = self.x.shape
-        moved = np.broadcast_to(self.surface_moved(), (n, gdim))
-        gap, none = self.now.flat - moved[:, -1], np.zeros((n, gdim - 1))
+        moved = np.broadcast_to(self.surface_moved(frames), (n, gdim))
+        gap, none = frames.flat - moved[:, -1], np.zeros((n, gdim - 1))
         return State(-moved, np.zeros((n, gdim)), gap, none, np.zeros(n, dtype=np.uint8))
 
-    def slip_past_edge(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def slip_past_edge(
+        self, u: np.ndarray, frames: Placed, history: History
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Nodes that have left what was opposite in the step, ``shape=(n,)``, and their slip, ``shape=(n, gdim - 1)``; None where nothing can be left.  Collective."""
         return None
 
-    def turned_past(self, displacement: np.ndarray) -> np.ndarray:
+    def turned_past(self, displacement: np.ndarray, frames: Placed) -> np.ndarray:
         """Displacements relative to the surface with what a rotation found in the step is beyond the first order."""
         ended = copy(self.surface)
         ended.end_step()
-        moved = turned_back(self.now.frame, displacement) + self.of_surface()
-        return times(self.now.own, ended.moved_past(self.x, moved))
+        moved = turned_back(frames.frame, displacement) + self.of_surface(frames)
+        return times(frames.own, ended.moved_past(self.x, moved))
 
     def gap_rounding_of(self, largest: float) -> float:
         """Bound of the rounding in a gap beside lengths of that size; a rank may have the origin alone."""
@@ -323,13 +338,13 @@ class Placement:
 
     # -- checkpoints ---------------------------------------------------------------------------
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self, frames: Placed) -> dict[str, np.ndarray]:
         """What the frames were taken for, as arrays by name."""
         surface, saved = self.surface, {}
         if surface.varies:
-            saved["home"] = self.now.home
-        if self.now.rotation.any():
-            saved["rotation_of_plane"] = self.now.rotation
+            saved["home"] = frames.home
+        if frames.rotation.any():
+            saved["rotation_of_plane"] = frames.rotation
         if surface.spins:
             saved["found_rotation_of_plane"] = surface.rotation
         return saved

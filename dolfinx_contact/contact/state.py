@@ -5,13 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.support.attributes import frozen
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.law.friction import Friction
 
 
 class Status(IntEnum):
@@ -45,73 +49,56 @@ KEPT = "slip_kept"
 OPPOSITE = "opposite_wear_depth"  # at nodes of a deformable surface that wears
 
 
+@dataclass(frozen=True, eq=False)
 class History:
-    """States and sums of ``n`` nodes.  All arrays are read-only: the next step starts from them.
+    """All that a contact hands from one step to the next, ``n`` nodes.  All arrays are read-only.
 
     Attributes:
-        present: The present ``State``.
-        last: That at the end of the last step that converged.
+        last: ``State`` at the end of the last step that converged, in its frames.
+        frames: Those of that step, with the surface where it has ended.
         sums: Since the start, and slip that sticking nodes have kept, arrays by name.
-        settled_by: Friction of the last step that converged; None before the first.
+        friction: The law of that step; None before the first.
+        worn: Depths of all nodes of a deformable surface that wears, of all ranks; None where none does.
+        bare: Nodes opposite nothing where that step has ended, ``shape=(n,)``; None as the frames say.
+        landed_after: In that step, slip before nodes touched, ``shape=(n, gdim - 1)``; None is none.
+        doubtful_work: Of that step, on this rank: by how much slip that went straight on would have another frictional work.
+        unloads: Depths worn in that step, and the larger normal reaction of its ends, ``shape=(n,)`` each; None before the first.
     """
 
-    present: State
     last: State
+    frames: Placed
     sums: dict[str, np.ndarray]
-    settled_by: Friction | None = None
+    friction: Friction | None = None
+    worn: np.ndarray | None = None
+    bare: np.ndarray | None = None
+    landed_after: np.ndarray | None = None
+    doubtful_work: float = 0.0
+    unloads: tuple[np.ndarray, np.ndarray] | None = None
 
-    def begin(self, state: State) -> None:
-        """Forget everything: this is the state, and all sums are zero."""
-        self.settled_by = None
-        self.sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
-        self.sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
-        self.replace_last(*state[:-1])
-        self.restore()
+    @staticmethod
+    def of(state: State, frames: Placed) -> History:
+        """No history: a state, and all sums zero."""
+        sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
+        sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
+        return History(State(*map(frozen, state[:-1])), frames, sums)
 
-    def take(self, **arrays: np.ndarray) -> None:
-        """Replace parts of the present state."""
-        self.present = self.present._replace(
-            **{k: a if a is None else frozen(a) for k, a in arrays.items()}
-        )
+    @property
+    def slip_kept(self) -> np.ndarray:
+        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``."""
+        return self.sums[KEPT]
 
-    def replace_last(self, *arrays: np.ndarray) -> None:
-        """Let the last state have these arrays."""
-        self.last = State(*map(frozen, arrays))
+    def but(self, **parts: Any) -> History:
+        """The same with other parts."""
+        return replace(self, **parts)
 
-    def restore(self) -> None:
-        """Return to the last converged state."""
-        self.present = self.last
-
-    def settle(
-        self, by: Friction, work: np.ndarray, path: np.ndarray, depth: np.ndarray, kept: np.ndarray
-    ) -> None:
-        """Make the present state the last converged one, and add to the sums what the step did; ``kept`` is the new ``slip_kept``."""
-        added = dict(zip(SUMS, (work, path, depth)))
-        self.sums = self.sums | {name: frozen(self.sums[name] + added[name]) for name in SUMS}
-        self.sums[KEPT] = frozen(kept)
-        self.last, self.settled_by = self.present._replace(known=None), by
-
-    def wear_opposite(self, depth: np.ndarray) -> None:
-        """Add depths that the step wears off a deformable surface, ``shape=(k,)``."""
-        self.sums = self.sums | {OPPOSITE: frozen(self.sums.get(OPPOSITE, 0.0) + depth)}
-
-    def kept(self) -> tuple:
-        """Last converged state and sums, and the law that was slipped by, for ``go_back``."""
-        return self.last, self.sums, self.settled_by
-
-    def go_back(self, kept: tuple) -> None:
-        """Take back what ``kept`` returned."""
-        self.last, self.sums, self.settled_by = kept
-        self.restore()
-
-    def save(self) -> dict[str, np.ndarray]:
+    def saved(self) -> dict[str, np.ndarray]:
         """Last converged state and sums as arrays by name; this rank's nodes."""
         sums = {name: of for name, of in self.sums.items() if name != OPPOSITE}  # of other nodes
         return {name: getattr(self.last, name) for name in SAVED} | sums
 
     def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
         """Raise a ``ValueError`` if an array is missing or of another size."""
-        for name, array in self.save().items():
+        for name, array in self.saved().items():
             if name == KEPT and name not in saved:
                 continue  # older checkpoints do not have it
             if name not in saved or saved[name].shape != array.shape:
@@ -127,11 +114,11 @@ class History:
                 f"checkpoint: {wrong[0]} has values that no step leaves: take another file."
             )
 
-    def load(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take back what ``save`` returned, with the same nodes on this rank."""
-        self.replace_last(*(np.array(saved[name]) for name in SAVED))
-        none = np.zeros_like(self.last.slip_increment)
-        self.sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
+    def loaded(self, saved: Mapping[str, np.ndarray]) -> History:
+        """What ``saved`` returned, with the same nodes on this rank and the frames of this one."""
+        last = State(*(frozen(np.array(saved[name])) for name in SAVED))
+        none = np.zeros_like(last.slip_increment)
+        sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
         if OPPOSITE in saved:
-            self.sums[OPPOSITE] = frozen(np.array(saved[OPPOSITE]))
-        self.restore()
+            sums[OPPOSITE] = frozen(np.array(saved[OPPOSITE]))
+        return History(last, self.frames, sums)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.placement import Placement
-    from dolfinx_contact.contact.state import State
+    from dolfinx_contact.contact.state import History, State
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep, StepState
     from dolfinx_contact.surfaces.surface import Surface
@@ -73,8 +73,6 @@ class EndGeometry(Lagged):
         step.place_surfaces(state)
         for surface in surfaces_of(step.contacts):
             surface.end_step()
-        for contact in step.contacts:
-            contact.given.restore()
         return self._step_at(step, self._ends.after(state.x))
 
     def not_settled(self, change: Change) -> str:
@@ -154,11 +152,11 @@ def _missed(contact: ContactStep, state: State, u: np.ndarray) -> tuple[np.ndarr
     size, friction = np.linalg.norm(r, axis=1), np.linalg.norm(r[:, :-1], axis=1)
     turned = surface.turned(own)[..., -1, :] - frames.frame[..., -1, :]
     angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
-    way = placement.way(surface, y, own, distance, contact.given.settled)
+    way = placement.way(surface, y, own, distance, contact.given.history)
     missed = way - (0.0 if frames.way is None else frames.way)
     return (
         _pressed(contact, state, distance + contact.opening, contact.points.closed),
-        np.hypot(size * angle, friction * contact.given.axes_turned(y, own)),
+        np.hypot(size * angle, friction * contact.given.axes_turned(contact, y, own)),
         _dragged(contact, state, missed),
     )
 
@@ -167,12 +165,14 @@ def _missed_by_rows(
     contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """The same on a deformable surface; forces of its nodes, too, in the place of normals.  Collective."""
-    ended = contact.given.placement.ended(state, u)
+    ended = contact.given.placement.end_of(contact.frames, state, u)
     ended.forces[fixed] = 0.0
     friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
     came = contact.points.alone & ~ended.alone  # opposite something at the end alone
     with raised_together(contact.comm):  # the user's functions
-        turned = friction * contact.given.axes_turned(ended.home, ended.frame, ended.points)
+        turned = friction * contact.given.axes_turned(
+            contact, ended.home, ended.frame, ended.points
+        )
     turned[ended.alone] = 0.0
     opening = contact.given.opening_at(ended.points, contact.depth)
     closed = contact.points.closed & ~came
@@ -234,7 +234,7 @@ def too_long(state: StepState) -> str:
     """
     body, changing = state.step.body, _changing(state)
     for contact in [c for c, _ in changing if c.surface.deformable and body.nonlinear]:
-        turned = contact.given.placement.twist(state.x)
+        turned = contact.given.placement.twist(state.x, state.step.last)
         if turned > LONGEST:
             return (
                 f"the step is too long: two bodies turn against each other by {turned:.2g} radians in it, {LONGEST:g} is the most. Divide the step, "
@@ -276,7 +276,7 @@ def _turned_on_the_way(contact: ContactStep, state: State, u: np.ndarray) -> np.
     count, dim = there.shape
     if not count:
         return np.zeros((PLACES + 1, 0))
-    y = _way(surface, placement, contact.given.settled, surface.relative(there))
+    y = _way(surface, placement, contact.given.history, surface.relative(there))
     flat = y.reshape(-1, dim)
     normals, distance = _looked_at(surface, flat)
     normals, touches = normals.reshape(y.shape), distance.reshape(-1, count) < 0.0
@@ -288,7 +288,8 @@ def _turned_on_the_way(contact: ContactStep, state: State, u: np.ndarray) -> np.
     bends = np.linalg.norm(np.diff(normals, axis=0), axis=2)
     bends[np.isnan(bends)] = np.pi  # through a place without a normal, such as a centre
     if dim == 3:  # and about the normal
-        bends = np.hypot(bends, (normals[-1] @ placement.turned_to(surface)) / PLACES)
+        turned = placement.turned_to(surface, contact.given.history)
+        bends = np.hypot(bends, (normals[-1] @ turned) / PLACES)
     within = touched & opens
     return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
 
@@ -304,13 +305,13 @@ def _looked_at(surface: Surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         return tuple(map(np.concatenate, zip(*halves)))
 
 
-def _way(surface: Surface, placement: Placement, last: State, end: np.ndarray) -> np.ndarray:
+def _way(surface: Surface, placement: Placement, history: History, end: np.ndarray) -> np.ndarray:
     """Positions along the way, relative to the surface, in its axes, ``shape=(PLACES + 1, n, gdim)``.
 
     In space nodes go straight, and the surface moves and turns evenly.
     """
-    turned = placement.turned_to(surface)
-    start, end = placement.started(last) - surface.point, end - surface.point
+    turned = placement.turned_to(surface, history)
+    start, end = placement.started(history) - surface.point, end - surface.point
     parts = np.linspace(0.0, 1.0, PLACES + 1)
     if not turned.any():
         return surface.point + start + parts[:, None, None] * (end - start)

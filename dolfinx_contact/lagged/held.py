@@ -24,7 +24,7 @@ class HeldPlanes(Lagged):
 
     limit = 1
 
-    def __init__(self, step_again: Callable[[HeldSurfaces], LoadStep]):
+    def __init__(self, step_again: Callable[[LoadStep, HeldSurfaces], LoadStep]):
         self._step_again, self._slid, self._asked = step_again, None, False
 
     def change(self, found: SolverResult, goal: float) -> Change:
@@ -34,4 +34,4 @@ class HeldPlanes(Lagged):
         return Change(slid is None, state)
 
     def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
-        return self._step_again(self._slid)
+        return self._step_again(step, self._slid)

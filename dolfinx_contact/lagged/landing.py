@@ -126,13 +126,13 @@ def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> 
     """
     step = state.step
     opens = [contact.opened(one) for contact, one in zip(step.contacts, nodes)]
-    settled = [contact.given.settled.reaction for contact in step.contacts]
+    settled = [contact.given.history.last.reaction for contact in step.contacts]
     squares = sum(np.square(reaction[at]).sum() for reaction, at in zip(settled, opens))
     size = np.sqrt(step.total([squares])[0])
     if size == 0.0 or size <= tol * step.reaction_scale(state, tol):
         return nodes
     before = [np.where(at[:, None], reaction, 0.0) for reaction, at in zip(settled, opens)]
-    points = [contact.given.placement.settled.points for contact in step.contacts]
+    points = [contact.given.history.frames.points for contact in step.contacts]
     forces = np.zeros(step.body.size)
     for of, reaction in zip(points, before):
         of.add_forces(reaction, forces)
@@ -143,7 +143,7 @@ def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> 
         alone = before[k][:, -1] / contact.stiffness.normal
         pressed = np.maximum(alone if moved is None else of.motion(moved)[:, -1], 0.0)
         beside = (
-            contact.given.covered == 0.0
+            contact.given.placement.covered(contact.frames) == 0.0
         )  # left the other side along the surface: that is no gap
         way = pressed + np.where(beside, 0.0, np.maximum(one.gap, 0.0))
         part = np.divide(pressed, way, np.ones_like(way), where=way > 0.0)

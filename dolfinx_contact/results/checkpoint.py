@@ -100,7 +100,7 @@ def _arrays(
     for k, of_contact in enumerate(saved):
         mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
         if contacts[k].surface.deformable:
-            at = contacts[k].placement.now.at
+            at = contacts[k].history.frames.at
             mine[f"{k}_placed"] = body.displacements.rows(at)
             worn = np.zeros(len(mine[f"{k}_placed"]))
             worn[contacts[k].opposite] = contacts[k].opposite_wear_depth

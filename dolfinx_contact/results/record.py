@@ -208,7 +208,7 @@ def warn_of_corners(body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     may = [contact for contact in contacts if contact.may_turn]
     if not may:
         return False
-    sums = [[c.doubtful_work for c in may], [c.dissipation.sum() for c in may]]
+    sums = [[c.history.doubtful_work for c in may], [c.dissipation.sum() for c in may]]
     doubtful, work = body.total(np.sum(sums, axis=1))
     if doubtful <= DOUBTFUL * work:
         return False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.bodies.forms import times_volume
+from dolfinx_contact.bodies.loose import times_volume
 from dolfinx_contact.contact.nodal import times
 from dolfinx_contact.law.friction import principal_axes
 from dolfinx_contact.results.record import NO_SOLUTION, UNHELD

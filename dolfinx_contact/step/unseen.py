@@ -281,7 +281,7 @@ def _spread(body: ElasticBody, u: np.ndarray) -> float:
 
 def _check_side(contact: Contact) -> bool:
     """Log, as soon as nodes press, that the other side would be the better slave; whether they do.  Collective."""
-    found = contact.placement.sides(contact.present)
+    found = contact.placement.sides(contact.present, contact.points)
     if found is None:
         return False
     size, stiff = found
@@ -315,7 +315,7 @@ def _check_axes(contact: Contact, u: np.ndarray) -> bool:
 def _check_held(body: ElasticBody, contact: Contact) -> bool:
     """Warn of nodes that have no friction because supports hold them along a deformable surface; whether any node presses.  Collective."""
     force = contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
-    without = contact.placement.clamped(body.fixed)
+    without = contact.placement.clamped(body.fixed, contact.history.frames)
     all, lost, count = body.total([force.sum(), force[without].sum(), without.sum()])
     if lost > LOST * all:
         warnings.warn(

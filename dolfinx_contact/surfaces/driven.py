@@ -44,9 +44,7 @@ def approach(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> N
     """
     curved = [contact for contact in contacts if contact.surface.free and contact.surface.curved]
     for _ in range(APPROACHES if curved else 0):
-        for contact in curved:
-            contact.follow(u)
-        steps = [contact.in_step() for contact in curved]
+        steps = [contact.in_step(frames=contact.frames_of_step(u)) for contact in curved]
         surfaces = DrivenSurfaces(body, steps)
         none = np.zeros(surfaces.count)
         moved = surfaces.touched(surfaces.with_columns(steps), u, none, NEAR * body.extent)

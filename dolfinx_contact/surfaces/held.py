@@ -172,7 +172,7 @@ class HeldSurface:
                 [np.zeros(1)],
             )
             for k, rows, axes in self._holding:
-                contact = contacts[k].given.in_step()  # the plane has moved
+                contact = contacts[k].where_it_stands()
                 state = contact.at(u)
                 slips.append(contact.known_slip(state)[rows].ravel())
                 columns.append(axes.reshape(-1, len(self._motions)))

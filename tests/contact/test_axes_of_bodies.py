@@ -112,7 +112,7 @@ def placed(owner, u_of, cells):
     scene = Pair("directions", owner, cells)
     contact, u = scene.contact, fem.Function(scene.V)
     u.interpolate(u_of)
-    found = contact.placement.placed(u.x.array[: contact.points.size].copy())
+    found = contact.placement.projected(u.x.array[: contact.points.size].copy())
     given = directions(contact.x.T)
     lines = contact.placement.directions(given, owner, found.points).T
     there = ~found.points.alone
@@ -125,7 +125,7 @@ def test_lines_of_the_material(owner):
     G = np.array([[0.8, -0.6, 0.0], [0.65, 0.75, 0.0], [0.0, 0.0, 1.0]])
     lines, found, contact, there = placed(owner, lambda x: G @ x - x, ((2, 2, 1), (3, 3, 1)))
     assert largest(lines - G @ ALONG) <= 1e-12
-    turned = contact.axes_turned(found.home, found.frame, found.points)
+    turned = contact.axes_turned(contact.in_step(), found.home, found.frame, found.points)
     e = G @ ALONG
     off = np.abs(np.cross(ALONG, e / np.linalg.norm(e))[2])
     assert largest(turned[there] - off) <= 1e-12

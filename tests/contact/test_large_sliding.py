@@ -508,8 +508,8 @@ def test_gaps_of_bodies_apart():
 
 def test_steady_sliding_takes_one_solution(monkeypatch):
     """Once a block slides on as in the step before, the rows of where it is expected are those of where it ends: none is repeated."""
-    placed, follow = [], dc.Contact.follow
-    monkeypatch.setattr(dc.Contact, "follow", lambda *a: placed.append(0) or follow(*a))
+    placed, own = [], dc.Contact.frames_of_step
+    monkeypatch.setattr(dc.Contact, "frames_of_step", lambda *a: placed.append(0) or own(*a))
     scene = blocks("quadrilateral", 1, ((6, 2), (19, 2)), size=(1.0, 3.0), sliding="large", mu=0.3)
     counts = []
     for k in range(5):

@@ -100,10 +100,12 @@ def test_even_wear_is_even_on_the_other_side(cell, degree):
     scene.way.value[-1] = -0.001
     scene.problem.solve()
     contact, placement = scene.contact, scene.contact.placement
-    taken = placement.taken(0.25 * contact.whole_area, contact.opposite_area)
+    history = contact.history
+    worn = 0.25 * contact.whole_area
+    taken = placement.taken(worn, contact.opposite_area, history.frames, history)
     assert taken == pytest.approx(0.25, rel=1e-10)
-    placement.settle(taken)
-    assert placement.opened(contact.points) == pytest.approx(0.25, rel=1e-10)
+    worn = placement.everywhere(taken)
+    assert placement.opened(contact.points, worn) == pytest.approx(0.25, rel=1e-10)
 
 
 def test_a_worn_track_stays_with_its_body():

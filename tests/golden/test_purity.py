@@ -42,7 +42,7 @@ def arrays(value, seen=None):
 def held(step, state):
     """What a step, a state, the contacts, their surfaces and ``u`` consist of."""
     contacts = [contact.given for contact in step.contacts]
-    given = [(c.present, c.last, c.sums, c.friction.mu, c.friction.p, c.placement.now[:5]) for c in contacts]  # fmt: skip
+    given = [(c.present, c.history, c.friction.mu, c.friction.p) for c in contacts]
     surfaces = [contact.surface.stands for contact in contacts]
     own = {name: part for name, part in vars(step).items() if name != "body"}
     return arrays([own, state.nodes, state.required, state.forces, given, surfaces, step.body.u.x.array])  # fmt: skip

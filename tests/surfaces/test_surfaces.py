@@ -170,17 +170,16 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
     for _ in range(4):
         surface.displacement = 0.1 * rng.normal(size=d)
         surface.rotation = rng.normal(size=surface.rotation.size)
-        contact.follow(given(contact, where))
-        contact.take(**contact.at(given(contact, where))._asdict())
-        assert contact.gap == pytest.approx(distance(surface, x + where), abs=1e-13)
-        frames = np.broadcast_to(contact.frame, (len(x), d, d))
+        step = contact.in_step(frames=contact.frames_of_step(given(contact, where)))
+        gap = step.at(given(contact, where)).gap
+        assert gap == pytest.approx(distance(surface, x + where), abs=1e-13)
+        frames = np.broadcast_to(step.frames.frame, (len(x), d, d))
         assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(d), atol=1e-14)
         for j, shift in enumerate(1e-6 * np.eye(d)):
             slope = distance(surface, x + where + shift) - distance(surface, x + where - shift)
             assert slope / 2e-6 == pytest.approx(frames[:, -1, j], abs=1e-9)
         where = where + 0.1 * rng.normal(size=x.shape)
-        contact.take(**contact.at(given(contact, where))._asdict())
-        contact.advance()
+        contact.accept(step, step.at(given(contact, where)))
 
 
 @pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(7))])
@@ -197,12 +196,12 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
         surface.displacement = rng.normal(size=d)
         R = rotation(surface)
         moved = surface.point + surface.displacement + (x - surface.point) @ R.T - x
-        contact.follow(given(contact, moved))
-        contact.take(**contact.at(given(contact, moved))._asdict())
-        assert contact.gap == pytest.approx(gap, abs=1e-13)
-        assert np.abs(contact.slip_increment).max(initial=0) < 1e-13
-        assert contact.frame == pytest.approx(frame @ R.T, abs=1e-13)
-        contact.advance()
+        step = contact.in_step(frames=contact.frames_of_step(given(contact, moved)))
+        state = step.at(given(contact, moved))
+        assert state.gap == pytest.approx(gap, abs=1e-13)
+        assert np.abs(state.slip_increment).max(initial=0) < 1e-13
+        assert step.frames.frame == pytest.approx(frame @ R.T, abs=1e-13)
+        contact.accept(step, state)
 
 
 @pytest.mark.parametrize("k", range(3))
@@ -216,8 +215,9 @@ def test_a_sphere_that_turns_about_its_centre_leaves_last_reactions(k):
     before = np.einsum("ni,nij->nj", reaction, contact.frame)
     for _ in range(3):
         surface.rotation = rng.normal(size=3)
-        contact.follow(np.zeros(contact.points.size))
-        after = np.einsum("ni,nij->nj", contact.last.reaction, contact.frame)
+        frames = contact.frames_of_step(np.zeros(contact.points.size))
+        last = contact.in_step(frames=frames).last
+        after = np.einsum("ni,nij->nj", last.reaction, frames.frame)
         assert after == pytest.approx(before, abs=1e-13)
 
 
@@ -423,11 +423,10 @@ def test_waviness_is_a_gap():
     plane.displacement = (0.02, 0, 0)
     for slide in (0.0, 0.1, 0.3):
         scene.step(slide, 0, -0.01)
-    contact.follow(scene.u.x.array[: contact.points.size])
-    u = scene.u.x.array[contact.points.dofs]
-    contact.take(**contact.at(scene.u)._asdict())
-    there = contact.x + u - plane.displacement
-    assert contact.gap == pytest.approx(there[:, 2] - wave(there.T), abs=1e-14)
+    end = scene.u.x.array[: contact.points.size]
+    step = contact.in_step(frames=contact.frames_of_step(end))
+    there = contact.x + end[contact.points.dofs] - plane.displacement
+    assert step.at(end).gap == pytest.approx(there[:, 2] - wave(there.T), abs=1e-14)
     assert "height=..." in repr(plane)
 
 

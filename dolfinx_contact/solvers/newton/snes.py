@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from petsc4py import PETSc
 
-from dolfinx_contact.bodies.stiffness_checks import warn_of_unread
+from dolfinx_contact.bodies.input import warn_of_unread
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
 from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Friction that follows the pressure at the end of a step."""
+"""Friction that follows the state at the end of a step."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from mpi4py import MPI
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.state import State
+    from dolfinx_contact.law.friction import Friction
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
@@ -22,13 +25,17 @@ SLOWEST_RATE = 0.9
 ROUGH_TOL, PART_OF_CHANGE = 1e-3, 0.03
 
 
-class PressureFriction(Lagged):
-    """Laws that follow the pressure: the errors by which a step is judged are measured with those of the pressures found."""
+class LaggedFriction(Lagged):
+    """Laws that follow the state: the errors by which a step is judged are measured with those of the state found."""
 
     limit, first_tol = 50, ROUGH_TOL
 
     def __init__(self) -> None:
         self._last = np.inf
+
+    def friction(self, contact: ContactStep, state: State) -> Friction:
+        """The law of a contact in a state; ``contact.friction`` itself where it stays.  Collective."""
+        raise NotImplementedError
 
     def restarted(self, step: LoadStep) -> LoadStep:
         self._last = np.inf
@@ -36,7 +43,7 @@ class PressureFriction(Lagged):
 
     def change(self, found: SolverResult, goal: float) -> Change:
         state = found.state
-        state = with_laws_of(state).measure(state.x, c=state.c, before=state)
+        state = self._with_laws_of(state).measure(state.x, c=state.c, before=state)
         change = state.errors.change
         rate = min(change / self._last, SLOWEST_RATE) if 0.0 < self._last < np.inf else 0.5
         forward = change * rate / (1 - rate)
@@ -50,16 +57,21 @@ class PressureFriction(Lagged):
     def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
         return step.but(starts=(state.x,), motions=state.c)
 
+    def _with_laws_of(self, state: StepState) -> LoadStep:
+        """The step with the laws of a state.  Collective."""
+        step = state.step
+        laws = [self.friction(*both) for both in zip(step.contacts, state.nodes)]
+        changed = any(law is not k.friction for law, k in zip(laws, step.contacts))
+        if not step.body.comm.allreduce(changed, op=MPI.LOR):
+            return step
+        return step.with_laws([k.with_friction(law) for law, k in zip(laws, step.contacts)])
+
+
+class PressureFriction(LaggedFriction):
+    """Friction that follows the pressure."""
+
+    def friction(self, contact: ContactStep, state: State) -> Friction:
+        return contact.given.friction_under(contact, state)
+
     def said(self, solutions: int) -> str:
         return f"{solutions} times with friction that follows the pressure"
-
-
-def with_laws_of(state: StepState) -> LoadStep:
-    """The step of a state with the laws of its pressures.  Collective."""
-    step = state.step
-    both = zip(step.contacts, state.nodes)
-    contacts = [contact.given.under_pressures_of(contact, nodes) for contact, nodes in both]
-    changed = any(new is not old for new, old in zip(contacts, step.contacts))
-    if not step.body.comm.allreduce(changed, op=MPI.LOR):
-        return step
-    return step.with_laws(contacts)
