@@ -1,6 +1,6 @@
 """Predictor and corrector in a loop of your own.
 
-With plain DOLFINx and PETSc, for those who have a solver already and want contact in it: ``contact.update`` turns displacements
+With plain DOLFINx and PETSc, for those who have a solver already and want contact in it: ``dc.OwnLoop`` turns displacements
 into reactions, ``contact.assemble_reaction`` adds them to a residual. Without acceleration the loop
 takes well over a thousand iterations a step on a coarse punch, each one back-solve; its answer is
 checked against ``dc.ContactProblem``.  From the root of the clone: ``python -m demos.demo_own_loop``.
@@ -19,7 +19,7 @@ from demos.helpers import everywhere, say
 from studies.punch import Parameters, Punch
 
 
-class OwnLoop:
+class Loop:
     """Fixed point of [dSFMH07, Section 2] with one contact and a residual form F linear in u."""
 
     def __init__(self, F, u, contact: dc.Contact, bcs):
@@ -27,8 +27,8 @@ class OwnLoop:
         self.minus_F = fem.form(-F)
         A = fem.petsc.assemble_matrix(fem.form(ufl.derivative(F, u)), bcs=bcs)
         A.assemble()
-        contact.set_metric(A)  # rho, from the stiffness
-        contact.add_springs(A, contact.springs())
+        self.loop = dc.OwnLoop(contact, A)
+        self.loop.add_springs(A)
         self.ksp = PETSc.KSP().create(A.comm)
         self.ksp.setOperators(A)
         self.ksp.setType("preonly")
@@ -39,7 +39,7 @@ class OwnLoop:
     def solve(self, tol: float) -> int:
         """One load step; ends when corrections are below ``tol`` times the displacement."""
         for iteration in range(1, 100_000):
-            self.contact.update(self.u)  # gaps, slip increments, predictor, projection
+            self.loop.update(self.u)  # gaps, slip increments, predictor, projection
             b = fem.petsc.assemble_vector(self.minus_F)
             b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
             self.contact.assemble_reaction(b)
@@ -49,7 +49,7 @@ class OwnLoop:
             petsc_vec(self.u).axpy(1.0, self.correction)
             self.u.x.scatter_forward()
             if self.correction.norm() <= tol * petsc_vec(self.u).norm():
-                self.contact.advance()  # accepted: the next slip is measured from here
+                self.loop.advance()  # accepted: the next slip is measured from here
                 return iteration
         raise RuntimeError("The loop did not converge.")
 
@@ -59,7 +59,7 @@ def compare(case: str = "C", displacements=(0.05, 0.1, 0.07)) -> float:
     coarse = dict(divisions=2, layers=1)
     own = Punch(Parameters(case=case), **coarse)
     reference = Punch(Parameters(case=case, tol=1e-12), **coarse)
-    loop = OwnLoop(own.F, own.u, own.contact, own.bcs)
+    loop = Loop(own.F, own.u, own.contact, own.bcs)
     differences = []
     for displacement in displacements:
         own.move_top(displacement)

@@ -13,6 +13,7 @@ from dolfinx_contact.analysis.increments import advance as advance
 from dolfinx_contact.bodies.internal_variables import InternalVariables as InternalVariables
 from dolfinx_contact.contact.contact import Contact as Contact
 from dolfinx_contact.contact.deformable import DeformableSurface as DeformableSurface
+from dolfinx_contact.contact.own_loop import OwnLoop as OwnLoop
 from dolfinx_contact.contact.state import Status as Status
 from dolfinx_contact.law.friction import Friction as Friction
 from dolfinx_contact.law.wear import Wear as Wear

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from copy import copy
 from os import PathLike
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.contact_step import frames_of, nodal_stiffness, step_of
 from dolfinx_contact.petsc.linear_solver import raise_interrupt, stage
 from dolfinx_contact.problem_input import (
     NUMBERS,
@@ -317,17 +319,18 @@ class ContactProblem(Guarded):
         said = f"step failed: {type(failure).__name__}: {failure}"
         self._log(lambda: said)
         stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
-        if self.body.comm.allreduce(stopped, op=MPI.LOR):
-            self._unbind()  # it stopped in the midst of PETSc, which keeps vectors locked
-            self.body.forget()
+        known = isinstance(failure, NotConverged)
+        doubt = self.body.comm.allreduce(2 if stopped else 0 if known else 1, op=MPI.MAX)
+        if doubt > 0:
+            self._unbind()  # a solver may have been told of a part of the step
+        if doubt > 1:
+            self.body.forget()  # in the midst of PETSc, which keeps vectors locked
         self._states.stand_again(stood)
-        self._large, self._turned, looked_at = told
-        vars(self._unseen).update(looked_at)
+        self._large, self._turned, self._unseen = told
 
     def _told(self) -> tuple:
         """What users have been told of, and what is still to be looked at."""
-        looked_at = vars(self._unseen).items()
-        return self._large, self._turned, {k: v[:] if isinstance(v, list) else v for k, v in looked_at}  # fmt: skip
+        return self._large, self._turned, copy(self._unseen)
 
     def _step(self, start: float) -> tuple[Step, SolverResult]:
         """Record and displacement of a step that has converged, shown and given to internal variables."""
@@ -354,8 +357,8 @@ class ContactProblem(Guarded):
         """A converged state with what only its end tells: gaps of open nodes, slip of those that have left or opened.  Collective."""
         both, nodes = zip(state.step.contacts, state.nodes), []
         for contact, one in both:
-            one = contact.given.with_slip_past_edges(contact, one, state.x)
-            nodes.append(contact.given.with_own_gaps(contact, one, state.x))
+            one = contact.with_slip_past_edges(one, state.x)
+            nodes.append(contact.with_own_gaps(one, state.x))
         opens = any(c.opened(one).any() for c, one in zip(state.step.contacts, nodes))
         if self.body.comm.allreduce(opens, op=MPI.LOR):
             from dolfinx_contact.lagged.landing import slip_up_to_opening
@@ -389,10 +392,12 @@ class ContactProblem(Guarded):
         body, start = self.body, self._states.last
         assembled = body.refresh(start)
         driven = [contact for contact in self.contacts if contact.surface.free]
-        if any(contact.surface.curved for contact in driven):
+        curved = [contact for contact in driven if contact.surface.curved]
+        if curved:
             from dolfinx_contact.surfaces.driven import approach
 
-            approach(body, self.contacts, start if at is None else at)
+            u = start if at is None else at
+            approach(body, lambda: [step_of(c, frames=frames_of(c, u)) for c in curved], u)
         b, external = body.load()
         likely, known = self._predicted(b) if at is None else at, self._points
         old = [None] * len(self.contacts) if before is None else [k.frames for k in before.contacts]
@@ -421,12 +426,12 @@ class ContactProblem(Guarded):
         old, body = self._stamps, self.body
         if turned or assembled != old.stiffness:
             both = zip(self.contacts, frames)
-            self._stiffness = [c.nodal_stiffness(body.K, of.points) for c, of in both]
+            self._stiffness = [nodal_stiffness(c, body.K, of.points) for c, of in both]
             size = body.largest(np.abs(body.displacements.x))
             # Any unit that keeps squares within the range of double precision.
             self._unit = body.largest(body.cancelling(np.full(body.size, size))) or 1.0
         given = zip(self.contacts, self._stiffness, frames)
-        contacts = [contact.in_step(*of, begins=True) for contact, *of in given]
+        contacts = [step_of(contact, *of, begins=True) for contact, *of in given]
         laws = [contact.friction for contact in contacts]
         changed = any(one is not other for one, other in zip(laws, self._laws))
         changed = body.comm.allreduce(changed, op=MPI.LOR)
@@ -463,7 +468,9 @@ class ContactProblem(Guarded):
         None where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts.
         """
         body, last = self.body, self._states.last
-        sliding = [c for c in self.contacts if c.surface.deformable and c.changes and c.has_history]
+        sliding = [
+            c for c in self.contacts if c.surface.deformable and c.changes and not c.history.empty
+        ]
         if not sliding or body.nonlinear or body.loose is not None:
             return None
         known = self._states.snapshot().known  # without contact, under the last loads
@@ -486,7 +493,7 @@ class ContactProblem(Guarded):
 
     def _may_land(self) -> bool:
         """Whether nodes that are open may land with friction.  Collective."""
-        may = [contact.may_land(self._states.last) for contact in self.contacts]
+        may = [step_of(c).may_land(self._states.last) for c in self.contacts]
         return self.body.comm.allreduce(any(may), op=MPI.LOR)
 
     def bound(self, step: LoadStep | None = None) -> BoundSolver:
@@ -495,7 +502,7 @@ class ContactProblem(Guarded):
         if self._bound_to != self.solver:
             self._unbind()
             solver = self.solver
-            if self.body.nonlinear and not getattr(solver, "nonlinear", False):
+            if self.body.nonlinear and not solver.nonlinear:
                 from dolfinx_contact.solvers.newton.linearised import Linearised
 
                 solver = Linearised(solver)
@@ -529,12 +536,12 @@ class ContactProblem(Guarded):
     def _levels(self, step: LoadStep) -> list:
         """What the step takes for known, level by level, the fastest first; imported where there is any.  Collective."""
         contacts, levels = self.contacts, []
-        if any(contact.follows_pressure for contact in contacts):
+        if any(contact.laws.follow_pressure for contact in contacts):
             from dolfinx_contact.lagged.friction import PressureFriction
 
             levels.append([PressureFriction()])
         levels += [[quantity] for quantity in self.lagged]
-        if any(contact.wears_within for contact in contacts):
+        if any(contact.laws.wears_within for contact in contacts):
             from dolfinx_contact.lagged.wear import WearOfStep
 
             levels.append([WearOfStep(step, self.geometry_tol)])

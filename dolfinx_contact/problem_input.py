@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import warnings
+import weakref
 from collections.abc import Callable, Sequence
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -17,9 +18,11 @@ from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.input import check_meshes, derivative_of
 from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.contact_step import frames_of, meet_supports
 from dolfinx_contact.contact.interface import components
 from dolfinx_contact.petsc.linear_solver import CROWDED
 from dolfinx_contact.petsc.linear_solver import LARGE as TOO_LARGE
+from dolfinx_contact.solvers.base import Solver
 from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place, positive
 from dolfinx_contact.support.collective import agree, raised_together
@@ -101,7 +104,7 @@ def check_sides(contacts: Sequence[Contact]) -> None:
 
 def check_mesh(contact: Contact) -> None:
     """Raise a ``ValueError`` if the mesh is no longer where it was when the contact was made."""
-    if contact.mesh_has_moved():
+    if contact.measure.mesh_has_moved:
         raise ValueError(
             "the mesh was moved or scaled after the contact was made, whose gaps and areas no longer fit: move it "
             "first, then make Contact and ContactProblem. A plane moves by surface.displacement."
@@ -129,9 +132,10 @@ def checked_solver(solver: Any):
     """A solver, or the automatic choice for None."""
     if isinstance(solver, type):
         raise ValueError(f"solver {solver.__name__} is a class: write solver={solver.__name__}().")
-    if solver is not None and not callable(getattr(solver, "bind", None)):
+    if solver is not None and not isinstance(solver, Solver):
         raise ValueError(
-            f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...)."
+            f"solver {solver!r} is unknown: use None, dc.CondensedNewton(...) or dc.FixedPoint(...); one of your own has the base "
+            "class dolfinx_contact.extend.Solver."
         )
     if solver is not None:
         return solver
@@ -254,7 +258,7 @@ def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: f
         told: Number of nodes left out of which a warning has told before.
     """
     for contact in contacts:
-        contact.meet(body.fixed)
+        meet_supports(contact, body.fixed)
     hold_points(contacts, [contact.points for contact in contacts], body, level + 1, told)
 
 
@@ -355,7 +359,7 @@ def frames_of_step(
         before: Frames with which the same step was solved before.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
-    frames = [c.frames_of_step(start, at, of) for c, of in zip(contacts, before)]
+    frames = [frames_of(c, start, at, of) for c, of in zip(contacts, before)]
     changed = [k for k, (of, old) in enumerate(zip(frames, known)) if of.points is not old]
     if changed:
         told = body.comm.allreduce(sum(int(known[k].closed.sum()) for k in changed))
@@ -409,7 +413,9 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
     which = sorted((k, factor) for k, factor in found if k is not None)
     if not which:
         return
-    if not all(contact.weighted and not _turns_alone(contact) for contact in contacts):
+    if not all(
+        contact.measure.weight is not None and not _turns_alone(contact) for contact in contacts
+    ):
         name = ("first", "second", "third")[which[0][0]]
         warnings.warn(
             f"F is multiplied by the {name} coordinate, as with axial symmetry, and a contact has no weight, or 2 pi alone: its pressures, worn depths "
@@ -418,9 +424,9 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
             stacklevel=3,
         )
     for contact in contacts:
-        if not (contact.weighted and contact.axial):
+        if not contact.measure.axial:
             continue
-        x, weight = contact.displacements.x[:, 0], contact.density
+        x, weight = contact.displacements.x[:, 0], contact.measure.density
         far = int(
             np.argmax(x)
         )  # moduli may be among the factors of F, but hardly make exactly 2 pi
@@ -435,7 +441,8 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
 
 def _turns_alone(contact: Contact) -> bool:
     """Whether the weight of a contact is 2 pi, without the radius.  Collective."""
-    alone = not contact.axial and np.allclose(contact.density, 2 * np.pi, rtol=1e-9)
+    measure = contact.measure
+    alone = not measure.axial and np.allclose(measure.density, 2 * np.pi, rtol=1e-9)
     return all(contact.comm.allgather(bool(alone)))
 
 
@@ -463,7 +470,7 @@ def _radius(term: Any) -> tuple[int | None, float]:
 def check_axial(contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
     for contact in contacts:
-        if not contact.axial:
+        if not contact.measure.axial:
             continue
         surface = contact.surface
         turns = surface.spins or surface.rotation.any()
@@ -479,7 +486,7 @@ def check_axial(contacts: Sequence[Contact]) -> None:
 
 def take_contacts(problem: ContactProblem, contacts: Sequence[Contact]) -> None:
     """From now on a problem makes the history of its contacts; warns where another one has begun it."""
-    begun = [contact for contact in contacts if contact.has_history]
+    begun = [contact for contact in contacts if not contact.history.empty]
     if begun:
         warnings.warn(
             f"{len(begun)} of {len(contacts)} contacts have a history of steps in another ContactProblem, which ends here: "
@@ -487,14 +494,14 @@ def take_contacts(problem: ContactProblem, contacts: Sequence[Contact]) -> None:
             stacklevel=3,
         )
     for contact in contacts:
-        contact.belong_to(problem)
+        contact.owner = weakref.ref(problem)
 
 
 def check_alive(problem: ContactProblem, body: ElasticBody, contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` if a problem can no longer go on."""
     if body.closed:
         raise ValueError("this ContactProblem has been closed: make a new one.")
-    if not all(contact.belongs_to(problem) for contact in contacts):
+    if not all(contact.owner is not None and contact.owner() is problem for contact in contacts):
         raise ValueError(
             "a contact of this problem now belongs to a ContactProblem made later, which began its history anew: "
             "go on with that one, or make a Contact for each."
@@ -508,7 +515,7 @@ def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[Contact]) -> 
     """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
     check_axial(contacts)
     for contact in contacts:
-        contact.check()
+        contact.laws.check(contact)
     with raised_together(comm):
         for contact in contacts[:1]:  # of one mesh, all of them
             check_mesh(contact)

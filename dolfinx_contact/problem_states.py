@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dolfinx_contact.contact.contact_step import meet_supports
 from dolfinx_contact.solvers.base import KEPT
 from dolfinx_contact.support.collective import raised_together
 
@@ -147,7 +148,7 @@ class ProblemStates:
         for part, history in zip(self._parts, kept.histories):
             part.go_back(history)
         for contact in self._contacts:  # supports may be others now
-            contact.meet(self._body.fixed)
+            meet_supports(contact, self._body.fixed)
         self._put_surfaces(kept.surfaces)
         self._take(kept.past)
 

@@ -20,6 +20,7 @@ from benchmarks.peers import by_calculix, by_getfem, by_siconos
 from benchmarks.report.drawing import OURS, THEIRS, bars, column
 from benchmarks.tables import chosen
 from dolfinx_contact.compat import lagrange_degree
+from dolfinx_contact.extend import Solver
 from dolfinx_contact.solvers.base import SolverResult
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from mechanics import judge
@@ -126,7 +127,7 @@ def told(punch: Punch) -> dict:
     )  # fmt: skip
 
 
-class Given:
+class Given(Solver):
     """A solver that answers with what somebody else has found."""
 
     answer = None

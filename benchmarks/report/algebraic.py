@@ -16,6 +16,7 @@ import dolfinx_contact as dc
 from benchmarks.measurement import SOLVERS, Measurement, ladder, mesh_of
 from benchmarks.report.drawing import legend, panels, style
 from benchmarks.stress.scenes import PROGRAMMES, C
+from dolfinx_contact.extend import Solver
 from mechanics.scenes import build, problem_of
 from studies.punch import CASES, Parameters, Punch, programme
 
@@ -51,7 +52,7 @@ def opened(name: str, solver, tol: float, mesh: dict):
     return problem_of(built, solver, tol), built.move_top, PROGRAMMES[of]
 
 
-class Sampled:
+class Sampled(Solver):
     """A solver whose every residual is noted: seconds since its start, and the error."""
 
     def __init__(self, solver):

@@ -16,12 +16,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.laws import rows
+from dolfinx_contact.contact.state import KEPT, OPPOSITE
 from dolfinx_contact.results.record import NotConverged
+from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import a_problem, positive
 from dolfinx_contact.support.collective import agree, by_first_rank, raised_together
 from dolfinx_contact.support.progress import progress_bar
 
 if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
 
 # The shortest jump: the cycles of its fine run are simulated one by one.
@@ -202,7 +205,7 @@ class _Run:
     def present(self) -> _State:
         """The present state."""
         depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
-        sums = [contact.sums for contact in self.problem.contacts]
+        sums = [_sums(contact) for contact in self.problem.contacts]
         friction = [rows(c.friction, c.nodes.size)[:, :4] for c in self.problem.contacts]
         return _State(self.problem.snapshot(), np.concatenate(depths), sums, np.concatenate(friction))  # fmt: skip
 
@@ -289,7 +292,7 @@ class _Run:
         more = _extrapolation(length, 1, 2)
         for contact, *sums in zip(self.problem.contacts, self.end.sums, coarse.sums, fine.sums):
             start, one, two = sums
-            contact.take_sums({name: np.maximum(two[name] + more * (two[name] - one[name]), start.get(name, 0.0)) for name in two})  # fmt: skip
+            _take_sums(contact, {name: np.maximum(two[name] + more * (two[name] - one[name]), start.get(name, 0.0)) for name in two})  # fmt: skip
         self._count(0)
         try:
             self.problem.solve()
@@ -466,3 +469,15 @@ class _Folder:
                     with suppress(OSError):
                         (self._path / name).unlink()
         self._written = names
+
+
+def _sums(contact: Contact) -> dict[str, np.ndarray]:
+    """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
+    return {name: of for name, of in contact.history.sums.items() if name != KEPT}
+
+
+def _take_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
+    """Let the next step start from other ``sums``, none of them negative.  Collective where a deformable surface wears."""
+    sums = contact.history.sums | {name: frozen(of) for name, of in sums.items()}
+    worn = contact.placement.everywhere(sums[OPPOSITE]) if OPPOSITE in sums else None
+    contact.go_back(contact.history.but(sums=sums, worn=worn))

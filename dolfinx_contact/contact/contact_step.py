@@ -15,14 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.placement import Placed, carried
-from dolfinx_contact.contact.state import State, Status
+from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction
-from dolfinx_contact.support.checks import EPSILON
+from dolfinx_contact.support.attributes import frozen
+from dolfinx_contact.support.checks import EPSILON, place
+from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+    from petsc4py import PETSc
 
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.displacements import Displacements
@@ -270,6 +273,82 @@ class ContactStep:
         """Part of a state's slip that supports prescribe, ``shape=(n, gdim - 1)``."""
         return np.zeros_like(state.slip_increment) if state.known is None else state.known
 
+    # -- end -----------------------------------------------------------------------------------
+
+    def may_land(self, u: np.ndarray) -> bool:
+        """Whether nodes of this rank are open at the last displacement ``u``, and there is friction if they land.  Collective where points are not ``local``."""
+        opens = (self.last.reaction[:, -1] == 0.0) & ~self.points.closed
+        if self.points.local and not opens.any():
+            return False
+        landing = self.last.gap[opens] > self.gap_rounding(u)
+        return bool(landing.any()) and not self.friction.frictionless
+
+    def with_slip_past_edges(self, state: State, u: np.ndarray) -> State:
+        """A state in which nodes that have left what was opposite have slipped past its edge.  Collective between bodies."""
+        given = self.given
+        found = given.placement.slip_past_edge(u, self.frames, given.history)
+        if found is None:
+            return state
+        left, slip = found
+        return state._replace(slip_increment=np.where(left[:, None], slip, state.slip_increment))
+
+    def with_own_gaps(self, state: State, u: np.ndarray) -> State:
+        """A state whose open nodes on a deformable surface have the gaps of a displacement, not of the rows that a step used.  Collective."""
+        given = self.given
+        if not (self.surface.deformable and given.changes):
+            return state
+        gap, points = given.placement.gap_at(u, self.frames)
+        gap = gap + given.placement.opening(points, given.history, self.depth)
+        return state._replace(gap=np.where(state.reaction[:, -1] > 0.0, state.gap, gap))
+
+    def ended(self, state: State, u: np.ndarray | None = None) -> History:
+        """What the next step gets from this one, which ends in a state.  Collective on deformable surfaces.
+
+        Args:
+            state: The state.
+            u: Its displacement, owned degrees of freedom; needed between bodies.
+        """
+        given, placement, frames = self.given, self.given.placement, self.frames
+        if self.surface.spin is not None:
+            turned = placement.turned_past(state.displacement, frames)
+            state = state._replace(displacement=turned)
+        state = State(*map(frozen, state[:-1]))
+        sums, worn, doubtful, unloads = self._summed(state)
+        bare = None
+        if self.surface.deformable and u is not None and given.changes:
+            bare = placement.gap_at(u, frames)[1].alone
+        ended = placement.ended(frames)
+        return History(state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads)  # fmt: skip
+
+    def _summed(self, state: State) -> tuple:
+        """Sums, depths of the other side, doubtful work, and what unloads nodes, of ``History``.  Collective where the other side wears."""
+        given, friction = self.given, self.friction
+        history, repeats, covered = given.history, given.repeats, given.placement.covered
+        slip = history.slip_kept + state.slip_increment
+        sticks = (friction.mu.any(axis=-1) & (state.status == int(Status.STICK)))[:, None]
+        slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
+        pressed = np.maximum(self.last.reaction[:, -1], state.reaction[:, -1])
+        # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
+        touches = (pressed > 0.0) & (covered(self.frames) > 0.0)
+        work, turned = self.work(slip, state.reaction)
+        work, turned = repeats * work, repeats * turned
+        added = {
+            "dissipation": work.sum(axis=1),
+            "slip_path": repeats * (touches * np.linalg.norm(slip, axis=1)),
+        }
+        sums, worn, depth = history.sums | {KEPT: kept}, history.worn, np.zeros(len(pressed))
+        if given.wear is not None:
+            from dolfinx_contact.contact.worn import worn_by
+
+            depth, added["wear_depth"], more = worn_by(self, work)
+            if more is not None:
+                sums[OPPOSITE] = sums.get(OPPOSITE, 0.0) + more
+                worn = given.placement.everywhere(sums[OPPOSITE])
+        sums |= {name: sums[name] + part for name, part in added.items()}
+        turns = self.points.dim == 3 and (friction.mu.ndim > 1 or not friction.isotropic)
+        doubtful = float(np.abs(turned.sum(axis=1)).sum()) if turns else None
+        return {name: frozen(a) for name, a in sums.items()}, worn, doubtful, (depth, pressed)
+
     # -- results -------------------------------------------------------------------------------
 
     def bipotential_gap(self, state: State) -> np.ndarray:
@@ -340,3 +419,72 @@ class ContactStep:
         axes = np.column_stack((along, np.zeros(n)))
         axes = carried(axes, before.frame, self.frames.frame)[:, :2]
         return Friction(law.mu, np.where(law.mu > 0, law.p, 1.0), axes=axes)
+
+
+def step_of(
+    contact: Contact,
+    stiffness: NodalStiffness | None = None,
+    frames: Placed | None = None,
+    begins: bool = False,
+) -> ContactStep:
+    """The contact as a step has it that begins at its last state, where the surface stands.  Collective on deformable surfaces.
+
+    Args:
+        contact: The contact.
+        stiffness: Of the nodes.
+        frames: Of the step; None are those of the last one.
+        begins: Whether fields get their present values.  Collective.
+    """
+    placement, laws, history = contact.placement, contact.laws, contact.history
+    frames = history.frames if frames is None else frames
+    friction, begun = laws.at_start(contact, frames) if begins else (laws.friction, None)
+    same = friction is laws.friction
+    law = laws.kernel if same else friction.law(contact.displacements.dim)
+    last, moved = placement.last_in(frames, history), placement.surface_moved(frames)
+    given = frames, friction, law, last, moved, placement.opening(frames.points, history)
+    return ContactStep(contact, *given, placement.clear, stiffness, begun=begun)
+
+
+def frames_of(
+    contact: Contact, start: np.ndarray, at: np.ndarray | None = None, before: Placed | None = None
+) -> Placed:
+    """Frames and gaps of a step, where the surface is at present, see ``Placement.following``.  Collective."""
+    history, placement = contact.history, contact.placement
+    wanders = contact.surface.varies or contact.laws.textured
+    if not placement.follows(wanders, history):
+        return history.frames
+    return placement.following(start, at, wanders, history, before)
+
+
+def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
+    """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
+    history, placement = contact.history, contact.placement
+    frames = placement.met(fixed, history.frames)
+    if frames is not history.frames:
+        last = placement.turned(frames, history, contact.opening)
+        contact.go_back(history.but(last=last, frames=frames))
+
+
+def nodal_stiffness(
+    contact: Contact, K: PETSc.Mat, points: ContactPoints | None = None
+) -> NodalStiffness:
+    """Normal and tangential blocks of the stiffness at the contact nodes, local frame.  Collective.
+
+    Args:
+        contact: The contact.
+        K: Assembled PETSc stiffness matrix on ``V``.
+        points: Of a step; None are those of the last one.
+
+    Raises:
+        ValueError: on all ranks, if a node does not resist being moved along the normal.
+    """
+    stiffness = (contact.points if points is None else points).stiffness(K)
+    with raised_together(contact.comm):
+        if not (stiffness.normal > 0.0).all():
+            node = int(np.argmin(stiffness.normal))
+            raise ValueError(
+                f"the stiffness of the contact node at {place(contact.x, node)} along the normal is "
+                f"{stiffness.normal[node]:g}, which must be positive: check the sign of F (internal minus "
+                "external work) and the moduli."
+            )
+    return stiffness

@@ -5,14 +5,11 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from dolfinx import fem
 
 from dolfinx_contact import compat
-
-if TYPE_CHECKING:
-    from dolfinx import fem
 
 
 def displacement_part(V: fem.FunctionSpace):
@@ -100,6 +97,14 @@ class Displacements:
         vectors = np.zeros((self.size, flat.shape[1]))
         vectors[self._dofs[: self.count].ravel()] = flat
         return vectors
+
+    def everywhere(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Values at some owned nodes, ``shape=(n,)``, at all nodes that this rank knows, ghosts included, zero elsewhere.  Collective."""
+        function = fem.Function(self.V)
+        rows = function.x.array.reshape(-1, self.dim)
+        rows[nodes, 0] = values
+        function.x.scatter_forward()
+        return rows[:, 0].copy()
 
     @cached_property
     def are(self) -> np.ndarray:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from dolfinx_contact import compat
+from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import finite, number, place
 from dolfinx_contact.support.collective import raised_together
 
@@ -28,8 +30,76 @@ ZERO = 1e-10
 # By which Cauchy's inequality may miss equality.
 SQUARE = 1e-10
 
+# Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
+TILTED = 0.01
+
 # Largest force of a uniform pressure at a node that is left out, relative to the largest nodal force, without a warning.
 UNEVEN = 0.01
+
+
+class SurfaceMeasure:
+    """What integrals over a contact's facets are taken with, and the areas of its nodes, which are computed when they are asked for.
+
+    Args:
+        V: Space of the displacements alone.
+        weight: Factor of the surface measure, see ``Contact``; None is one.
+
+    Attributes:
+        weight: As ``weight_on`` returns it.
+    """
+
+    def __init__(self, V: fem.FunctionSpace, weight: Any) -> None:
+        self._V, self.weight, self._geometry = V, weight_on(V, weight), V.mesh.geometry.x.copy()
+        self._whole: np.ndarray | None = None
+        self._opposite: np.ndarray | None = None
+
+    @property
+    def mesh_has_moved(self) -> bool:
+        """Whether the mesh has been moved or scaled since, on this rank."""
+        return not np.array_equal(self._V.mesh.geometry.x, self._geometry)
+
+    @property
+    def density(self) -> np.ndarray | None:
+        """The weight at the nodes of ``V``, None where it is one.  Collective."""
+        return None if self.weight is None else at_nodes(self._V, self.weight)
+
+    @cached_property
+    def axial(self) -> bool:
+        """Whether the weight is in proportion to the first coordinate, in two dimensions: axial symmetry.  Collective."""
+        plain = self.weight is None or self._V.mesh.geometry.dim == 3
+        return not plain and grows_with_radius(self._V, self.weight)
+
+    def whole(self, contact: Contact) -> np.ndarray:
+        """See ``Contact.whole_area``."""
+        if self._whole is None:
+            surface, x = contact.surface, contact.x[:, : contact.points.dim]
+            turn = none = np.eye(x.shape[1])
+            if not (surface.curved or surface.deformable):
+                arms = contact.placement.arms(contact.displacement, contact.history.frames)
+                turn = turn_of_nodes(x, arms, contact.comm)
+            if np.abs(turn - none).max() <= TILTED:
+                turn = none
+            self._whole = frozen(facing_areas(contact, self.weight, turn))
+            self._seen_from = surface.rotation
+        return self._whole
+
+    def opposite(self, contact: Contact) -> np.ndarray:
+        """See ``Contact.opposite_area``."""
+        if self._opposite is None:
+            found = np.zeros(0)
+            if contact.surface.deformable:
+                every = areas(self._V, contact.surface.facets, weight=self.weight)
+                found = every[self._V.mesh.geometry.dim * contact.opposite]
+            self._opposite = frozen(found)
+        return self._opposite
+
+    def renew(self, contact: Contact) -> None:
+        """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""
+        if self._whole is None or contact.surface.curved or contact.surface.deformable:
+            return
+        if np.abs(contact.surface.rotation - self._seen_from).max() > TILTED:
+            self._whole = None
+            self.whole(contact)
 
 
 def weight_on(V: fem.FunctionSpace, weight: Any):

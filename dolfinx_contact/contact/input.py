@@ -17,6 +17,7 @@ from dolfinx_contact.surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
+    from mpi4py import MPI
     from numpy.typing import ArrayLike
 
 # Coefficients of friction between these are hardly meant.
@@ -118,6 +119,17 @@ def check_law(
             f"plane.axis is None, but {friction} depends on the direction: give {type(surface).__name__} the "
             "first principal friction direction, axis=(...)."
         )
+
+
+def check_some(nodes: np.ndarray, comm: MPI.Comm) -> None:
+    """Raise a ``ValueError`` on all ranks if none has nodes.  Collective."""
+    total = comm.allreduce(nodes.size)
+    with raised_together(comm):
+        if total == 0:
+            raise ValueError(
+                "facets is empty on all ranks: name the facets that may touch. If they come from tags, "
+                "facet_tags.values has the tags that the mesh has; if from a position, compare it with mesh.geometry.x."
+            )
 
 
 def check_opposite(V: Any, surface: Surface) -> None:

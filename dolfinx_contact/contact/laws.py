@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.contact.input import check_law, warn_of_percent
+from dolfinx_contact.contact.input import check_coefficients, check_law, check_wear, warn_of_percent
 from dolfinx_contact.contact.placement import times
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
-from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
@@ -63,6 +63,15 @@ class Laws:
         self._field = field
         self.take(contact, friction)
 
+    def assign_wear(self, contact: Contact, wear: Wear | None) -> None:
+        """Take another law of wear, or none.  Collective."""
+        check_wear(wear, contact.surface)
+        field = None
+        with raised_together(contact.comm):
+            if wear is not None:
+                field = _fields().wear_on_nodes(contact, wear)
+        self.wear, self.wear_field = wear, field
+
     def _evaluated(
         self,
         contact: Contact,
@@ -102,6 +111,11 @@ class Laws:
     def _axes_vary(self) -> bool:
         """Whether axes are a field."""
         return self._field is not None and is_field(self._field.given()["axes"])
+
+    @property
+    def wears_within(self) -> bool:
+        """Whether what a step wears opens gaps in the same step; the same on all ranks."""
+        return self.wear is not None and not self.wear.explicit
 
     @property
     def body_has_axes(self) -> bool:
@@ -171,6 +185,13 @@ class Laws:
             "wear": repr(self.wear),
         }
 
+    def check(self, contact: Contact) -> None:
+        """Raise a ``ValueError`` on all ranks if a law does not fit the nodes of one, or surface or laws differ.  Collective."""
+        if contact.comm.size > 1:
+            agree(contact.comm, **self.described(contact.surface), repeats=contact.repeats)
+        with raised_together(contact.comm):
+            check_coefficients(self.friction, contact.nodes.size)
+
     def save(self, contact: Contact) -> dict[str, np.ndarray]:
         """Coefficients, of a law that follows the state those without one, and axes of all nodes; surface and wear.
 
@@ -201,13 +222,14 @@ class Laws:
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
-    def load(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> Friction:
-        """Let fields have the values of the state that was saved; returns the law by which its last step was settled."""
+    def load(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> Friction | None:
+        """Let fields have the values of the state that was saved; returns the law by which its last step was settled, None before the first."""
         if self._field is not None:
             self.take(contact, self._evaluated(contact, self._field))
-        now = rows(self.friction, contact.nodes.size)
-        then = saved.get("law_of_last_step", now)  # older checkpoints do not have it
-        if np.array_equal(then, now):
+        if "law_of_last_step" not in saved:
+            return None
+        then = saved["law_of_last_step"]
+        if np.array_equal(then, rows(self.friction, contact.nodes.size)):
             return self.friction
         mu, p, axes = np.split(then, 3, axis=1)
         turned = (axes != (1.0, 0.0)).any()

@@ -54,7 +54,7 @@ class MortarPlacement(Placement):
 
     def __init__(self, contact: Contact, facets: np.ndarray, owned: tuple, extent: float):
         of, nodes, comm = contact.displacements, contact.nodes, contact.comm
-        self._slave = Skin(of, facets, comm, contact.density)
+        self._slave = Skin(of, facets, comm, contact.measure.density)
         self._master = Skin(of, contact.surface.facets, comm)
         numbers = _numbers(of.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)

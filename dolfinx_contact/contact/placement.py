@@ -189,6 +189,14 @@ class Placement:
         """Depths of all nodes of a deformable surface, from those of this rank's.  Collective."""
         return worn
 
+    def opening(
+        self, points: ContactPoints, history: History, depth: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Depth by which wear of both sides, and what a step wears, open gaps at nodes with some rows, ``shape=(n,)``, length."""
+        own, other = history.sums["wear_depth"], self.opened(points, history.worn)
+        worn = own if depth is None else own + depth
+        return worn if other is None else worn + other
+
     def opened(self, points: ContactPoints, worn: np.ndarray | None) -> np.ndarray | None:
         """By what wear of a deformable surface has opened gaps, ``shape=(n,)``, length; None is nothing."""
         return None

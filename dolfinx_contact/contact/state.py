@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -43,7 +42,6 @@ class State(NamedTuple):
     )
 
 
-SAVED = State._fields[:-1]  # of a state, in checkpoints
 SUMS = ("dissipation", "slip_path", "wear_depth")
 KEPT = "slip_kept"
 OPPOSITE = "opposite_wear_depth"  # at nodes of a deformable surface that wears
@@ -61,7 +59,7 @@ class History:
         worn: Depths of all nodes of a deformable surface that wears, of all ranks; None where none does.
         bare: Nodes opposite nothing where that step has ended, ``shape=(n,)``; None as the frames say.
         landed_after: In that step, slip before nodes touched, ``shape=(n, gdim - 1)``; None is none.
-        doubtful_work: Of that step, on this rank: by how much slip that went straight on would have another frictional work.
+        doubtful_work: Of that step, on this rank: by how much slip that went straight on would have another frictional work; None where it cannot turn.
         unloads: Depths worn in that step, and the larger normal reaction of its ends, ``shape=(n,)`` each; None before the first.
     """
 
@@ -72,7 +70,7 @@ class History:
     worn: np.ndarray | None = None
     bare: np.ndarray | None = None
     landed_after: np.ndarray | None = None
-    doubtful_work: float = 0.0
+    doubtful_work: float | None = None
     unloads: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
@@ -83,6 +81,11 @@ class History:
         return History(State(*map(frozen, state[:-1])), frames, sums)
 
     @property
+    def empty(self) -> bool:
+        """Whether no step was made; the same on all ranks."""
+        return self.friction is None
+
+    @property
     def slip_kept(self) -> np.ndarray:
         """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``."""
         return self.sums[KEPT]
@@ -90,35 +93,3 @@ class History:
     def but(self, **parts: Any) -> History:
         """The same with other parts."""
         return replace(self, **parts)
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Last converged state and sums as arrays by name; this rank's nodes."""
-        sums = {name: of for name, of in self.sums.items() if name != OPPOSITE}  # of other nodes
-        return {name: getattr(self.last, name) for name in SAVED} | sums
-
-    def check_saved(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Raise a ``ValueError`` if an array is missing or of another size."""
-        for name, array in self.saved().items():
-            if name == KEPT and name not in saved:
-                continue  # older checkpoints do not have it
-            if name not in saved or saved[name].shape != array.shape:
-                found = saved[name].shape if name in saved else "nothing"
-                raise ValueError(
-                    f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
-                    "for another mesh or another contact."
-                )
-        wrong = [name for name in SUMS if (saved[name] < 0).any()]
-        wrong += ["status"] * (not np.isin(saved["status"], list(map(int, Status))).all())
-        if wrong:
-            raise ValueError(
-                f"checkpoint: {wrong[0]} has values that no step leaves: take another file."
-            )
-
-    def loaded(self, saved: Mapping[str, np.ndarray]) -> History:
-        """What ``saved`` returned, with the same nodes on this rank and the frames of this one."""
-        last = State(*(frozen(np.array(saved[name])) for name in SAVED))
-        none = np.zeros_like(last.slip_increment)
-        sums = {n: frozen(np.array(saved.get(n, none))) for n in (*SUMS, KEPT)}
-        if OPPOSITE in saved:
-            sums[OPPOSITE] = frozen(np.array(saved[OPPOSITE]))
-        return History(last, self.frames, sums)

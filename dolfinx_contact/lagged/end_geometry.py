@@ -156,7 +156,7 @@ def _missed(contact: ContactStep, state: State, u: np.ndarray) -> tuple[np.ndarr
     missed = way - (0.0 if frames.way is None else frames.way)
     return (
         _pressed(contact, state, distance + contact.opening, contact.points.closed),
-        np.hypot(size * angle, friction * contact.given.axes_turned(contact, y, own)),
+        np.hypot(size * angle, friction * contact.given.laws.turned(contact, y, own)),
         _dragged(contact, state, missed),
     )
 
@@ -170,11 +170,12 @@ def _missed_by_rows(
     friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
     came = contact.points.alone & ~ended.alone  # opposite something at the end alone
     with raised_together(contact.comm):  # the user's functions
-        turned = friction * contact.given.axes_turned(
+        turned = friction * contact.given.laws.turned(
             contact, ended.home, ended.frame, ended.points
         )
     turned[ended.alone] = 0.0
-    opening = contact.given.opening_at(ended.points, contact.depth)
+    given = contact.given
+    opening = given.placement.opening(ended.points, given.history, contact.depth)
     closed = contact.points.closed & ~came
     return (
         _pressed(contact, state, ended.gap + opening, closed),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
+from dolfinx_contact.contact.fields import per_area
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
@@ -71,7 +72,9 @@ class PressureFriction(LaggedFriction):
     """Friction that follows the pressure."""
 
     def friction(self, contact: ContactStep, state: State) -> Friction:
-        return contact.given.friction_under(contact, state)
+        given = contact.given
+        pressure = per_area(state.reaction[:, -1], given.area)
+        return given.laws.under(given, pressure, contact.friction, contact.frames)
 
     def said(self, solutions: int) -> str:
         return f"{solutions} times with friction that follows the pressure"

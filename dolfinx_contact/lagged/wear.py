@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.contact.worn import wear_rates
 from dolfinx_contact.step.staggered import Change, Lagged
 from dolfinx_contact.support.anderson import Anderson
 from dolfinx_contact.support.attributes import frozen
@@ -100,7 +101,9 @@ class WearOfStep(Lagged):
         return f"{solutions} times with the depth that the step wears" if solutions > 1 else ""
 
     def _settled(self, state: StepState, scale: float) -> bool:
-        some = [k for k, contact in enumerate(state.step.contacts) if contact.given.wears_within]
+        some = [
+            k for k, contact in enumerate(state.step.contacts) if contact.given.laws.wears_within
+        ]
         contacts = [state.step.contacts[k] for k in some]
         nodes = [state.nodes[k] for k in some]
         kappa, depth = self._stiffness(contacts), self._depth
@@ -137,7 +140,7 @@ class WearOfStep(Lagged):
     ) -> tuple[np.ndarray, ...]:
         """Depth that the slip of a state wears under forces at the end, the part of it due to the start, and that per force at the end."""
         both = zip(contacts, nodes)
-        rates = [contact.given.wear_rates(contact, state, x) for contact, state in both]
+        rates = [wear_rates(contact, state, x) for contact, state in both]
         start, c = map(np.concatenate, zip(*rates))
         repeats = np.concatenate([np.full(k.nodes.size, k.given.repeats) for k in contacts])
         z, part = c * kappa, START * repeats
@@ -150,7 +153,7 @@ class WearOfStep(Lagged):
         """The step that wears by the depths."""
         contacts, first = list(step.contacts), 0
         for k, contact in enumerate(contacts):
-            if contact.given.wears_within:
+            if contact.given.laws.wears_within:
                 size = contact.nodes.size
                 contacts[k] = contact.but(depth=frozen(self._depth[first : first + size]))
                 first += size
@@ -159,7 +162,7 @@ class WearOfStep(Lagged):
 
 def _wearing(step: LoadStep) -> list[ContactStep]:
     """Contacts that wear within the step."""
-    return [contact for contact in step.contacts if contact.given.wears_within]
+    return [contact for contact in step.contacts if contact.given.laws.wears_within]
 
 
 def _shares(contacts: Sequence[Contact]) -> np.ndarray:

@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody, FreeState
+from dolfinx_contact.contact.saved import check_saved, load_saved, saved_of
 from dolfinx_contact.contact.state import OPPOSITE
 from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
@@ -96,7 +97,7 @@ def _arrays(
     if body.displacements.mixed:
         mine |= {f"mixed_{name}": _by_cells(body, of) for name, of in zip(("u", "before"), states)}
     with raised_together(body.comm):  # the user's functions
-        saved = [contact.save() for contact in contacts]
+        saved = [saved_of(contact) for contact in contacts]
     for k, of_contact in enumerate(saved):
         mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
         if contacts[k].surface.deformable:
@@ -185,9 +186,9 @@ def load(
         saved |= _of_body(mine, body, k, contacts[k])
     with raised_together(comm):
         for contact, saved in zip(contacts, own):
-            contact.check_saved(saved)
+            check_saved(contact, saved)
     for contact, saved in zip(contacts, own):
-        contact.load(saved)
+        load_saved(contact, saved)
     if variables:
         variables.load(mine)
     body.known = _free_state(mine, comm)

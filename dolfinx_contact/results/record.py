@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from dolfinx_contact.support.checks import ROUNDED, RoundingWarning
 
@@ -151,7 +152,7 @@ def record(
     for contact, nodes in zip(step.contacts, state.nodes):
         given = contact.given
         if given.displacements.degree > 1 and given.wear is None and not given.surface.deformable:
-            of_vertices = max(of_vertices, given.penetration_between(state.x))
+            of_vertices = max(of_vertices, _penetration_between(given, state.x))
         gap += contact.bipotential_gap(nodes).sum()
         penetration = max(penetration, -nodes.gap.min(initial=0.0))
     largest = step.body.largest
@@ -203,9 +204,17 @@ def warn_of_contact(step: Step, tol: float) -> None:
         )
 
 
+def _penetration_between(contact: Contact, u: np.ndarray) -> float:
+    """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
+    of = contact.displacements
+    here = of.rows(u)[contact.left_out]
+    gaps = contact.surface.distances(of.x[contact.left_out, : of.dim] + here)
+    return max(0.0, -contact.comm.allreduce(float(gaps.min(initial=0.0)), op=MPI.MIN))
+
+
 def warn_of_corners(body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Warn, in the name of who called ``solve``, of work that a turn of slip within the step leaves unknown; whether it did.  Collective."""
-    may = [contact for contact in contacts if contact.may_turn]
+    may = [contact for contact in contacts if contact.history.doubtful_work is not None]
     if not may:
         return False
     sums = [[c.history.doubtful_work for c in may], [c.dissipation.sum() for c in may]]

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.interface import components
-from dolfinx_contact.solvers.base import ASTRAY, SolverResult
+from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, Solver, SolverResult
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.base import BoundSolver, Solver
     from dolfinx_contact.step.load_step import LoadStep
 
 
@@ -61,7 +60,7 @@ def _sparse() -> Solver:
     return SparseNewton()
 
 
-class Automatic:
+class Automatic(Solver):
     """Newton's method on the condensed problem for small contacts, the fixed point for large ones.
 
     For nonlinear bodies, Newton's method on body and contact together; or, if linear systems are not factorised or planes are driven
@@ -75,7 +74,7 @@ class Automatic:
         return BoundAutomatic(step)
 
 
-class BoundAutomatic:
+class BoundAutomatic(BoundSolver):
     """The candidate solvers, each bound when it is first used."""
 
     def __init__(self, step: LoadStep):

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: MIT
 """The interface of solvers.
 
-A solver is an object with options and a method ``bind(step)``, which returns a ``BoundSolver``.  The bound solver solves load steps of
+A ``Solver`` is an object with options and a method ``bind(step)``, which returns a ``BoundSolver``.  The bound solver solves load steps of
 one problem.  It owns what it has set up, and is told by ``update(step)``, before each solution, what has become another one.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from enum import Enum
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,12 +62,13 @@ class SolverResult(NamedTuple):
     start: Any = None
 
 
-class BoundSolver(Protocol):
-    """A solver bound to the steps of a problem."""
+class BoundSolver(ABC):
+    """Base class of solvers that are bound to the steps of a problem."""
 
-    def update(self, step: LoadStep) -> None:
-        """Keep of what is set up that which is valid for a step, see ``step.stamps``.  Collective."""
+    def update(self, step: LoadStep) -> None:  # noqa: B027 (may be left out)
+        """Keep of what is set up that which is valid for a step, see ``step.stamps``; here nothing is.  Collective."""
 
+    @abstractmethod
     def solve(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
         """Search for a state whose errors are at most ``step.tol``; return the best one found.  Collective.
 
@@ -75,16 +77,20 @@ class BoundSolver(Protocol):
             starts: What solvers have returned as ``start`` in earlier steps, at most ``KEPT``, the last one last.
         """
 
-    def close(self) -> None:
-        """Free PETSc objects.  Collective."""
+    def close(self) -> None:  # noqa: B027
+        """Free PETSc objects; here there are none.  Collective."""
 
 
-class Solver(Protocol):
-    """Options of a solver; one object may serve several problems."""
+class Solver(ABC):
+    """Base class of solvers' options; one object may serve several problems.
 
-    # Optional; without it, a step of a nonlinear body is passed to the solver as a sequence of linear ones:
-    # nonlinear = True
-    #     Whether the solver handles steps whose residual is a nonlinear function of the displacement.
+    Attributes:
+        nonlinear: Whether the solver handles steps whose residual is a nonlinear function of the displacement; without it, it gets
+            a sequence of linear ones.
+    """
 
+    nonlinear: ClassVar[bool] = False
+
+    @abstractmethod
     def bind(self, step: LoadStep) -> BoundSolver:
         """The solver for steps like this one.  Collective."""

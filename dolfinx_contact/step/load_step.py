@@ -426,9 +426,9 @@ class LoadStep:
         """Why it has not converged, in words, as far as anything tells.  Collective."""
         said = "" if self.statics is None else self.statics.hidden(self)
         said = said or self._no_state(state) or self._hard()
-        if any(contact.given.follows_pressure for contact in self.contacts):
+        if any(contact.given.laws.follow_pressure for contact in self.contacts):
             said += "; friction follows the pressure, and was that of the last iterate"
-        if any(contact.given.wears_within for contact in self.contacts):
+        if any(contact.given.laws.wears_within for contact in self.contacts):
             said += (
                 "; the depth that the step wears is part of it, and was that of the last iterate"
             )

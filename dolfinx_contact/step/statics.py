@@ -83,7 +83,7 @@ class Statics:
         self.reason = NO_SOLUTION
         if not self._felt.all():
             free = body.loose.refusal(np.eye(m)[:, self._felt == 0.0])
-            if not any(contact.given.has_history for contact in contacts):
+            if not any(not contact.given.history.empty for contact in contacts):
                 raise ValueError(
                     f"{free} No contact node can hold it: fix it by Dirichlet "
                     "conditions, add a soft spring to F, or name the facets that may touch."

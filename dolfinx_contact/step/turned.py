@@ -16,6 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from dolfinx_contact.bodies.rigid_motion import rigid_modes
+from dolfinx_contact.contact.contact_step import step_of
 from dolfinx_contact.surfaces.surface import cross, rotation_less_one
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ class Turn:
             return None
         from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
-        return DrivenSurfaces(self._body, [contact.in_step() for contact in contacts])
+        return DrivenSurfaces(self._body, [step_of(contact) for contact in contacts])
 
     def _motions(self, u: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """By what the body grows, by what else than turning it moves, and rigid motions of its parts, ``shape=(owned dofs, 2 + m)``."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -120,6 +120,7 @@ class Unseen:
         self._straight = [contact for contact in self._facets if self._is_straight(contact)]
         self._between = [contact for contact in self._facets if contact.surface.varies]
         self._wavy = [c for c in self._between if getattr(c.surface, "height", None) is not None]
+        # lists are replaced, not changed: after a failed step the problem goes on with a shallow copy
         self._leaps = self._apart = True  # to be looked at
         self._approach = True  # whether the log has yet to say that no node touches
         self._far = contacts if len(contacts) > 1 else []  # not yet touched while others are
@@ -127,7 +128,11 @@ class Unseen:
         self._sided = self._near  # which side carries the unknowns is to be looked at
         self._held = self._near  # whether supports take friction from nodes
         self._turn, self._turns = None, bool(contacts)  # to be looked at
-        self._stay = [contact for contact in contacts if contact.body_has_axes]
+        self._stay = [
+            contact
+            for contact in contacts
+            if contact.laws.body_has_axes and not contact.surface.deformable
+        ]
 
     def check(
         self,
@@ -171,20 +176,26 @@ class Unseen:
 
     def _check_facets(self, u: np.ndarray, stiffness: dict[Contact, NodalStiffness]) -> None:
         """What nodes of facets do not see.  Collective."""
-        for looked_at, look in ((self._straight, self._off_straight), (self._between, _between)):
-            for contact in looked_at:
-                lengths = contact.reaction[:, -1] / stiffness[contact].normal
-                pushed = contact.comm.allreduce(float(lengths.max(initial=0.0)), op=MPI.MAX)
-                worn = None if contact.wear is None else contact.everywhere(contact.wear_depth)
-                with raised_together(contact.comm):
-                    missed = look(contact, self._facets[contact], u, pushed, worn)
-                missed = max(contact.comm.allgather(missed))
-                if missed.length > max(SHARE * pushed, CLEAR * missed.size):
-                    said = _of_straight if look == self._off_straight else _of_between
-                    looked_at.clear()
-                    self._apart = self._apart and pushed > 0.0  # nothing touches, and that is why
-                    warnings.warn(said(contact, missed, pushed), stacklevel=4)
-                    break
+        given = u, stiffness
+        self._straight = self._unsaid(self._straight, self._off_straight, _of_straight, *given)
+        self._between = self._unsaid(self._between, _between, _of_between, *given)
+
+    def _unsaid(self, contacts: list, look: Callable, said: Callable, u: np.ndarray, stiffness: dict) -> list:  # fmt: skip
+        """Of contacts whose facets a function looks at those of which nothing has been said.  Collective."""
+        for contact in contacts:
+            lengths = contact.reaction[:, -1] / stiffness[contact].normal
+            pushed = contact.comm.allreduce(float(lengths.max(initial=0.0)), op=MPI.MAX)
+            worn = None
+            if contact.wear is not None:
+                worn = contact.displacements.everywhere(contact.nodes, contact.wear_depth)
+            with raised_together(contact.comm):
+                missed = look(contact, self._facets[contact], u, pushed, worn)
+            missed = max(contact.comm.allgather(missed))
+            if missed.length > max(SHARE * pushed, CLEAR * missed.size):
+                self._apart = self._apart and pushed > 0.0  # nothing touches, and that is why
+                warnings.warn(said(contact, missed, pushed), stacklevel=5)
+                return []
+        return contacts
 
     def _check_wear(self, contacts: Sequence[Contact], stiffness: list[NodalStiffness]) -> None:
         """A step that wears off so much that the next one is unloaded by more than it carries.  Collective."""
@@ -192,11 +203,11 @@ class Unseen:
             if (
                 not self._leaps
                 or contact.wear is None
-                or contact.wears_within
+                or contact.laws.wears_within
                 or contact.repeats > 1.0
             ):
                 continue
-            times, depth, where = contact.worn_in_a_leap(of)
+            times, depth, where = _worn_in_a_leap(contact, of)
             if times > 1.0:
                 self._leaps = False
                 warnings.warn(
@@ -222,7 +233,7 @@ class Unseen:
                 return
             from dolfinx_contact.step.turned import Turn
 
-            self._turns = not any(contact.axial for contact in contacts)
+            self._turns = not any(contact.measure.axial for contact in contacts)
             self._turn = Turn(body)
         angles = self._turn.angles(u[: body.size])
         theta = float(np.linalg.norm(angles, axis=1).max())
@@ -514,3 +525,16 @@ def _said(where: ArrayLike) -> str:
 def _positions(contact: Contact, facets: Facets, u: np.ndarray) -> np.ndarray:
     """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
+
+
+def _worn_in_a_leap(contact: Contact, stiffness: NodalStiffness) -> tuple[float, float, list]:
+    """Of the node whose depth worn in the last step unloads it most: by how many times its reaction, depth and position.  Collective.
+
+    Wear is explicit: the depth opens the gap of the next step.  With the node's own stiffness ``kappa`` it takes ``kappa`` times
+    the depth from the reaction.
+    """
+    depth, carried = contact.history.unloads
+    taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)
+    k = int(taken.argmax()) if taken.size else None
+    mine = (0.0, 0.0, []) if k is None else (float(taken[k]), float(depth[k]), contact.x[k].tolist())  # fmt: skip
+    return max(contact.comm.allgather(mine))

@@ -21,7 +21,6 @@ from dolfinx_contact.surfaces.sliding import slides_away
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
-    from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.state import State
     from dolfinx_contact.law.maps import NodalMap
@@ -36,15 +35,16 @@ STIFFEST = 1e10
 APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
 
 
-def approach(body: ElasticBody, contacts: Sequence[Contact], u: np.ndarray) -> None:
+def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.ndarray) -> None:
     """Move curved surfaces that force drives and no node touches to the body, before a step.  Collective.
 
     Args:
+        body: The body.
+        in_step: Returns their contacts as a step has them that begins where the surfaces stand.
         u: Last displacement, owned degrees of freedom.
     """
-    curved = [contact for contact in contacts if contact.surface.free and contact.surface.curved]
-    for _ in range(APPROACHES if curved else 0):
-        steps = [contact.in_step(frames=contact.frames_of_step(u)) for contact in curved]
+    for _ in range(APPROACHES):
+        steps = in_step()
         surfaces = DrivenSurfaces(body, steps)
         none = np.zeros(surfaces.count)
         moved = surfaces.touched(surfaces.with_columns(steps), u, none, NEAR * body.extent)

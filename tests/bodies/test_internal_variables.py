@@ -12,6 +12,7 @@ from dolfinx import fem, mesh
 
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.compat import functionspace, interpolation_points
+from dolfinx_contact.extend import Solver
 
 pytestmark = pytest.mark.ranks
 E, NU = 200.0, 0.3
@@ -119,7 +120,7 @@ def test_plastic_block(solver):
     assert scene.contact.force()[2] == pytest.approx(0.0, abs=1e-9)
 
 
-class Curious:
+class Curious(Solver):
     """Newton's method, and a look at the undeformed body before it answers."""
 
     nonlinear = True

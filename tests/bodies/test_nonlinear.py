@@ -13,6 +13,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx import fem
 
 from dolfinx_contact.bodies.elastic import ElasticBody
+from dolfinx_contact.extend import Solver
 from dolfinx_contact.petsc.linear_solver import MULTIGRID
 from dolfinx_contact.solvers.base import SolverResult
 from mechanics.material import elasticity
@@ -247,7 +248,7 @@ def elasticity_of_rubber(u, v, modulus):
     return elasticity(u, v, modulus, 0.3)
 
 
-class Lazy:
+class Lazy(Solver):
     """A solver that hands back where the step starts, and takes that for the solution."""
 
     nonlinear = True

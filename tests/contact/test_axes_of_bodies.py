@@ -11,6 +11,7 @@ from dolfinx import fem
 from two_bodies import E, dc, largest, rubber, stress
 
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.contact_step import step_of
 from mechanics.two_blocks import pair
 
 pytestmark = pytest.mark.ranks
@@ -125,7 +126,7 @@ def test_lines_of_the_material(owner):
     G = np.array([[0.8, -0.6, 0.0], [0.65, 0.75, 0.0], [0.0, 0.0, 1.0]])
     lines, found, contact, there = placed(owner, lambda x: G @ x - x, ((2, 2, 1), (3, 3, 1)))
     assert largest(lines - G @ ALONG) <= 1e-12
-    turned = contact.axes_turned(contact.in_step(), found.home, found.frame, found.points)
+    turned = contact.laws.turned(step_of(contact), found.home, found.frame, found.points)
     e = G @ ALONG
     off = np.abs(np.cross(ALONG, e / np.linalg.norm(e))[2])
     assert largest(turned[there] - off) <= 1e-12

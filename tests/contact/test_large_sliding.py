@@ -10,6 +10,7 @@ import ufl
 from dolfinx import fem, mesh
 from two_bodies import COMM, E, blocks, dc, largest, rubber, stress, work
 
+from dolfinx_contact import problem_input
 from dolfinx_contact.compat import cell_points, functionspace
 from dolfinx_contact.results.meshes import SurfaceMesh
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
@@ -508,8 +509,8 @@ def test_gaps_of_bodies_apart():
 
 def test_steady_sliding_takes_one_solution(monkeypatch):
     """Once a block slides on as in the step before, the rows of where it is expected are those of where it ends: none is repeated."""
-    placed, own = [], dc.Contact.frames_of_step
-    monkeypatch.setattr(dc.Contact, "frames_of_step", lambda *a: placed.append(0) or own(*a))
+    placed, own = [], problem_input.frames_of
+    monkeypatch.setattr(problem_input, "frames_of", lambda *a: placed.append(0) or own(*a))
     scene = blocks("quadrilateral", 1, ((6, 2), (19, 2)), size=(1.0, 3.0), sliding="large", mu=0.3)
     counts = []
     for k in range(5):

@@ -310,5 +310,5 @@ def test_functions_sit_at_their_nodes():
 
 @pytest.mark.skipif(COMM.size > 2, reason="its thousands of small solves take minutes then")
 def test_own_loop():
-    """A loop written with ``contact.update`` and plain DOLFINx finds ContactProblem's reactions."""
+    """A loop written with ``dc.OwnLoop`` and plain DOLFINx finds ContactProblem's reactions."""
     assert demo_own_loop.compare("B", displacements=(0.1, 0.07)) < 1e-9

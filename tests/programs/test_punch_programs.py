@@ -68,11 +68,12 @@ class Counted:
 def test_the_fixed_point_asks_the_law_once_an_iteration(monkeypatch):
     """On the punch, case C, an iteration calls the kernel's laws 1.3 times, and a step eight times beside that, at most."""
     calls: list = []
-    monkeypatch.setattr(dc.Contact, "law", property(lambda self: Counted(self._laws.kernel, calls)))
+    law = dc.Friction.law
+    monkeypatch.setattr(dc.Friction, "law", lambda self, dim: Counted(law(self, dim), calls))
     punch = Punch(Parameters(case="C", tol=1e-8), solver=dc.FixedPoint())
     steps = []
     for displacement in programme(punch.parameters):
         punch.approach.value = -displacement
         steps.append(punch.problem.solve())
     iterations = sum(step.iterations for step in steps)
-    assert len(calls) <= 1.3 * iterations + 8 * len(steps), (len(calls), iterations)
+    assert iterations <= len(calls) <= 1.3 * iterations + 8 * len(steps), (len(calls), iterations)

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.extend import Solver
 from dolfinx_contact.solvers.base import SolverResult
 
 SOLVERS = {"default": lambda: None, "fixed point": dc.FixedPoint, "condensed": dc.CondensedNewton}
@@ -202,7 +203,7 @@ def test_unloaded_to_next_to_nothing(solver):
     assert np.linalg.norm(r - expected) <= 1e-6 * np.linalg.norm(expected)
 
 
-class Nothing:
+class Nothing(Solver):
     """A solver that moves nothing."""
 
     def bind(self, step):

@@ -11,6 +11,7 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
+from dolfinx_contact.extend import Solver
 
 pytestmark = pytest.mark.ranks
 COMM = scenes.COMM
@@ -83,7 +84,7 @@ def test_there_is_one_step_to_go_back_by():
         scene.problem.rewind()
 
 
-class Reluctant:
+class Reluctant(Solver):
     """A solver that refuses steps larger than ``most``; solves the others as usual."""
 
     def __init__(self, scene, most):

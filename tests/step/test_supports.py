@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.contact_step import nodal_stiffness, step_of
 from dolfinx_contact.step.errors import contact_defects
 
 pytestmark = pytest.mark.ranks
@@ -153,7 +154,7 @@ def test_errors_see_friction_that_is_missing():
     problem.solve()
     push.value = 0.1
     problem.solve()
-    step = contact.in_step(contact.nodal_stiffness(problem.body.K))
+    step = step_of(contact, nodal_stiffness(contact, problem.body.K))
     good, moved = contact.reaction, np.isclose(contact.x[:, 0], 0.0)
     assert np.abs(contact_defects(step, contact.present)[0]).max(initial=0.0) < 1e-9
     for factor in (0.0, -1.0):

@@ -9,6 +9,7 @@ from way_scenes import COMM, slab
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.contact_step import step_of
 
 # The plate stands for two springs: that it is strained by a fifth is no matter.
 pytestmark = [pytest.mark.ranks, pytest.mark.filterwarnings("ignore:the body is strained")]
@@ -118,5 +119,5 @@ def test_what_rounding_is_does_not_depend_on_whose_a_node_is():
     foot = mesh.locate_entities_boundary(square, 1, lambda x: np.isclose(x[1], 0))
     contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), MU)
     at_rest = np.zeros(2 * V.dofmap.index_map.size_local)
-    assert not any(COMM.allgather(contact.may_land(at_rest)))
-    assert len(set(COMM.allgather(contact.in_step().gap_rounding(at_rest)))) == 1
+    assert not any(COMM.allgather(step_of(contact).may_land(at_rest)))
+    assert len(set(COMM.allgather(step_of(contact).gap_rounding(at_rest)))) == 1

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
+from dolfinx_contact.contact.contact_step import frames_of, step_of
 from dolfinx_contact.surfaces.surface import CurvedSurface
 from dolfinx_contact.surfaces.ufl_distance import by_ufl
 from mechanics.material import elasticity
@@ -170,7 +171,7 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
     for _ in range(4):
         surface.displacement = 0.1 * rng.normal(size=d)
         surface.rotation = rng.normal(size=surface.rotation.size)
-        step = contact.in_step(frames=contact.frames_of_step(given(contact, where)))
+        step = step_of(contact, frames=frames_of(contact, given(contact, where)))
         gap = step.at(given(contact, where)).gap
         assert gap == pytest.approx(distance(surface, x + where), abs=1e-13)
         frames = np.broadcast_to(step.frames.frame, (len(x), d, d))
@@ -188,15 +189,15 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
     rng, surface = np.random.default_rng(k), surfaces(d)[k]
     contact = block(surface).contact
     x = contact.x[:, :d]
-    contact.take(**contact.at(given(contact, 0.0 * x))._asdict())
-    contact.advance()
+    contact.present = step_of(contact).at(given(contact, 0.0 * x))
+    contact.accept(step_of(contact), contact.present)
     gap, frame = contact.gap, contact.frame
     for _ in range(3):
         surface.rotation = rng.normal(size=surface.rotation.size)
         surface.displacement = rng.normal(size=d)
         R = rotation(surface)
         moved = surface.point + surface.displacement + (x - surface.point) @ R.T - x
-        step = contact.in_step(frames=contact.frames_of_step(given(contact, moved)))
+        step = step_of(contact, frames=frames_of(contact, given(contact, moved)))
         state = step.at(given(contact, moved))
         assert state.gap == pytest.approx(gap, abs=1e-13)
         assert np.abs(state.slip_increment).max(initial=0) < 1e-13
@@ -210,13 +211,13 @@ def test_a_sphere_that_turns_about_its_centre_leaves_last_reactions(k):
     rng, surface = np.random.default_rng(k), surfaces(3)[k]
     contact = block(surface, 0.3).contact
     reaction = rng.normal(size=(len(contact.x), 3))
-    contact.take(reaction=reaction)
-    contact.advance()
+    contact.present = contact.present._replace(reaction=reaction)
+    contact.accept(step_of(contact), contact.present)
     before = np.einsum("ni,nij->nj", reaction, contact.frame)
     for _ in range(3):
         surface.rotation = rng.normal(size=3)
-        frames = contact.frames_of_step(np.zeros(contact.points.size))
-        last = contact.in_step(frames=frames).last
+        frames = frames_of(contact, np.zeros(contact.points.size))
+        last = step_of(contact, frames=frames).last
         after = np.einsum("ni,nij->nj", last.reaction, frames.frame)
         assert after == pytest.approx(before, abs=1e-13)
 
@@ -424,7 +425,7 @@ def test_waviness_is_a_gap():
     for slide in (0.0, 0.1, 0.3):
         scene.step(slide, 0, -0.01)
     end = scene.u.x.array[: contact.points.size]
-    step = contact.in_step(frames=contact.frames_of_step(end))
+    step = step_of(contact, frames=frames_of(contact, end))
     there = contact.x + end[contact.points.dofs] - plane.displacement
     assert step.at(end).gap == pytest.approx(there[:, 2] - wave(there.T), abs=1e-14)
     assert "height=..." in repr(plane)

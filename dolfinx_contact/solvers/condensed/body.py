@@ -16,7 +16,7 @@ from scipy import sparse
 from dolfinx_contact.contact.interface import components
 from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.petsc.linear_solver import LinearSolver
-from dolfinx_contact.solvers.base import ASTRAY, SolverName, SolverResult
+from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Responses,
     Rows,
@@ -46,7 +46,7 @@ FEW, MANY = 3000, 6000
 RIGID = 1e-9
 
 
-class BoundCondensedNewton:
+class BoundCondensedNewton(BoundSolver):
     """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
 
     ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of

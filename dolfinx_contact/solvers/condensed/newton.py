@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction, principal_axes
+from dolfinx_contact.solvers.base import BoundSolver, Solver
 from dolfinx_contact.solvers.condensed.input import checked_problem, no_way_out
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.solvers.condensed.result import (
@@ -25,7 +26,6 @@ from dolfinx_contact.solvers.condensed.result import (
 from dolfinx_contact.support.checks import RoundingWarning, positive
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.base import BoundSolver
     from dolfinx_contact.step.load_step import LoadStep
 
 
@@ -44,7 +44,7 @@ NEARER, GAIN, NEAR_ROUNDING, SMALL = (1e-2, 1e-4), 0.1, 10, 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class CondensedNewton:
+class CondensedNewton(Solver):
     """Semismooth Newton method with a line search on the condensed problem ``w = q + W r``, and its fallbacks; see docs/solvers.md.
 
     Args:

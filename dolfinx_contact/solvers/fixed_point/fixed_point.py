@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.law.maps import BipotentialMap, NodalMap, ReturnMap
-from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.anderson import Anderson
@@ -44,7 +44,7 @@ ASTRAY = 1e3
 
 
 @dataclass(frozen=True)
-class FixedPoint:
+class FixedPoint(Solver):
     """Predictor and corrector in every iteration, without a condensed operator.
 
     An iteration takes the reactions required for equilibrium, ``K u - f`` at the contact nodes, and applies predictor and projection
@@ -103,7 +103,7 @@ def _slides(state: StepState, tried: bool = False) -> bool:
     return step.slides(state) if tried else step.pushed_off(state)
 
 
-class BoundFixedPoint:
+class BoundFixedPoint(BoundSolver):
     """The fixed point for the steps of a problem; keeps the preconditioner of the rho used last."""
 
     def __init__(self, options: FixedPoint, step: LoadStep):

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact.contact.interface import like, response, responses, structure
 from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
+from dolfinx_contact.solvers.base import BoundSolver
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
@@ -162,7 +163,7 @@ def next_change(state: StepState) -> float:
     return step.size(body.multiply(dx)) / acting if acting > 0.0 else np.inf
 
 
-class OnTangent:
+class OnTangent(BoundSolver):
     """A solver on the tangent of one body, bound; keeps its ordering."""
 
     def __init__(self, options: Any, step: LoadStep):

@@ -26,7 +26,7 @@ MOST, SHORTEST, BEFORE = 30, 2.0**-6, 3
 ROUGH, PART = 1e-3, 0.1
 
 
-class Linearised:
+class Linearised(Solver):
     """Newton's method: in every iteration a solver's contact step of the body linearised at the last iterate.
 
     Args:
@@ -43,7 +43,7 @@ class Linearised:
         return BoundLinearised(self.solver)
 
 
-class BoundLinearised:
+class BoundLinearised(BoundSolver):
     """The method for one body; the solver is bound anew to every tangent."""
 
     def __init__(self, solver: Solver):

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from dolfinx_contact.bodies.input import warn_of_unread
 from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
-from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
 from dolfinx_contact.solvers.search import Search
@@ -31,7 +31,7 @@ REASONS = {
 
 
 @dataclass(frozen=True, eq=False)  # a dictionary has no hash
-class SNES:
+class SNES(Solver):
     """PETSc's SNES on the equations of ``SparseNewton``, with its types, line searches, monitors and options.
 
     One Newton step brings supports to their positions and finds which nodes touch; SNES continues from there.  It ends when the

@@ -15,7 +15,7 @@ import numpy as np
 
 from dolfinx_contact.law.maps import NodalLaw, ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError
-from dolfinx_contact.solvers.base import BoundSolver, SolverName, SolverResult
+from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
 from dolfinx_contact.solvers.search import Search
 from dolfinx_contact.support.checks import positive
@@ -38,7 +38,7 @@ BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
 
 
 @dataclass(frozen=True)
-class SparseNewton:
+class SparseNewton(Solver):
     """Newton's method on body and contact together: ``-F(u) + r(F(u), u) = 0``, with the nodal map r of the law, see docs/nonlinear.md.
 
     An iteration assembles the tangent of the body, replaces its rows at contact nodes with the derivatives of predictor and

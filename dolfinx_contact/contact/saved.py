@@ -1,0 +1,79 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What a contact hands from one step to the next, and its laws, as arrays by name; those of this rank's nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dolfinx_contact.contact.laws import rows
+from dolfinx_contact.contact.state import KEPT, OPPOSITE, SUMS, History, State, Status
+from dolfinx_contact.support.attributes import frozen
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact import Contact
+
+FIELDS = State._fields[:-1]
+
+
+def saved_of(contact: Contact) -> dict[str, np.ndarray]:
+    """All that the next step starts from, and the laws."""
+    history, surface = contact.history, contact.surface
+    arrays = _of(history) | contact.laws.save(contact) | {"plane": surface.displacement}
+    if history.friction is not None:
+        arrays["law_of_last_step"] = rows(history.friction, contact.nodes.size)
+    if surface.placed.any():
+        arrays["placed_rotation_of_plane"] = surface.placed
+    return arrays | contact.placement.save(history.frames)
+
+
+def _of(history: History) -> dict[str, np.ndarray]:
+    sums = {name: of for name, of in history.sums.items() if name != OPPOSITE}  # of other nodes
+    return {name: getattr(history.last, name) for name in FIELDS} | sums
+
+
+def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
+    """Raise a ``ValueError`` if an array is missing or of another size, or another law or surface was saved."""
+    for name, array in _of(contact.history).items():
+        if name == KEPT and name not in arrays:
+            continue  # older checkpoints do not have it
+        if name not in arrays or arrays[name].shape != array.shape:
+            found = arrays[name].shape if name in arrays else "nothing"
+            raise ValueError(
+                f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
+                "for another mesh or another contact."
+            )
+    wrong = [name for name in SUMS if (arrays[name] < 0).any()]
+    wrong += ["status"] * (not np.isin(arrays["status"], list(map(int, Status))).all())
+    if wrong:
+        raise ValueError(
+            f"checkpoint: {wrong[0]} has values that no step leaves: take another file."
+        )
+    contact.laws.check_saved(contact, arrays)
+    if contact.surface.varies and "home" not in arrays:
+        raise ValueError(f"checkpoint: it was written with another plane: here {contact.surface}.")
+
+
+def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
+    """Take back what ``saved_of`` returned, with the same nodes on this rank; see ``check_saved``."""
+    surface, placement, frames = contact.surface, contact.placement, contact.history.frames
+    placed = frozen(np.array(arrays.get("placed_rotation_of_plane", surface.placed)))
+    surface.place(arrays.get("rotation_of_plane", np.zeros_like(surface.rotation)), placed)
+    if placement.follows(surface.varies or contact.laws.textured, contact.history):
+        at = arrays["home"] if surface.varies else arrays.get("at")
+        frames = placement.saved_at(at, frames)
+    surface.displacement = arrays["plane"]
+    found = arrays.get("found_rotation_of_plane", surface.rotation)
+    frames = placement.ended(frames, found)
+    last = State(*(frozen(np.array(arrays[name])) for name in FIELDS))
+    none, worn = np.zeros_like(last.slip_increment), None
+    sums = {name: frozen(np.array(arrays.get(name, none))) for name in (*SUMS, KEPT)}
+    if OPPOSITE in arrays:
+        sums[OPPOSITE] = frozen(np.array(arrays[OPPOSITE]))
+        worn = placement.everywhere(sums[OPPOSITE])
+    contact.go_back(History(last, frames, sums, worn=worn))
+    contact.go_back(contact.history.but(friction=contact.laws.load(contact, arrays)))
+    surface.turn_to(found)
