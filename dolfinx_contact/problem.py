@@ -48,6 +48,7 @@ from dolfinx_contact.results.record import (
     NotConverged,
     Step,
     converged,
+    counts_of,
     named,
     record,
     warn_of_contact,
@@ -491,11 +492,6 @@ class ContactProblem(Guarded):
             return None
         return x
 
-    def _may_land(self) -> bool:
-        """Whether nodes that are open may land with friction.  Collective."""
-        may = [step_of(c).may_land(self._states.last) for c in self.contacts]
-        return self.body.comm.allreduce(any(may), op=MPI.LOR)
-
     def bound(self, step: LoadStep | None = None) -> BoundSolver:
         """The solver, bound to steps like this one, see ``solvers/base.py``; None is the next step.  Collective."""
         step = self.load_step() if step is None else step
@@ -549,7 +545,7 @@ class ContactProblem(Guarded):
             from dolfinx_contact.lagged.held import HeldPlanes
 
             levels.append([HeldPlanes(self._with_planes)])
-        if any(contact.changes for contact in contacts) or self._may_land():
+        if any(contact.changes for contact in contacts) or step.may_land():
             from dolfinx_contact.lagged.end_geometry import EndGeometry
             from dolfinx_contact.lagged.landing import SlipBeforeLanding
 
@@ -705,5 +701,4 @@ class ContactProblem(Guarded):
 
     def counts(self) -> Counts:
         """Contact nodes open, sticking and slipping in the last converged state.  Collective."""
-        here = sum(np.bincount(contact.status, minlength=3) for contact in self.contacts)
-        return Counts(*(int(count) for count in self.body.total(here + np.zeros(3))))
+        return counts_of(self.body, self.contacts)

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
-from dolfinx_contact.contact.contact_step import ContactStep
+from dolfinx_contact.contact.contact_step import ContactStep, wanders
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import SurfaceMeasure, contact_nodes
 from dolfinx_contact.contact.input import (
@@ -214,9 +214,9 @@ class Contact(Guarded):
 
     def reset(self) -> None:
         """Clear the history: undeformed, unworn body, no reactions, the surface in its present position."""
-        frames, wanders = self.history.frames, self.surface.varies or self.laws.textured
-        if self.placement.follows(wanders, self.history):
-            frames = self.placement.standing(wanders, frames)
+        frames, moves = self.history.frames, wanders(self)
+        if self.placement.follows(moves, self.history):
+            frames = self.placement.standing(moves, frames)
         self._begin(frames)
 
     def _begin(self, frames: Placed) -> None:

@@ -445,15 +445,20 @@ def step_of(
     return ContactStep(contact, *given, placement.clear, stiffness, begun=begun)
 
 
+def wanders(contact: Contact) -> bool:
+    """Whether it matters where on the surface nodes are; the same on all ranks."""
+    return contact.surface.varies or contact.laws.textured
+
+
 def frames_of(
     contact: Contact, start: np.ndarray, at: np.ndarray | None = None, before: Placed | None = None
 ) -> Placed:
     """Frames and gaps of a step, where the surface is at present, see ``Placement.following``.  Collective."""
     history, placement = contact.history, contact.placement
-    wanders = contact.surface.varies or contact.laws.textured
-    if not placement.follows(wanders, history):
+    moves = wanders(contact)
+    if not placement.follows(moves, history):
         return history.frames
-    return placement.following(start, at, wanders, history, before)
+    return placement.following(start, at, moves, history, before)
 
 
 def meet_supports(contact: Contact, fixed: np.ndarray) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dolfinx_contact.contact.contact_step import wanders
 from dolfinx_contact.contact.laws import rows
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, SUMS, History, State, Status
 from dolfinx_contact.support.attributes import frozen
@@ -62,7 +63,7 @@ def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     surface, placement, frames = contact.surface, contact.placement, contact.history.frames
     placed = frozen(np.array(arrays.get("placed_rotation_of_plane", surface.placed)))
     surface.place(arrays.get("rotation_of_plane", np.zeros_like(surface.rotation)), placed)
-    if placement.follows(surface.varies or contact.laws.textured, contact.history):
+    if placement.follows(wanders(contact), contact.history):
         at = arrays["home"] if surface.varies else arrays.get("at")
         frames = placement.saved_at(at, frames)
     surface.displacement = arrays["plane"]

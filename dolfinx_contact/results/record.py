@@ -136,6 +136,12 @@ class NotConverged(RuntimeError):
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
+def counts_of(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
+    """Contact nodes open, sticking and slipping, of the states of some contacts, or these themselves.  Collective."""
+    here = sum(np.bincount(of.status, minlength=3) for of in nodes)
+    return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
+
+
 def record(
     state: StepState, found: SolverResult, seconds: float, geometry_error: float = 0.0
 ) -> Step:

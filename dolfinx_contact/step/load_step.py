@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.results.record import WORSE, Counts
+from dolfinx_contact.results.record import WORSE, Counts, counts_of
 from dolfinx_contact.step.errors import Errors, as_errors, contact_defects, contact_rounding
 from dolfinx_contact.support.checks import EPSILON, ROUNDED
 from dolfinx_contact.support.collective import raised_together
@@ -129,6 +129,11 @@ class LoadStep:
     def may_slide(self) -> bool:
         """Whether a plane, or the body, is held by contact along some direction."""
         return self.surfaces is not None or self.statics is not None
+
+    def may_land(self) -> bool:
+        """Whether nodes that are open may land with friction.  Collective."""
+        may = [contact.may_land(self.last) for contact in self.contacts]
+        return bool(self.body.comm.allreduce(any(may)))
 
     @cached_property
     def was_pressed(self) -> bool:
@@ -456,8 +461,7 @@ class LoadStep:
 
     def counts(self, state: StepState) -> Counts:
         """Contact nodes open, sticking and slipping.  Collective."""
-        here = sum(np.bincount(nodes.status, minlength=3) for nodes in state.nodes)
-        return Counts(*(int(count) for count in self.total(here + np.zeros(3))))
+        return counts_of(self.body, state.nodes)
 
     def tell(self, state: StepState) -> None:
         """Tell the user of a state of the body, if that is wanted.  Collective."""
@@ -586,12 +590,13 @@ class StepState:
 
     def of(self, step: LoadStep) -> StepState:
         """The same state in a step that differs from its own by less than counts; errors stay."""
-        state = replace(self, step=step)
-        vars(state)["errors"] = self.errors
-        return state
+        return self._with_its_errors(step=step)
 
     def with_nodes(self, nodes: Sequence[State]) -> StepState:
         """The same displacement with other states of the nodes; errors stay those of this state."""
-        state = replace(self, nodes=tuple(nodes))
+        return self._with_its_errors(nodes=tuple(nodes))
+
+    def _with_its_errors(self, **parts: Any) -> StepState:
+        state = replace(self, **parts)
         vars(state)["errors"] = self.errors
         return state
