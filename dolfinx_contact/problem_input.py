@@ -228,7 +228,7 @@ def checked_undetermined(choice: Any) -> str:
 
 
 def checked_internal(internal: Any):
-    """``InternalVariables`` with a history of this problem's own, None where there are none."""
+    """``InternalVariables``, None where there are none."""
     if internal is None:
         return None
     from dolfinx_contact.bodies.internal_variables import InternalVariables
@@ -237,7 +237,7 @@ def checked_internal(internal: Any):
         raise ValueError(
             f"internal must be dc.InternalVariables(state, ...) or None, got {internal!r}."
         )
-    return internal.begun()
+    return internal
 
 
 def checked_options(name: str, options: Any) -> dict | None:

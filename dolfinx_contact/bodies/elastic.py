@@ -130,7 +130,7 @@ class ElasticBody(OverRanks):
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
         self.closed = self._said = False
-        self.known: FreeState | None = None  # the last one
+        self.last_free_state: FreeState | None = None
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
         self.parts = rigid_motion.connected_parts(self.displacements)
 
@@ -353,17 +353,17 @@ class ElasticBody(OverRanks):
             b: As ``load`` returns it.
             rough: Three digits are enough, see ``linear_solver.ROUGH``; only where they are cheaper.
         """
-        known = self.known
+        known = self.last_free_state
         if known is not None and known.digest.tobytes() != self._digest:
             known = None
         start = None if known is None else known.scaled(b, self.fixed, self.comm)
-        if start is not None and (rough or self.known.exact):
+        if start is not None and (rough or known.exact):
             return start
         x = self.solve(b, rough, start)
         x[self.fixed] = b[self.fixed]
         exact = self._elastic.exact or not rough
         digest = np.frombuffer(self._digest, dtype=np.uint8)
-        self.known = FreeState(digest, b.copy(), x.copy(), exact)
+        self.last_free_state = FreeState(digest, b.copy(), x.copy(), exact)
         return x
 
     def forget(self) -> None:

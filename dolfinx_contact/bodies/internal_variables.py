@@ -56,44 +56,22 @@ class InternalVariables(Guarded):
             if not (call is None or callable(call)):
                 raise ValueError(f"{name} must be a function of u, got {call!r}.")
         self.state, self.before_residual, self.after_step = list(state), before_residual, after_step
-        self._first = self._last = self._values()
         self._made = True
 
-    def begun(self) -> InternalVariables:
-        """The same with a history of its own, which begins with the present values."""
-        before, after = self.before_residual, self.after_step
-        return InternalVariables(self.state, before_residual=before, after_step=after)
+    def values(self) -> tuple[np.ndarray, ...]:
+        """What they are now, for ``put``."""
+        return tuple(function.x.array.copy() for function in self.state)
 
-    def _values(self) -> list[np.ndarray]:
-        return [function.x.array.copy() for function in self.state]
-
-    def reset(self) -> None:
-        """Back to what they were when the problem was made."""
-        self.go_back(self._first)
-
-    def go_back(self, values: list[np.ndarray]) -> None:
-        """Back to what ``history`` returned."""
-        self._last = values
-        self.restore()
-
-    def restore(self) -> None:
-        """Back to the last converged state."""
-        for function, values in zip(self.state, self._last):
-            function.x.array[:] = values
+    def put(self, values: Sequence[np.ndarray]) -> None:
+        """Let them be what they were."""
+        for function, array in zip(self.state, values):
+            function.x.array[:] = array
 
     def move_on(self, u: fem.Function) -> None:
         """Let the user move them on with the converged displacement.  Collective."""
         if self.after_step is not None:
             with raised_together(u.function_space.mesh.comm):
                 self.after_step(u)
-
-    def history(self) -> list[np.ndarray]:
-        """All that a step leaves to the next one, for ``go_back``."""
-        return self._last
-
-    def advance(self) -> None:
-        """What they are is the last converged state."""
-        self._last = self._values()
 
     # -- checkpoints ---------------------------------------------------------------------------
 
@@ -115,10 +93,10 @@ class InternalVariables(Guarded):
             rows[f"state_{k}"] = function.x.array[dofs[: len(rows["state_nodes"])]]
         return rows
 
-    def load(self, rows: dict[str, np.ndarray]) -> None:
-        """Take back what ``save`` returned, for the cells that this rank owns.  Collective."""
+    def loaded(self, rows: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
+        """The values, as ``values`` returns them, of what ``save`` returned, for the cells that this rank owns; they are put, too.  Collective."""
         for k, function in enumerate(self.state):
             values, dofs = rows[f"state_{k}"], compat.cell_dofs(function.function_space)
             function.x.array[dofs[: len(values)]] = values
             function.x.scatter_forward()
-        self.advance()
+        return self.values()

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
-from dolfinx_contact.contact.contact_step import ContactStep, wanders
+from dolfinx_contact.contact.contact_step import wanders
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import SurfaceMeasure, contact_nodes
 from dolfinx_contact.contact.input import (
@@ -29,7 +29,7 @@ from dolfinx_contact.contact.input import (
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.laws import Laws
 from dolfinx_contact.contact.placement import Placed, Placement
-from dolfinx_contact.contact.state import OPPOSITE, History, State
+from dolfinx_contact.contact.state import OPPOSITE, History, State, frozen_state
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, positive
@@ -228,17 +228,10 @@ class Contact(Guarded):
         if self.laws.field and history.friction is not None:
             self.laws.take(self, history.friction)
 
-    def accept(self, step: ContactStep, state: State, u: np.ndarray | None = None) -> None:
-        """Let a state in a step be the last converged one.  Collective.
-
-        Args:
-            step: The contact in the step.
-            state: The state.
-            u: Its displacement, owned degrees of freedom; needed between bodies.
-        """
-        self._history = step.ended(state, u)
-        self.laws.take(self, step.friction)
-        self.present = self._history.last._replace(known=state.known)
+    def accept(self, history: History) -> None:
+        """Let this be the history that a step has made, see ``ContactStep.ended``.  Collective."""
+        self.laws.take(self, history.friction)
+        self.go_back(history)
         self.measure.renew(self)
 
     # -- results -------------------------------------------------------------------------------
@@ -250,7 +243,7 @@ class Contact(Guarded):
 
     @present.setter
     def present(self, state: State) -> None:
-        self._present = State(*(None if a is None else frozen(a) for a in state))
+        self._present = frozen_state(state)
 
     @property
     def history(self) -> History:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.placement import Placed, carried
-from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status
+from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status, frozen_state
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.support.attributes import frozen
@@ -312,7 +312,7 @@ class ContactStep:
         if self.surface.spin is not None:
             turned = placement.turned_past(state.displacement, frames)
             state = state._replace(displacement=turned)
-        state = State(*map(frozen, state[:-1]))
+        state = frozen_state(state)
         sums, worn, doubtful, unloads = self._summed(state)
         bare = None
         if self.surface.deformable and u is not None and given.changes:

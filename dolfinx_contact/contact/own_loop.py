@@ -74,4 +74,4 @@ class OwnLoop:
 
     def advance(self) -> None:
         """Accept the present state as the last converged one, from which the next slip counts.  Collective."""
-        self.contact.accept(step_of(self.contact), self.contact.present)
+        self.contact.accept(step_of(self.contact).ended(self.contact.present))

@@ -39,8 +39,6 @@ def _of(history: History) -> dict[str, np.ndarray]:
 def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     """Raise a ``ValueError`` if an array is missing or of another size, or another law or surface was saved."""
     for name, array in _of(contact.history).items():
-        if name == KEPT and name not in arrays:
-            continue  # older checkpoints do not have it
         if name not in arrays or arrays[name].shape != array.shape:
             found = arrays[name].shape if name in arrays else "nothing"
             raise ValueError(
@@ -69,9 +67,8 @@ def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     surface.displacement = arrays["plane"]
     found = arrays.get("found_rotation_of_plane", surface.rotation)
     frames = placement.ended(frames, found)
-    last = State(*(frozen(np.array(arrays[name])) for name in FIELDS))
-    none, worn = np.zeros_like(last.slip_increment), None
-    sums = {name: frozen(np.array(arrays.get(name, none))) for name in (*SUMS, KEPT)}
+    last, worn = State(*(frozen(np.array(arrays[name])) for name in FIELDS)), None
+    sums = {name: frozen(np.array(arrays[name])) for name in (*SUMS, KEPT)}
     if OPPOSITE in arrays:
         sums[OPPOSITE] = frozen(np.array(arrays[OPPOSITE]))
         worn = placement.everywhere(sums[OPPOSITE])

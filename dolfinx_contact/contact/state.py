@@ -42,6 +42,11 @@ class State(NamedTuple):
     )
 
 
+def frozen_state(state: State) -> State:
+    """The state with read-only arrays."""
+    return State(*(None if array is None else frozen(array) for array in state))
+
+
 SUMS = ("dissipation", "slip_path", "wear_depth")
 KEPT = "slip_kept"
 OPPOSITE = "opposite_wear_depth"  # at nodes of a deformable surface that wears
@@ -78,7 +83,7 @@ class History:
         """No history: a state, and all sums zero."""
         sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
         sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
-        return History(State(*map(frozen, state[:-1])), frames, sums)
+        return History(frozen_state(state), frames, sums)
 
     @property
     def empty(self) -> bool:

@@ -19,6 +19,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
+from dolfinx_contact.accepted import Accepted, poses_of
 from dolfinx_contact.bodies.elastic import ElasticBody, FreeState
 from dolfinx_contact.contact.saved import check_saved, load_saved, saved_of
 from dolfinx_contact.contact.state import OPPOSITE
@@ -27,51 +28,32 @@ from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.support.numbering import original_cells, original_nodes
 
 if TYPE_CHECKING:
-    from dolfinx_contact.bodies.internal_variables import InternalVariables
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.problem import ContactProblem
 
-# Of what is written.  Files of before 27 November 2026 have none.
-VERSION = 2
+VERSION = 3  # of what is written; files of others are refused
 
-# Ends of the names of arrays that not every history has, and of those that files of the first version, and of none, may lack.
-SOME = ("law_of_last_step", "home", "rotation_of_plane")
-FIRST = (*SOME, "_placed", "_worn", "fixed")
-LACKING = [(*FIRST, "laws", "texture", "rigid_plane", "slip_kept"), FIRST, SOME]
+# Ends of the names of arrays that not every history has.
+MAY_LACK = ("law_of_last_step", "home", "rotation_of_plane")
 
 ANEW = "Take another one, or write it anew with problem.save."
 
 
-def save(
-    path: str | PathLike[str],
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    states: Sequence[np.ndarray],
-    past: Sequence[tuple],
-    variables: InternalVariables | None,
-) -> None:
-    """Write the history of a problem.  Collective.
-
-    Args:
-        path: File name.
-        body: The body.
-        contacts: Its contacts.
-        states: The last displacement and the one before, owned degrees of freedom.
-        past: Earlier steps of the condensed solver.
-        variables: ``InternalVariables``, or None.
-    """
+def save(path: str | PathLike[str], problem: ContactProblem) -> None:
+    """Write the accepted state of a problem.  Collective."""
+    body, contacts, accepted = problem.body, problem.contacts, problem.accepted
     comm, nodes = body.comm, _nodes(body, contacts)
     with raised_together(comm):
         _check_path(path)
     body.refresh()
-    mine = nodes | {"ranks": np.array([len(nodes["nodes"])])} | _arrays(body, contacts, states)
-    if body.known and not body.displacements.mixed:
-        known, rows = body.known, body.displacements.rows
+    mine = nodes | {"ranks": np.array([len(nodes["nodes"])])} | _arrays(problem, accepted)
+    known, rows, starts = accepted.free_state, body.displacements.rows, accepted.starts
+    if known and not body.displacements.mixed:
         mine |= {"digest": known.digest[None], "load": rows(known.load)}
         mine["free" if known.exact else "rough"] = rows(known.displacement)
-    if past:
+    if starts:
         of_contacts = [nodes[f"contact{k}_nodes"] for k in range(len(contacts))]
-        mine["past_nodes"] = np.concatenate(of_contacts)
-    mine |= variables.save() if variables else {}
+        mine["starts_nodes"] = np.concatenate(of_contacts)
     stiffness, everything = body.stiffness_norm(), comm.gather(mine, root=0)
     with raised_together(comm):
         if comm.rank == 0:
@@ -80,33 +62,32 @@ def save(
                 name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
                 for name in mine
             } | {"stiffness": np.array(stiffness), "version": np.array(VERSION)}
-            if past:
-                last = past[-1]
-                alike = [step for step in past if step[0].size == last[0].size]
-                file["past"] = np.array([step[:2] for step in alike])
-                file["past_tied"] = last[2]
+            if starts:
+                last = starts[-1]
+                alike = [step for step in starts if step[0].size == last[0].size]
+                file["starts"] = np.array([step[:2] for step in alike])
+                file["starts_tied"] = last[2]
             _write(path, file)
 
 
-def _arrays(
-    body: ElasticBody, contacts: Sequence[Contact], states: Sequence[np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Displacements and histories of contacts by name; this rank's rows.  Collective."""
-    mine = {name: body.displacements.rows(of) for name, of in zip(("u", "before"), states)}
+def _arrays(problem: ContactProblem, accepted: Accepted | None = None) -> dict[str, np.ndarray]:
+    """Displacements, histories and internal variables by name, this rank's rows; without a state those of any.  Collective."""
+    body, contacts = problem.body, problem.contacts
+    x, before = 2 * [np.zeros(body.size)] if accepted is None else (accepted.x, accepted.x_before)
+    mine = {"x": body.displacements.rows(x), "x_before": body.displacements.rows(before)}
     mine["fixed"] = _fixed(body)
     if body.displacements.mixed:
-        mine |= {f"mixed_{name}": _by_cells(body, of) for name, of in zip(("u", "before"), states)}
+        mine |= {"mixed_x": _by_cells(body, x), "mixed_x_before": _by_cells(body, before)}
     with raised_together(body.comm):  # the user's functions
         saved = [saved_of(contact) for contact in contacts]
-    for k, of_contact in enumerate(saved):
+    for k, (contact, of_contact) in enumerate(zip(contacts, saved)):
         mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
-        if contacts[k].surface.deformable:
-            at = contacts[k].history.frames.at
-            mine[f"{k}_placed"] = body.displacements.rows(at)
-            worn = np.zeros(len(mine[f"{k}_placed"]))
-            worn[contacts[k].opposite] = contacts[k].opposite_wear_depth
-            mine[f"{k}_worn"] = worn
-    return mine
+        if contact.surface.deformable:
+            placed = body.displacements.rows(contact.history.frames.at)
+            worn = np.zeros(len(placed))
+            worn[contact.opposite] = contact.opposite_wear_depth
+            mine |= {f"{k}_placed": placed, f"{k}_worn": worn}
+    return mine | (problem.internal.save() if problem.internal else {})
 
 
 def _fixed(body: ElasticBody) -> np.ndarray:
@@ -137,30 +118,22 @@ def _write(path: str | PathLike[str], file: dict[str, np.ndarray]) -> None:
             os.close(folder)
 
 
-def load(
-    path: str | PathLike[str],
-    body: ElasticBody,
-    contacts: Sequence[Contact],
-    variables: InternalVariables | None,
-) -> tuple[list[np.ndarray], list]:
-    """Give contacts, body and internal variables the history in a file.  Collective.
-
-    Returns:
-        The last displacement and the one before, and the earlier steps of the condensed solver.
+def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
+    """The state in a file; contacts and internal variables have it.  Collective.
 
     Raises:
         ValueError: the file is no checkpoint of this problem.
     """
+    body, contacts, internal = problem.body, problem.contacts, problem.internal
     comm = body.comm
     with raised_together(comm):
         _check_path(path)
     body.refresh(np.zeros(body.size) if body.displacements.mixed else None)  # it scales unknowns
-    nodes, like = _nodes(body, contacts), _arrays(body, contacts, [np.zeros(body.size)] * 2)
-    if variables:
-        nodes, like = nodes | variables.cells(), like | variables.save()
+    nodes, like = _nodes(body, contacts), _arrays(problem)
+    nodes |= internal.cells() if internal else {}
     asked = comm.gather(nodes, root=0)
     stiffness = body.stiffness_norm()
-    parts, past = None, ()
+    parts, starts = None, ()
     with raised_together(comm):
         if comm.rank == 0:
             file = _opened(path)
@@ -168,11 +141,11 @@ def load(
             _check_arrays(path, file, like)
             orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
             parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
-            if "past" in file:
+            if "starts" in file:
                 names = [f"contact{k}_nodes" for k in range(len(contacts))]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
-                past = _past(path, file, order)
-    mine, past = comm.scatter(parts, root=0), comm.bcast(past, root=0)
+                starts = _starts(path, file, order)
+    mine, starts = comm.scatter(parts, root=0), comm.bcast(starts, root=0)
     with raised_together(comm):
         _check_supports(path, mine, body)
     with raised_together(comm):
@@ -189,12 +162,18 @@ def load(
             check_saved(contact, saved)
     for contact, saved in zip(contacts, own):
         load_saved(contact, saved)
-    if variables:
-        variables.load(mine)
-    body.known = _free_state(mine, comm)
-    if body.displacements.mixed:
-        return [_of_cells(body, mine[f"mixed_{name}"]) for name in ("u", "before")], past
-    return [mine["u"].ravel(), mine["before"].ravel()], past
+    names = ("x", "x_before")
+    mixed = body.displacements.mixed
+    x, before = (_of_cells(body, mine[f"mixed_{n}"]) if mixed else mine[n].ravel() for n in names)
+    return problem.accepted.but(
+        x=x,
+        x_before=before,
+        histories=tuple(contact.history for contact in contacts),
+        poses=poses_of(contacts),
+        free_state=_free_state(mine, comm),
+        variables=internal.loaded(mine) if internal else (),
+        starts=tuple(starts),
+    )
 
 
 def _of_body(mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Contact) -> dict:
@@ -234,11 +213,11 @@ def _opened(path: str | PathLike[str]) -> dict[str, np.ndarray]:
 
 def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: Any) -> None:
     """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
-    if not {"u", "before", "nodes", "ranks"} <= file.keys():
+    if not {"nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
-    if not 0 <= (version := _number(path, file, "version", 0)) <= VERSION:
+    if file.get("version", 0) != VERSION:
         raise ValueError(
-            f"checkpoint {path} is of version {version:.0f}, this dolfinx_contact reads up to {VERSION}: take the one that wrote it."
+            f"checkpoint {path} was written by another version of dolfinx_contact: read it with that one."
         )
     for name in asked[0]:
         size = sum(len(nodes[name]) for nodes in asked)
@@ -252,8 +231,7 @@ def _check_supports(
 ) -> None:
     """Raise a ``ValueError`` if other displacements of this rank were given in the run that wrote the file."""
     here = _fixed(body)
-    saved = mine.get("fixed", here)  # older checkpoints do not have it
-    differs = np.flatnonzero((saved != here).any(axis=1))
+    differs = np.flatnonzero((mine["fixed"] != here).any(axis=1))
     if differs.size:
         where = body.displacements.x[differs[0], : body.displacements.dim].tolist()
         raise ValueError(
@@ -266,7 +244,7 @@ def _check_stiffness(
     path: str | PathLike[str], file: dict[str, np.ndarray], stiffness: float
 ) -> None:
     """Raise a ``ValueError`` unless the file has the same stiffness as the problem that asks."""
-    saved = _number(path, file, "stiffness", stiffness)  # older checkpoints do not have it
+    saved = _number(path, file, "stiffness")
     if not abs(saved - stiffness) <= 1e-9 * stiffness:
         raise ValueError(
             f"checkpoint {path} was written with another stiffness (norm {saved:.12g}, here {stiffness:.12g}): set "
@@ -274,12 +252,10 @@ def _check_stiffness(
         )
 
 
-def _number(
-    path: str | PathLike[str], file: dict[str, np.ndarray], name: str, otherwise: float
-) -> float:
-    """A number in the file, or what counts where it has none."""
+def _number(path: str | PathLike[str], file: dict[str, np.ndarray], name: str) -> float:
+    """A number in the file."""
     try:
-        return number(f"checkpoint {path}: {name}", file.get(name, otherwise))
+        return number(f"checkpoint {path}: {name}", file.get(name))
     except ValueError as error:
         raise ValueError(f"{error} {ANEW}") from None
 
@@ -288,11 +264,10 @@ def _check_arrays(
     path: str | PathLike[str], file: dict[str, np.ndarray], like: dict[str, np.ndarray]
 ) -> None:
     """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
-    older = LACKING[int(_number(path, file, "version", 0))]
-    missing = [name for name in like if name not in file and not name.endswith(older)]
+    missing = [name for name in like if name not in file and not name.endswith(MAY_LACK)]
     if missing:
         raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {ANEW}")
-    like = like | {name: like["u"] for name in ("load", "free", "rough")}
+    like = like | {name: like["x"] for name in ("load", "free", "rough")}
     for name, array in file.items():
         surface = name.endswith("rigid_plane")  # compared by the contact; without wear it has NaN
         if name == "digest":
@@ -322,14 +297,16 @@ def _nodes_of(name: str) -> str:
     return f"{prefix}_nodes" if prefix.startswith(("contact", "state", "mixed")) else "nodes"
 
 
-def _past(path: str | PathLike[str], file: dict[str, np.ndarray], order: np.ndarray) -> list[tuple]:
+def _starts(
+    path: str | PathLike[str], file: dict[str, np.ndarray], order: np.ndarray
+) -> list[tuple]:
     """Earlier condensed steps for nodes in this order; what belongs to anchors stays behind them."""
-    saved, nodes = file["past"], file.get("past_nodes", np.zeros(0))
-    tied = int(_number(path, file, "past_tied", 0))
+    saved, nodes = file["starts"], file.get("starts_nodes", np.zeros(0))
+    tied = int(_number(path, file, "starts_tied"))
     size = int(np.prod(saved.shape[2:])) - tied
     if nodes.shape != order.shape or saved.ndim < 3 or saved.shape[1] != 2 or size < 0 or size % max(len(nodes), 1):  # fmt: skip
         raise ValueError(
-            f"checkpoint {path}: past and past_nodes do not belong to each other. {ANEW}"
+            f"checkpoint {path}: starts and starts_nodes do not belong to each other. {ANEW}"
         )
     at = _positions(nodes, np.argsort(nodes), order)
     flat = saved.reshape(*saved.shape[:2], -1)
@@ -380,7 +357,7 @@ def _part(
     part = {}
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
-        of_body = {"u", "before", "fixed", "load", "free", "rough"}
+        of_body = {"x", "x_before", "fixed", "load", "free", "rough"}
         of_body |= {name for name in file if name.endswith(("_placed", "_worn"))}
         names = of_body if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):

@@ -31,7 +31,7 @@ def without_reactions(step: LoadStep) -> SolverResult | None:
         c = step.surfaces.at_rest(c)
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
-        if not (body.known.exact or presses(step, trial, c)):
+        if not (body.last_free_state.exact or presses(step, trial, c)):
             trial = body.free_state(step.b)  # whether anything touches takes all digits
     if may_touch(step, trial, c):
         return None

@@ -166,6 +166,7 @@ class LoadStep:
         c: np.ndarray | None = None,
         before: StepState | None = None,
         near: Sequence[np.ndarray] | None = None,
+        exact: bool | None = None,
     ) -> StepState:
         """The state of a displacement: every node has the reaction that its map makes of the one which the body asks for.  Collective.
 
@@ -176,9 +177,15 @@ class LoadStep:
             c: Where motions of surfaces may be; they are balanced from there.
             before: The state before, for the change of the reactions since and what it knows of shared nodes.
             near: Reactions of each contact that a solver knows better than the body tells, at shared nodes.
+            exact: Whether ``forces`` are those of F itself; None as ``forces(x)`` are.
         """
         forces = self.forces(x) if forces is None else forces
-        return self._state(x, maps, forces, self.exact_forces, c, before, near)
+        exact = self.exact_forces if exact is None else exact
+        c, required, split = self._balanced(x, maps, self.free(forces), c, before, near)
+        given = zip(self.contacts, required, maps)
+        nodes = tuple(contact.respond(x, reaction, map, c) for contact, reaction, map in given)
+        nodes = self._with_shares(nodes)
+        return StepState(self, x, c, forces, nodes, required, exact, split, before)
 
     def measure(
         self,
@@ -192,7 +199,8 @@ class LoadStep:
 
         Beside large slip their direction is that of the slip, not that of rounding in forces.
         """
-        return self._state(x, self.measuring_maps, self.by_form(x), True, c, before, near)
+        given: dict[str, Any] = dict(forces=self.by_form(x), c=c, before=before, near=near)
+        return self.evaluate(x, self.measuring_maps, exact=True, **given)
 
     def open(self, x: np.ndarray, c: np.ndarray | None = None) -> StepState:
         """The state of a displacement without reactions, by F itself.  Collective."""
@@ -228,23 +236,7 @@ class LoadStep:
         derivatives = [derivative for _, derivative in found]
         if split is not None:
             derivatives = self.shared.coupled(derivatives, split)
-        return self._with_shares(tuple(state for state, _ in found), c), derivatives
-
-    def _state(
-        self,
-        x: np.ndarray,
-        maps: Sequence[NodalMap],
-        forces: np.ndarray,
-        exact: bool,
-        c: np.ndarray | None,
-        before: StepState | None,
-        near: Sequence[np.ndarray] | None,
-    ) -> StepState:
-        c, required, split = self._balanced(x, maps, self.free(forces), c, before, near)
-        given = zip(self.contacts, required, maps)
-        nodes = tuple(contact.respond(x, reaction, map, c) for contact, reaction, map in given)
-        nodes = self._with_shares(nodes, c)
-        return StepState(self, x, c, forces, nodes, required, exact, split, before)
+        return self._with_shares(tuple(state for state, _ in found)), derivatives
 
     def _balanced(
         self,
@@ -275,7 +267,7 @@ class LoadStep:
             c = self.surfaces.balanced(self.contacts, x, c, maps, required)
         return c, required(c), split
 
-    def _with_shares(self, nodes: tuple[State, ...], c: np.ndarray) -> tuple[State, ...]:
+    def _with_shares(self, nodes: tuple[State, ...]) -> tuple[State, ...]:
         """The states with what held nodes carry of the planes that they hold."""
         return nodes if self.holding is None else self.holding.shared(self.contacts, nodes)
 

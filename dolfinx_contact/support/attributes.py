@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -76,11 +76,13 @@ class Guarded:
     """
 
     _settable: tuple[str, ...] = ()
+    _checked: Mapping[str, Callable] = {}  # what is kept of values given, or raises
     _remedy: str = ""  # what to do instead of setting one of the others
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in self._settable or name.startswith("_") or "_made" not in self.__dict__:
-            object.__setattr__(self, name, value)
+            check = self._checked.get(name)
+            object.__setattr__(self, name, check(value) if check else value)
             return
         kind = type(self).__name__
         if name in dir(self):

@@ -71,7 +71,7 @@ def test_three_digits_of_the_free_state_are_enough_where_it_presses(monkeypatch)
     monkeypatch.setattr(linear_solver, "ROUGH", 0.0)
     exactly = pressed(0, 0, -0.005, solver=dc.FixedPoint())
     assert iterations < 0.5 * exactly.problem.body.ksp.getIterationNumber()
-    assert not roughly.problem.body.known.exact
+    assert not roughly.problem.body.last_free_state.exact
     reactions, expected = (scenes.gathered(scene.contact)[1] for scene in (roughly, exactly))
     assert np.abs(reactions - expected).max() <= 1e-8 * np.abs(expected).max()
 
@@ -82,7 +82,7 @@ def test_all_digits_of_the_free_state_where_they_count(height, solver):
     solver = dc.CondensedNewton() if solver else dc.FixedPoint()
     scene = pressed(0.001, 0, height, solver=solver)
     body = scene.problem.body
-    known = body.known
+    known = body.last_free_state
     assert known.exact
     left = body.norm(known.load - body.multiply(known.displacement))
     assert left <= 1e-10 * body.norm(known.load)
@@ -100,7 +100,7 @@ def test_an_interrupted_rough_solve_leaves_tolerance_and_start_as_they_were():
     body.ksp.setMonitor(interrupt)
     # PETSc 3.18 lets what a callback raises through, 3.25 raises an error of its own from it.
     with pytest.raises((KeyboardInterrupt, PETSc.Error)):
-        body.solve(body.known.load, rough=True, start=body.known.displacement)
+        body.solve(body.last_free_state.load, rough=True, start=body.last_free_state.displacement)
     assert body.ksp.getTolerances()[0] == MULTIGRID["ksp_rtol"]
     assert not body.ksp.getInitialGuessNonzero()
 

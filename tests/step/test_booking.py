@@ -87,7 +87,7 @@ class Run:
         return all(np.allclose(a, b, 1e-6, 1e-12) for a, b in zip(found, whole))
 
 
-def at_line(k, act, first="accept", file="problem_states.py"):
+def at_line(k, act, first="advanced", file="accepted.py"):
     """Do something at the k-th line that the package runs from the booking of a step on, or from another function on; returns how many there were."""
     seen = SimpleNamespace(lines=0, booking=False)
 
@@ -170,7 +170,7 @@ def test_an_exception_at_any_line_of_a_step(scene):
             pass
         finally:
             sys.settrace(None)
-        booked = problem.snapshot().displacements[0] is not accepted.displacements[0]
+        booked = problem.accepted.x is not accepted.x
         if booked:  # raised once all was done
             assert run.is_(run.done)
             continue

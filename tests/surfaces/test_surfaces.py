@@ -180,7 +180,7 @@ def test_gaps_are_distances_at_the_start_of_every_step(d, k):
             slope = distance(surface, x + where + shift) - distance(surface, x + where - shift)
             assert slope / 2e-6 == pytest.approx(frames[:, -1, j], abs=1e-9)
         where = where + 0.1 * rng.normal(size=x.shape)
-        contact.accept(step, step.at(given(contact, where)))
+        contact.accept(step.ended(step.at(given(contact, where))))
 
 
 @pytest.mark.parametrize("d, k", [(2, 0), (2, 1), *((3, k) for k in range(7))])
@@ -190,7 +190,7 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
     contact = block(surface).contact
     x = contact.x[:, :d]
     contact.present = step_of(contact).at(given(contact, 0.0 * x))
-    contact.accept(step_of(contact), contact.present)
+    contact.accept(step_of(contact).ended(contact.present))
     gap, frame = contact.gap, contact.frame
     for _ in range(3):
         surface.rotation = rng.normal(size=surface.rotation.size)
@@ -202,7 +202,7 @@ def test_a_rigid_motion_of_all_changes_nothing(d, k):
         assert state.gap == pytest.approx(gap, abs=1e-13)
         assert np.abs(state.slip_increment).max(initial=0) < 1e-13
         assert step.frames.frame == pytest.approx(frame @ R.T, abs=1e-13)
-        contact.accept(step, state)
+        contact.accept(step.ended(state))
 
 
 @pytest.mark.parametrize("k", range(3))
@@ -212,7 +212,7 @@ def test_a_sphere_that_turns_about_its_centre_leaves_last_reactions(k):
     contact = block(surface, 0.3).contact
     reaction = rng.normal(size=(len(contact.x), 3))
     contact.present = contact.present._replace(reaction=reaction)
-    contact.accept(step_of(contact), contact.present)
+    contact.accept(step_of(contact).ended(contact.present))
     before = np.einsum("ni,nij->nj", reaction, contact.frame)
     for _ in range(3):
         surface.rotation = rng.normal(size=3)

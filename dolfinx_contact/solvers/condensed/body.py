@@ -223,7 +223,7 @@ class BoundCondensedNewton(BoundSolver):
         held, first, (free, c) = self._held_by.solve, self.dim * self.nodes, self._begun(step)
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
         q = rows = self._motion(step, free, c)
-        placed, near = np.zeros(q.size), self._starts(q, starts)
+        placed, near = np.zeros(q.size), _similar_starts(q, starts, self._surfaces)
         if step.statics is not None:
             q, placed, near = self._placed(step, free, c, near)
         iterations, error, rounding, best, state = 0, np.inf, 0.0, None, None
@@ -411,32 +411,6 @@ class BoundCondensedNewton(BoundSolver):
         tell = None if step.monitor is None else step.monitor.tell
         return by_first_rank(self.comm, solve, tell)
 
-    # -- starts ----------------------------------------------------------------------------------
-
-    def _starts(self, q: np.ndarray, starts: Sequence[Any]) -> list[np.ndarray]:
-        """Reactions to start from: last step's, extrapolated, those of the most similar step, and last
-        step's with the change that led to the most similar one."""
-        past = [(a, b) for a, b, _ in starts if a.size == q.size]
-        if not past:
-            return []
-        last = past[-1]
-        before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
-        near = [last[1], 2 * last[1] - before]
-        tied = 0 if self._surfaces is None else self._surfaces.tied
-        if tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
-            near.append(q[-1] / last[0][-1] * last[1])
-        scale, others = np.abs(q[: q.size - tied]).max(), np.array([other for other, _ in past])
-        if tied:
-            distances = self._surfaces.distances(others, q)
-        else:
-            distances = np.abs(others - q).max(axis=1)
-        similar = int(np.argmin(distances))
-        if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
-            near.append(past[similar][1])
-            if similar > 0:
-                near.append(last[1] + past[similar][1] - past[similar - 1][1])
-        return near
-
     # -- gathered from all ranks -----------------------------------------------------------------
 
     def gather(self, local: np.ndarray) -> np.ndarray:
@@ -481,3 +455,26 @@ def _next_change(state: StepState) -> float:
     from dolfinx_contact.solvers.newton.contact_tangent import next_change
 
     return next_change(state)
+
+
+def _similar_starts(
+    q: np.ndarray, starts: Sequence[Any], surfaces: CondensedSurfaces | None
+) -> list[np.ndarray]:
+    """Reactions to start from: last step's, extrapolated, those of the most similar step, and last step's with the change that led to the most similar one."""
+    past = [(a, b) for a, b, _ in starts if a.size == q.size]
+    if not past:
+        return []
+    last = past[-1]
+    before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
+    near = [last[1], 2 * last[1] - before]
+    tied = 0 if surfaces is None else surfaces.tied
+    if tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
+        near.append(q[-1] / last[0][-1] * last[1])
+    scale, others = np.abs(q[: q.size - tied]).max(), np.array([other for other, _ in past])
+    distances = surfaces.distances(others, q) if tied else np.abs(others - q).max(axis=1)
+    similar = int(np.argmin(distances))
+    if similar < len(past) - 1 and distances[similar] < 0.1 * scale:
+        near.append(past[similar][1])
+        if similar > 0:
+            near.append(last[1] + past[similar][1] - past[similar - 1][1])
+    return near

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.law.maps import BipotentialMap, NodalMap, ReturnMap
+from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverName, SolverResult
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.search import Search
@@ -187,50 +187,30 @@ class BoundFixedPoint(BoundSolver):
         return step.evaluate(x, step.measuring_maps, c=other.nearest.c)
 
     def _fall(self, search: Search, factor: float, every: int, state: StepState, most: int = 10**9) -> None:  # fmt: skip
-        """Iterate from a state with one rho while the errors fall, with a tangent every so many iterations; ``most`` of them."""
-        first = search.iterations == 0
+        """Anderson's method from a state with one rho while the errors fall, ``most`` iterations: with a tangent after every so many, and at once where the error is small.
+
+        It starts again from the nearest state wherever the error has grown too much since the last tangent.
+        """
+        step, first = search.step, search.iterations == 0
         search.begin(state, min(most, self._options.max_iterations), PATIENCE)
-        near, growth = NEAR if first and search.step.contacts else 0.0, GROWTH
+        near, growth, anderson = NEAR if first and step.contacts else 0.0, GROWTH, None
         while search.goes_on:
-            known = search.step.continues and search.iterations == 0
-            maps = self._set(search.step, factor, known)
-            near = 0.0 if known and self.preconditioner.linearised else near
-            self._accelerate(search, maps, search.nearest, every, near, growth)
-            near, growth = 0.0, GROWTH * growth
-
-    def _set(self, step: LoadStep, factor: float, known: bool) -> list:
-        """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
-        bipotential = self._options.map == "bipotential"
-        parameters = [factor * contact.stiffness.normal for contact in step.contacts]
-        maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]
-        if self._factor != factor:
-            self.close()  # one factorisation at a time: memory counts more than time
-            self.preconditioner = ContactPreconditioner(step, maps)
-            self._factor = factor
-        if not known:
-            self.preconditioner.forget_tangent()
-        return maps
-
-    def _accelerate(
-        self,
-        search: Search,
-        maps: Sequence[NodalMap],
-        start: StepState,
-        every: int,
-        near: float,
-        growth: float,
-    ) -> None:
-        """Anderson's method from a state, until the search ends or the error is ``growth`` times that at the last tangent; with one at once if it is below ``near``."""
-        step, tangent = search.step, np.inf  # error at the last tangent
-        x, before = start.x, start.as_start
-        anderson = Anderson(x.size, self._options.depth, step.total)
-        smallest, due, limit = np.inf, search.left - every, growth
-        while True:
+            if anderson is None:
+                known = step.continues and search.iterations == 0
+                maps = self._set(step, factor, known)
+                near = 0.0 if known and self.preconditioner.linearised else near
+                x, before = search.nearest.x, search.nearest.as_start
+                anderson = Anderson(x.size, self._options.depth, step.total)
+                tangent = smallest = np.inf  # error at the last tangent; smallest correction
+                due, limit = search.left - every, growth
             x, forces, c = self.preconditioner.rigid.balanced(x, step, maps, before)
             state = step.evaluate(x, maps, forces=forces, c=c, before=before)
             before = search.see(state)
-            if not search.goes_on or search.error > limit * tangent:
+            if not search.goes_on:
                 return
+            if search.error > limit * tangent:
+                near, growth, anderson = 0.0, GROWTH * growth, None
+                continue
             if search.left <= due or search.error < near:
                 search.error = before.errors.largest
             if search.left <= due or search.error < near:
@@ -252,3 +232,16 @@ class BoundFixedPoint(BoundSolver):
                 following, smallest = search.nearest.x, np.inf
             smallest = min(smallest, norm)
             x = following
+
+    def _set(self, step: LoadStep, factor: float, known: bool) -> list:
+        """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
+        bipotential = self._options.map == "bipotential"
+        parameters = [factor * contact.stiffness.normal for contact in step.contacts]
+        maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]
+        if self._factor != factor:
+            self.close()  # one factorisation at a time: memory counts more than time
+            self.preconditioner = ContactPreconditioner(step, maps)
+            self._factor = factor
+        if not known:
+            self.preconditioner.forget_tangent()
+        return maps
