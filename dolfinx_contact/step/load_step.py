@@ -564,20 +564,27 @@ class StepState:
         """Whether its errors are at most the tolerance of the step.  Collective."""
         return self.errors.within(self.step.tol)
 
-    @cached_property
+    # What is lazy is never the state itself: a state that holds itself stays in memory until Python looks for such.
+
+    @property
     def confirmed(self) -> StepState:
         """The same state with forces of F itself, by which it is judged.  Collective."""
-        if self.exact:
-            return self
+        return self if self.exact else self._confirmed
+
+    @cached_property
+    def _confirmed(self) -> StepState:
         state = replace(self, forces=self.step.by_form(self.x), exact=True)
         vars(state)["contact_sums"] = self.contact_sums  # of the same nodes
         return state
 
-    @cached_property
+    @property
     def judged(self) -> StepState:
         """The state by F itself: with its reactions where it is a solution, else with those of the return map.  Collective."""
-        if self.exact or (not self.is_far and self.within):
-            return self.confirmed
+        stands = self.exact or (not self.is_far and self.within)
+        return self.confirmed if stands else self._measured
+
+    @cached_property
+    def _measured(self) -> StepState:
         return self.step.measure(self.x, c=self.c, before=self)
 
     def of(self, step: LoadStep) -> StepState:

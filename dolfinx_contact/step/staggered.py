@@ -94,17 +94,18 @@ def solve_staggered(
         if not found.state.within:
             break  # no state with these values
         late, found = loop.first_unsettled(found)
-        state, step = found.state, found.state.step
+        step = found.state.step
         if late == len(levels):
             if step.tol <= goal:
                 break
-            loop.aim = goal
-            finer = step.but(tol=goal, starts=(state.x,), motions=state.c, continues=True)
+            loop.aim, start = goal, (found.state.x,)
+            finer = step.but(tol=goal, starts=start, motions=found.state.c, continues=True)
             step = loop.begun(finer, late)
         elif loop.at_its_limit(late):
             break
         else:
-            step = loop.renewed(step, state, late)
+            step = loop.renewed(step, found.state, late)
+        found = None  # of states the next search has its own
     return Staggered(loop.result(found), loop.sizes, loop.refused)
 
 
@@ -164,7 +165,8 @@ class _Loop:
         self._renewals[k] += 1
         for quantity in self._levels[k]:
             step = quantity.renewed(step, state)
-        return self.begun(step, k, max(change.tol for change in self._changes))
+        tol, self._changes = max(change.tol for change in self._changes), []
+        return self.begun(step, k, tol)
 
     def result(self, found: SolverResult) -> SolverResult:
         """What was found, with all iterations, and the reasons of all levels."""

@@ -3,6 +3,8 @@
 """A step is a value: nothing that is asked of it changes anything."""
 
 import dataclasses
+import gc
+from contextlib import suppress
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 
@@ -12,6 +14,7 @@ import pytest
 from golden_scenes import COMM, SCENES
 
 from dolfinx_contact.solvers.search import Search
+from dolfinx_contact.step.load_step import StepState
 
 # Planes, curved, turning, driven, loose, shared nodes, guided, wear, pressure, two bodies, nonlinear, mixed.
 KINDS = (
@@ -94,3 +97,26 @@ def test_evaluations_of_foreign_displacements_change_nothing(name, monkeypatch):
                 if COMM.size == 1
                 else np.abs(a - b).max(initial=0.0) <= 1e-7 * size
             )
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("solver", ["FixedPoint", "CondensedNewton", "SparseNewton"])
+@pytest.mark.parametrize("name", KINDS)
+def test_three_states_at_most_are_in_memory(name, solver):
+    """Told of each iterate, a monitor finds no more than three states of the contacts, without Python's search for cycles: what is no longer needed is freed at once."""
+    alive = []
+
+    def monitor(iteration, error, counts):
+        states = [one for one in gc.get_objects() if isinstance(one, StepState)]
+        alive.append(len({id(state.nodes[0].reaction) for state in states}))
+
+    gc.collect()
+    gc.disable()
+    try:
+        for problem in SCENES[name].steps(solver=getattr(dc, solver)()):
+            problem.monitor = monitor
+            with suppress(dc.NotConverged, ValueError):
+                problem.solve()
+    finally:
+        gc.enable()
+    assert max(alive, default=1) <= 3

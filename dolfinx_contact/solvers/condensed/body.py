@@ -33,11 +33,11 @@ from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.support.collective import by_first_rank, raised_together
 
 if TYPE_CHECKING:
-    from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.contact.state import State
     from dolfinx_contact.solvers.condensed.newton import CondensedNewton
+    from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations for a loose body that seems to slide away, and for any other.

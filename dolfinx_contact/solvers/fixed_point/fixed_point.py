@@ -138,9 +138,11 @@ class BoundFixedPoint(BoundSolver):
         """
         start = step.start() if start is None else start
         search, attempts = Search(step, start, self._options.max_seconds), []
-        for name, factor, every, state in self._attempts(search, start):
+        where = start.x, start.c
+        start = None  # a state is as large as its contacts: no more than three are kept
+        for name, factor, every in self._attempts(search, *where):
             attempts.append(f"{name} ({search.iterations})")
-            self._fall(search, factor, every, state)
+            self._fall(search, factor, every)
             if search.over or _slides(search.best):
                 break
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
@@ -156,23 +158,32 @@ class BoundFixedPoint(BoundSolver):
             said.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
         return SolverResult(*found, reason="; ".join(said))
 
-    def _attempts(self, search: Search, start: StepState) -> Iterator[tuple]:
-        """The attempts in their order: a name, rho, every how many iterations there is a tangent, and where it begins.  Collective."""
-        options = self._options
+    def _attempts(
+        self, search: Search, x: np.ndarray, c: np.ndarray
+    ) -> Iterator[tuple[str, float, int]]:
+        """The attempts in their order, begun: a name, rho, and every how many iterations there is a tangent; the step starts at ``x``.  Collective."""
+        options, step = self._options, search.step
+
+        def begin(state: StepState) -> None:
+            search.begin(state, options.max_iterations, PATIENCE)
+
         again = AGAIN if options.max_iterations > EVERY else ()
         for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
-            yield f"rho {factor:g}", factor, EVERY, search.best
+            begin(search.best)
+            yield f"rho {factor:g}", factor, EVERY
             if self.preconditioner.soften():
-                yield "soft motions", factor, EVERY, search.best
+                begin(search.best)
+                yield "soft motions", factor, EVERY
             for every, where in again:
                 if where == START:
-                    yield where, factor, every, start
+                    begin(step.evaluate(x, step.measuring_maps, c=c).as_start)
                 elif where == HALF:
-                    yield where, factor, every, self._half_way(search, factor)
+                    begin(self._half_way(search, factor))
                 else:
                     from dolfinx_contact.solvers.fixed_point.put_back import put_back
 
-                    yield "nodes put back", factor, every, put_back(search.best, where)
+                    begin(put_back(search.best, where))
+                yield where if where in (START, HALF) else "nodes put back", factor, every
             if _slides(search.best, tried=True):
                 return
 
@@ -180,19 +191,19 @@ class BoundFixedPoint(BoundSolver):
         """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
         step, half = search.step, search.step.half_way()
         other = Search(half, half.start(), self._options.max_seconds)
-        self._fall(other, factor, EVERY, other.best, 2 * EVERY)
+        other.begin(other.best, min(2 * EVERY, self._options.max_iterations), PATIENCE)
+        self._fall(other, factor, EVERY)
         search.count(other.iterations)
         x = other.nearest.x.copy()
         x[step.body.fixed] = step.b[step.body.fixed]
         return step.evaluate(x, step.measuring_maps, c=other.nearest.c)
 
-    def _fall(self, search: Search, factor: float, every: int, state: StepState, most: int = 10**9) -> None:  # fmt: skip
-        """Anderson's method from a state with one rho while the errors fall, ``most`` iterations: with a tangent after every so many, and at once where the error is small.
+    def _fall(self, search: Search, factor: float, every: int) -> None:
+        """Anderson's method with one rho while the errors fall: with a tangent after every so many iterations, and at once where the error is small.
 
         It starts again from the nearest state wherever the error has grown too much since the last tangent.
         """
         step, first = search.step, search.iterations == 0
-        search.begin(state, min(most, self._options.max_iterations), PATIENCE)
         near, growth, anderson = NEAR if first and step.contacts else 0.0, GROWTH, None
         while search.goes_on:
             if anderson is None:

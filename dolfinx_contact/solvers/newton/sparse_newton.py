@@ -83,12 +83,14 @@ class BoundSparseNewton(OnTangent):
         search = Search(step, state, self._options.max_seconds)
         search.begin(search.best, self._options.max_iterations, PATIENCE)
         descent, self._seen = Descent(step, self._tangent, stands=start is None), state.as_start
+        x, forces = state.x, state.forces
+        state = start = None  # no more than three are kept
         for tangential in cycle(TANGENTIAL):
             parameters = [contact.stiffness.normal for contact in step.contacts]
             maps = [ReturnMap(NORMAL * rho, tangential * rho) for rho in parameters]
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
-                    state = self._fall(search, descent, state, maps)
+                    x, forces = self._fall(search, descent, x, forces, maps)
             except LinearSolverError:
                 break
             if not search.goes_on:
@@ -98,21 +100,27 @@ class BoundSparseNewton(OnTangent):
         )
 
     def _fall(
-        self, search: Search, descent: Descent, state: StepState, maps: Sequence[ReturnMap]
-    ) -> StepState:
-        """Steps with the same maps until the search ends or one gets short: the last iterate."""
+        self,
+        search: Search,
+        descent: Descent,
+        x: np.ndarray,
+        forces: np.ndarray,
+        maps: Sequence[ReturnMap],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Steps with the same maps until the search ends or one gets short: displacement and forces of the last iterate."""
         descent.begin(maps)
         step = search.step
         while True:
-            state = step.evaluate(state.x, maps, forces=state.forces, before=self._seen)
-            if step.held(state.x):
+            state = step.evaluate(x, maps, forces=forces, before=self._seen)
+            if step.held(x):
                 self._seen = search.see(state)
                 if not search.goes_on:
-                    return state
+                    return x, forces
             state, length = descent.advance(state, search.error <= step.tol)
+            x, forces = state.x, state.forces
             search.count(1)
             if length < SHORT:
-                return state
+                return x, forces
 
 
 class Descent:
