@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Base classes, interfaces and building blocks for surfaces, laws, contact points, lagged quantities and solvers of your own.
+"""Base classes, interfaces and building blocks for surfaces, laws, contact points, lagged quantities, checks and solvers of your own.
 
 See docs/extending.md and docs/own_solver.md.  Nothing in the package imports this module.
 """
 
+from dolfinx_contact.checks.check import Check, CheckedStep
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.lagged.friction import LaggedFriction
 from dolfinx_contact.law.maps import BipotentialMap, ContactLaw, NodalLaw, NodalMap, ReturnMap
@@ -17,6 +18,8 @@ __all__ = [
     "BipotentialMap",
     "BoundSolver",
     "Change",
+    "Check",
+    "CheckedStep",
     "ContactLaw",
     "ContactPoints",
     "ContactPreconditioner",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from copy import copy
 from functools import partial
 from os import PathLike
 from time import perf_counter
@@ -17,6 +16,8 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.accepted import Accepted, advanced, poses_of, put_surfaces, show, unloaded
+from dolfinx_contact.checks.check import Check, CheckedStep, checked_checks, run_checks
+from dolfinx_contact.checks.scene import checks_of
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.next_step import StepMaker
 from dolfinx_contact.petsc.linear_solver import raise_interrupt
@@ -24,7 +25,6 @@ from dolfinx_contact.problem_input import (
     NUMBERS,
     body_of,
     check_alive,
-    check_size,
     check_step,
     check_surfaces,
     check_weights,
@@ -52,13 +52,11 @@ from dolfinx_contact.results.record import (
     named,
     record,
     warn_of_contact,
-    warn_of_corners,
     warn_of_rounding,
 )
 from dolfinx_contact.solution import ended, solution
 from dolfinx_contact.solvers.base import BoundSolver, Solver
 from dolfinx_contact.step.load_step import LoadStep, StepState
-from dolfinx_contact.step.unseen import Unseen
 from dolfinx_contact.support.attributes import Guarded
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together, uninterrupted
@@ -101,6 +99,7 @@ class ContactProblem(Guarded):
     Attributes:
         solver: The solver's options; like ``tol``, ``geometry_tol``, ``undetermined`` and ``lagged`` it may be changed between steps, on all ranks.
         lagged: What a step takes for known beside this package's quantities, of classes of your own, see docs/extending.md; none at first.
+        checks: What is looked at after each step until the user was told of it, ``Check`` objects; add your own, see docs/extending.md.
         monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number in the
             step, largest error and ``Counts``; far from ``tol`` the error of equilibrium alone.  For iterates of the condensed
             problem, the error is the residual over the largest reaction; the errors of the body follow.
@@ -130,14 +129,25 @@ class ContactProblem(Guarded):
     geometry_tol: float
     undetermined: str
     lagged: tuple[Lagged, ...]
+    checks: tuple[Check, ...]
     _checked = dict(
         solver=checked_solver,
         tol=checked_tolerance,
         geometry_tol=partial(positive, "geometry_tol"),
         undetermined=checked_undetermined,
         lagged=checked_lagged,
+        checks=checked_checks,
     )
-    _settable = ("bcs", "monitor", "solver", "tol", "undetermined", "geometry_tol", "lagged")
+    _settable = (
+        "bcs",
+        "monitor",
+        "solver",
+        "tol",
+        "undetermined",
+        "geometry_tol",
+        "lagged",
+        "checks",
+    )
     _remedy = "bcs, monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
@@ -186,9 +196,7 @@ class ContactProblem(Guarded):
         self.body.crowded = crowded(self.solver, self.body, self.contacts)
         check_surfaces(self.contacts, self.body)
         check_weights(F, self.contacts)
-        self._unseen = Unseen(self.contacts)
-        self._large = False  # whether a displacement was, and the user told
-        self._turned = False  # the same of slip that turns
+        self.checks, self._over = checks_of(self.body, self.contacts), frozenset()
         self._bound = self._bound_to = None
         self._maker = StepMaker(self)
         take_contacts(self, self.contacts)
@@ -249,7 +257,7 @@ class ContactProblem(Guarded):
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
-        began, told = self._began(), (self._large, self._turned, copy(self._unseen))
+        began, checks = self._began(), (self.checks, self._over)
         try:
             with raised_together(self.body.comm):  # whatever happens on one rank alone
                 check_step(self.u, self.body.comm, self.contacts)
@@ -265,17 +273,15 @@ class ContactProblem(Guarded):
                     self.internal.move_on(self.u)
                 with uninterrupted():
                     self._accept(advanced(self, found))
-                    x, u = self._accepted.x, self.u.x.array
-                    self._large = self._large or check_size(self.body, x, u)
-                    shown = u, done.counts, self._large
-                    self._unseen.check(self.body, self.contacts, self._maker.stiffness, *shown)
                     warn_of_rounding(done, self.tol)
                     warn_of_contact(done, self.tol)
-                    self._turned = self._turned or warn_of_corners(self.body, self.contacts)
+                    shown = self._maker.stiffness, self.u.x.array, done.counts
+                    ended_in = CheckedStep(self.body, self.contacts, *shown, self._over)
+                    self.checks, self._over = run_checks(self.checks, ended_in)
                     self._log(lambda: f"step solved: {done}, {done.seconds:.3g} s, {named(done)}")
         except BaseException as failure:
             with uninterrupted():
-                self._undo(failure, began, told)
+                self._undo(failure, began, checks)
             raise_interrupt(failure)
             raise
         return done
@@ -305,7 +311,7 @@ class ContactProblem(Guarded):
         for contact, history in zip(self.contacts, accepted.histories):
             contact.accept(history)
 
-    def _undo(self, failure: BaseException, began: tuple, told: tuple) -> None:
+    def _undo(self, failure: BaseException, began: tuple, checks: tuple) -> None:
         """Nothing has happened, whatever did: also while a step that has converged was booked.  Collective."""
         said = f"step failed: {type(failure).__name__}: {failure}"
         self._log(lambda: said)
@@ -320,7 +326,7 @@ class ContactProblem(Guarded):
         self._go_to(accepted)
         self._before = before
         put_surfaces(self.contacts, poses)
-        self._large, self._turned, self._unseen = told
+        self.checks, self._over = checks
 
     def load_step(
         self,

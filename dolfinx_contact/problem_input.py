@@ -16,12 +16,10 @@ from ufl.classes import Indexed, Product, ScalarValue, SpatialCoordinate, Sum
 from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.input import check_meshes, derivative_of
-from dolfinx_contact.bodies.rigid_motion import mean_strain
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.contact_step import frames_of, meet_supports
 from dolfinx_contact.contact.interface import components
-from dolfinx_contact.petsc.linear_solver import CROWDED
-from dolfinx_contact.petsc.linear_solver import LARGE as TOO_LARGE
+from dolfinx_contact.petsc.linear_solver import CROWDED, LARGE
 from dolfinx_contact.solvers.base import Solver
 from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place, positive
@@ -39,8 +37,6 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import Solver
 
 DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
-STRAINED = 0.2  # mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth
-LARGE = 10.0  # a displacement of so many times the size of a body is one in other units
 
 # What to do where a motion of a body that contact alone holds is undetermined.
 UNDETERMINED = ("refused", "nearest")
@@ -185,7 +181,7 @@ def body_of(
 def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
     unknowns = body.comm.allreduce(body.size)
-    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= TOO_LARGE[3]
+    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= LARGE[3]
     if not (contacts and solid and body.options is None) or body.nonlinear:
         return False
     from dolfinx_contact.solvers.automatic import Automatic, most_nodes
@@ -526,34 +522,3 @@ def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[Contact]) -> 
         for driver in filter(None, (contact.surface.driver for contact in contacts)):
             driver.hold()
             driver.check()
-
-
-def check_size(body: ElasticBody, x: np.ndarray, u: np.ndarray) -> bool:
-    """Warn of a displacement far larger than the body, or of strains that are not small; whether it did.  Collective.
-
-    Args:
-        body: The body.
-        x: Displacement, owned degrees of freedom.
-        u: The same with those of ghosts.
-    """
-    largest = body.farthest(x)
-    if 2.0 * largest <= STRAINED * body.thickness:  # opposite faces may move against each other
-        return False
-    linear = "" if body.nonlinear else " (Elasticity is linear here.)"
-    if largest > LARGE * body.extent:
-        warnings.warn(
-            f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
-            f"{body.extent:.3g}: check the units of lengths, loads and moduli." + linear,
-            stacklevel=3,
-        )
-        return True
-    strain = 0.0 if body.nonlinear else mean_strain(body.displacements, u)
-    if strain <= STRAINED:
-        return False
-    warnings.warn(
-        f"the body is strained by {strain:.0%} (root mean square of the largest principal strain): F is linear in u, which "
-        "holds for strains of some per cent. Check loads, moduli and how far supports and surfaces move, or write F for large "
-        "strains.",
-        stacklevel=3,
-    )
-    return True

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 # Times the tolerance that errors over the reactions alone may have without a word.
 WORSE = 1e3
 
-# Part of the frictional work that a step may leave unknown without a word.
-DOUBTFUL = 0.1
-
 # Reasons of steps that have no solution, in words.
 NO_SOLUTION, UNHELD = "there is no solution", "a body leaves what held it"
 
@@ -216,20 +213,3 @@ def _penetration_between(contact: Contact, u: np.ndarray) -> float:
     here = of.rows(u)[contact.left_out]
     gaps = contact.surface.distances(of.x[contact.left_out, : of.dim] + here)
     return max(0.0, -contact.comm.allreduce(float(gaps.min(initial=0.0)), op=MPI.MIN))
-
-
-def warn_of_corners(body: ElasticBody, contacts: Sequence[Contact]) -> bool:
-    """Warn, in the name of who called ``solve``, of work that a turn of slip within the step leaves unknown; whether it did.  Collective."""
-    may = [contact for contact in contacts if contact.history.doubtful_work is not None]
-    if not may:
-        return False
-    sums = [[c.history.doubtful_work for c in may], [c.dissipation.sum() for c in may]]
-    doubtful, work = body.total(np.sum(sums, axis=1))
-    if doubtful <= DOUBTFUL * work:
-        return False
-    warnings.warn(
-        f"slip has turned in this step between directions of different friction, which leaves the frictional work unknown by {doubtful:.2g}, "
-        f"{doubtful / work:.0%} of all so far: it counts as a part of a curve, a sharp corner has so much more or less. Divide the step that turns.",
-        stacklevel=3,
-    )
-    return True

@@ -14,7 +14,7 @@ import two_bodies
 
 import dolfinx_contact as dc
 from dolfinx_contact import problem as module
-from dolfinx_contact.step.unseen import Unseen
+from dolfinx_contact.checks.scene import SlipTurns, WearsInLeaps
 
 COMM = scenes.COMM
 ALONE = pytest.mark.skipif(COMM.size > 1, reason="a signal reaches one process")
@@ -191,8 +191,8 @@ def test_an_exception_while_ranks_book(scene, on, monkeypatch):
     """On all ranks, or on one alone after what it tells others: all raise it, and the step has not been done."""
     run = Run(SCENES[scene])
     if on == "all" or COMM.rank == COMM.size - 1:
-        last = module.warn_of_corners
-        monkeypatch.setattr(module, "warn_of_corners", lambda *given: last(*given) or breaks())
+        last = SlipTurns.run
+        monkeypatch.setattr(SlipTurns, "run", lambda *given: last(*given) or breaks())
     with pytest.raises(Broken):
         run.problem.solve()
     monkeypatch.undo()
@@ -202,24 +202,22 @@ def test_an_exception_while_ranks_book(scene, on, monkeypatch):
     assert run.is_(run.done)
 
 
-TOLD = ["check_size", "warn_of_rounding", "warn_of_contact", "warn_of_corners"]
+TOLD = ["warn_of_rounding", "warn_of_contact"]
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize("name", [*TOLD, "check"])
+@pytest.mark.parametrize("name", [*TOLD, "run"])
 def test_every_warning_as_an_error(name, monkeypatch):
     """Raised, it undoes the step, and it is still to be told: the next time it is."""
-    run, owner = Run(worn_blocks), Unseen if name == "check" else module
+    run, owner = Run(worn_blocks), WearsInLeaps if name == "run" else module
 
     def warn(*arguments):
-        if name == "check":
-            vars(arguments[0])["_leaps"] = False
+        if name == "run":
+            return "something"
         warnings.warn("something", stacklevel=2)
-        return True
 
     def told():
-        of = vars(run.problem)
-        return of["_large"], of["_turned"], vars(of["_unseen"])["_leaps"]
+        return run.problem.checks, vars(run.problem)["_over"]
 
     monkeypatch.setattr(owner, name, warn)
     flags = told()

@@ -1,0 +1,250 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What the nodes of facets cannot see: surfaces between them, round bodies of straight cells, slopes of wavy faces.
+
+Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
+nodes miss is an error of their forces of about ``kappa`` times that length.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from dolfinx_contact.checks.check import CLEAR, Check, CheckedStep, place_of
+from dolfinx_contact.contact.contact import Contact
+from dolfinx_contact.contact.facets import Facets, facets_of, gauss
+from dolfinx_contact.support.collective import raised_together
+
+# What is missed, over the largest ``r_n / kappa``, above which the user is told.
+SHARE = 1.0
+
+# A surface stands out between nodes of a round body on its own account if it does by more than so many times the body.
+ROUND = 4.0
+
+# Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
+SLOPES, ALONG = 0.1, 1e-5
+
+# Part of a hollow between nodes that these may be open and still count as touching.
+TOUCHING = 0.1
+
+# How often points of a facet are taken about the deepest one, and by how much nearer to each other.
+CLOSER, FACTOR = 3, 0.25
+
+# In how many facets of a rank points are moved: the surface may be slow to ask for distances.
+DEEPEST = 64
+
+
+class Missed(NamedTuple):
+    """A length that the nodes of a facet miss; of two the larger one is the larger tuple."""
+
+    length: float = 0.0
+    where: tuple = ()
+    size: float = 0.0  # of the facet
+    needed: float = 0.0  # about the size that would see it
+    hollow: bool = False  # whether the surface recedes
+
+    def or_more(
+        self, lengths: Any, where: Any, size: Any, needed: Any = 0.0, hollow: Any = False
+    ) -> Missed:
+        """This one, or the largest of those of some facets."""
+        if not lengths.size:
+            return self
+        k = int(lengths.argmax())
+        columns = (np.broadcast_to(column, lengths.shape)[k] for column in (size, needed, hollow))
+        return max(self, Missed(float(lengths[k]), tuple(where[k].tolist()), *map(float, columns)))
+
+
+def facets_of_contact(contact: Contact) -> list[Facets]:
+    """The facets of a contact.  Collective."""
+    return facets_of(contact.displacements, contact.facets)
+
+
+class _OfFacets(Check):
+    """What facets of some contacts miss.  Collective.
+
+    Args:
+        facets: Those of each contact.
+    """
+
+    def __init__(self, facets: dict[Contact, list[Facets]]):
+        self._facets = {
+            contact: of for contact, of in facets.items() if self._concerns(contact, of)
+        }
+
+    def run(self, step: CheckedStep) -> str | None:
+        stiffness = dict(zip(step.contacts, step.stiffness))
+        for contact, facets in self._facets.items():
+            lengths = contact.reaction[:, -1] / stiffness[contact].normal
+            pushed = contact.comm.allreduce(float(lengths.max(initial=0.0)), op=MPI.MAX)
+            worn = None
+            if contact.wear is not None:
+                worn = contact.displacements.everywhere(contact.nodes, contact.wear_depth)
+            with raised_together(contact.comm):
+                missed = self._missed(contact, facets, step.u, pushed, worn)
+            missed = max(contact.comm.allgather(missed))
+            if missed.length > max(SHARE * pushed, CLEAR * missed.size):
+                return self._said(contact, missed, pushed)
+        return None
+
+    @abstractmethod
+    def _concerns(self, contact: Contact, facets: list[Facets]) -> bool:
+        """Whether there is anything to be looked at.  Collective."""
+
+    @abstractmethod
+    def _missed(self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+        """The largest length that nodes of facets of this rank miss."""
+
+    @abstractmethod
+    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+        """It in words, where the largest reaction pushes its node in by ``pushed``."""
+
+
+class Straight(_OfFacets):
+    """Nodes amid straight edges stand off a round body, where it touches."""
+
+    def _concerns(self, contact: Contact, of: list[Facets]) -> bool:
+        """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
+        most = 0.0
+        for facets in of:
+            flat = facets.at_nodes @ facets.x[:, facets.vertices]
+            off = np.linalg.norm(facets.x - flat, axis=-1) / facets.size[:, None]
+            sag = np.abs(facets.sag_at_nodes()) / facets.size[:, None]
+            most = max(most, float(np.where(off < CLEAR, sag, 0.0).max(initial=0.0)))
+        return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
+
+    def _missed(
+        self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: Any
+    ) -> Missed:
+        missed = Missed()
+        for facets in of:
+            x = _positions(contact, facets, u)
+            sag = facets.sag_at_nodes()
+            if (
+                pushed == 0.0
+            ):  # nodes that stand out of a hollow body, and touch nothing, are no harm
+                sag = np.maximum(sag, 0.0)
+            sag = np.abs(sag).max(axis=1)
+            near = contact.surface.distances(x).min(axis=1) <= sag
+            missed = missed.or_more(sag * near, x[:, 0], facets.size)
+        return missed
+
+    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+        felt = (
+            f"more than reactions push nodes in, {pushed:.2g}"
+            if pushed
+            else "where nothing touches"
+        )
+        return (
+            f"displacements of second order on straight-sided cells of a round surface: near {place_of(missed.where)} nodes between "
+            f"vertices stand {missed.length:.2g} off the round surface through these, {felt}, so that they carry too much or "
+            "nothing. Take a mesh whose cells are of second order, with curved edges, or displacements of first order, or "
+            f"smaller cells; they are {missed.size:.2g} there."
+        )
+
+
+class Between(_OfFacets):
+    """The surface goes into facets between nodes, or recedes between nodes that touch."""
+
+    def _concerns(self, contact: Contact, of: list[Facets]) -> bool:
+        return contact.surface.varies
+
+    def _missed(self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+        missed = Missed()
+        for facets in of:
+            x = _positions(contact, facets, u)
+            gaps = contact.surface.distances(x)
+            opened = gaps if worn is None else gaps + worn[facets.nodes]
+            near = opened.min(axis=1) < facets.size
+            if near.any():
+                some = facets.some(near)
+                missed = _within(contact, some, x[near], gaps[near], opened[near], missed)
+        return missed
+
+    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+        near = f"near {place_of(missed.where)}"
+        if missed.hollow:
+            does = f"recedes by {missed.length:.2g} between nodes that touch, {near}"
+        else:
+            does = f"goes {missed.length:.2g} into the body between its nodes, {near}"
+        felt = (
+            f"more than reactions push nodes in, {pushed:.2g}" if pushed else "and no node feels it"
+        )
+        return (
+            f"{contact.surface!r} {does}, {felt}: contact is asked for at nodes alone, and facets of size {missed.size:.2g} "
+            f"there do not see the surface, so that forces may be off by as much as they are large. Take facets of about "
+            f"{missed.needed:.1g} there, unless this is but a first touch that later steps leave behind."
+        )
+
+
+def _within(
+    contact: Contact,
+    facets: Facets,
+    x: np.ndarray,
+    gaps: np.ndarray,
+    opened: np.ndarray | None,
+    missed: Missed,
+) -> Missed:
+    """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
+    half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
+    rule = 2.0 * gauss(facets.dim) - 1.0
+    for _ in range(CLOSER):
+        rows, touch = np.arange(len(x)), opened.max(axis=1)[:, None]
+        at = np.clip(centre + half * rule, 0.0, 1.0)
+        shapes = facets.shapes(at)
+        points = shapes @ x
+        there = contact.surface.distances(points)
+        bulge = np.einsum("mqk,mk->mq", shapes, gaps) - there
+        bulge[np.isinf(there)] = 0.0
+        above = np.einsum("mqk,mk->mq", shapes, opened)
+        hollow = np.where(touch < -TOUCHING * bulge, -bulge, 0.0)
+        sunk = bulge - np.maximum(above, 0.0)
+        own = np.abs(bulge) > ROUND * np.abs(facets.sag(facets.hats(at)))
+        lengths = np.where(own, np.maximum(sunk, hollow), 0.0)
+        k = lengths.argmax(axis=1)
+        lengths, of_all = lengths[rows, k], np.abs(bulge[rows, k])
+        part = np.divide(lengths, of_all, np.zeros(len(x)), where=of_all > 0)
+        needed = facets.size * np.sqrt(part) / 8
+        receding = hollow[rows, k] > sunk[rows, k]
+        missed = missed.or_more(lengths, points[rows, k], facets.size, needed, receding)
+        depth = bulge - above
+        some = np.argsort(-depth.max(axis=1), kind="stable")[:DEEPEST]
+        centre, half = at[some, depth[some].argmax(axis=1)][:, None], half * FACTOR
+        facets, x, gaps, opened = facets.some(some), x[some], gaps[some], opened[some]
+    return missed
+
+
+def _positions(contact: Contact, facets: Facets, u: np.ndarray) -> np.ndarray:
+    """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
+    return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
+
+
+class Slopes(Check):
+    """Of a wavy face that is steep where nodes press on it, whose reactions are along the plane's normal."""
+
+    def __init__(self, contact: Contact):
+        self._contact = contact
+
+    def run(self, step: CheckedStep) -> str | None:
+        contact, u = self._contact, step.u
+        length, force = ALONG * step.body.extent, contact.reaction[:, -1]
+        (_, x), squares = contact.placement.ended_at(u), np.zeros(len(force))
+        with raised_together(contact.comm):
+            for along in contact.frame[:-1]:
+                ends = [
+                    contact.surface.distances(x + side * length * along) for side in (1.0, -1.0)
+                ]
+                with np.errstate(invalid="ignore"):  # infinite where it has none
+                    slopes = (ends[0] - ends[1]) / (2.0 * length)
+                squares += np.square(np.where(np.isfinite(slopes), slopes, 0.0))
+        sizes = np.array([squares @ force**2, force @ force])
+        turned, pressing = np.sqrt(contact.comm.allreduce(sizes))
+        if not turned > SLOPES * pressing:
+            return None
+        return (
+            f"the height of {contact.surface!r} slopes by {turned / pressing:.2g} where nodes press on it, and its normal stays that of the plane: "
+            "reactions have the wrong direction by that part. Take a dc.RigidSurface, whose distance is that from the face."
+        )
