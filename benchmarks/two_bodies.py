@@ -27,7 +27,7 @@ from dolfinx import fem, mesh
 
 from benchmarks.measurement import commit, now, timed
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.contact.mortar_points import MortarPlacement
+from dolfinx_contact.contact.mortar_points import MortarGeometry
 from mechanics.material import elasticity
 from mechanics.two_blocks import pair
 
@@ -71,10 +71,10 @@ class Projections:
         self._seconds, self._count, self._placed, self._last = (
             0.0,
             0,
-            MortarPlacement.projected,
+            MortarGeometry.projected,
             None,
         )
-        MortarPlacement.projected = lambda *given: self._timed(*given)
+        MortarGeometry.projected = lambda *given: self._timed(*given)
 
     def _timed(self, *given):
         seconds, found = timed(self._placed, *given)

@@ -17,8 +17,8 @@ from dolfinx_contact.step.load_step import LoadStep, Monitor, Stamps, new_stamp
 if TYPE_CHECKING:
     from dolfinx_contact.accepted import Accepted
     from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.contact.interface import NodalStiffness
-    from dolfinx_contact.contact.placement import Placed
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
@@ -97,7 +97,7 @@ class StepMaker:
         )
 
     def _in_step(
-        self, body: Any, assembled: int, frames: Sequence[Placed], turned: bool, begins: bool
+        self, body: Any, assembled: int, frames: Sequence[Frames], turned: bool, begins: bool
     ) -> list[ContactStep]:
         """The contacts as the step has them, and notes of what is another one than in the last: stiffness, rows, laws.  Collective."""
         old = self._stamps
@@ -153,7 +153,7 @@ def _predicted(problem: ContactProblem, last: Accepted, b: np.ndarray) -> np.nda
     None where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts.
     """
     body = problem.body
-    sliding = [c for c in problem.contacts if c.surface.deformable and c.changes and not c.history.empty]  # fmt: skip
+    sliding = [c for c in problem.contacts if c.geometry.renews_rows and not c.history.empty]  # fmt: skip
     if not sliding or body.nonlinear or body.loose is not None:
         return None
     known = last.free_state
@@ -169,7 +169,7 @@ def _predicted(problem: ContactProblem, last: Accepted, b: np.ndarray) -> np.nda
         x = last.x + more
         if not exact:  # six digits
             x += body.solve(load - body.multiply(more), rough=True)
-    slid = body.largest(np.array([c.placement.slid(x - last.x, c.history) for c in sliding]))
+    slid = body.largest(np.array([c.geometry.slid(x - last.x, c.history) for c in sliding]))
     if slid < problem.geometry_tol or body.farthest(x - last.x) > FARTHER * body.farthest(given):
         return None
     return x

@@ -17,8 +17,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.input import check_meshes, derivative_of
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.contact_step import frames_of, meet_supports
-from dolfinx_contact.contact.interface import components
+from dolfinx_contact.contact.contact_step import components, frames_of, meet_supports
 from dolfinx_contact.petsc.linear_solver import CROWDED, LARGE
 from dolfinx_contact.solvers.base import Solver
 from dolfinx_contact.support.attributes import surfaces_of
@@ -31,12 +30,11 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from dolfinx_contact.contact.displacements import Displacements
+    from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.contact.interface import ContactPoints
-    from dolfinx_contact.contact.placement import Placed
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.solvers.base import Solver
 
-DEEP = 0.1  # part of a body that may lie on the other side of a plane at the start
 
 # What to do where a motion of a body that contact alone holds is undetermined.
 UNDETERMINED = ("refused", "nearest")
@@ -84,15 +82,14 @@ def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
 def check_sides(contacts: Sequence[Contact]) -> None:
     """Raise a ``ValueError`` if a node that carries unknowns of one contact is opposite to another one's.  On this rank alone."""
     for contact in contacts:
-        if not contact.surface.deformable:
-            continue
         for other in contacts:
             if np.isin(contact.opposite, other.nodes).any():
                 raise ValueError(
                     "a node of a contact is on the deformable surface of another one, or of its own: every node is slave or master. "
                     "Swap the sides of one of them, or leave out facets."
                 )
-            if other is not contact and np.isin(other.nodes, contact.nodes).any():
+            apart = other is contact or contact.geometry.shares_nodes
+            if not apart and np.isin(other.nodes, contact.nodes).any():
                 raise ValueError(
                     "nodes of a contact with a deformable surface belong to another contact, too: take the facets out of one."
                 )
@@ -342,9 +339,9 @@ def frames_of_step(
     body: ElasticBody,
     start: np.ndarray,
     at: np.ndarray | None,
-    before: Sequence[Placed | None],
+    before: Sequence[Frames | None],
     known: list,
-) -> tuple[list[Placed], bool]:
+) -> tuple[list[Frames], bool]:
     """Frames and gaps of contacts for a step, and whether rows are others.  Collective.
 
     Args:
@@ -366,38 +363,11 @@ def frames_of_step(
 
 
 def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
-    """Warn of planes whose normal shows away from the body, and of bodies that start deep inside one.  Collective."""
+    """Warn of surfaces that make no sense where the undeformed body stands.  Collective."""
     for contact in contacts:
-        if contact.surface.deformable:
-            _check_through(contact, body)
-            continue
-        surface, gdim = contact.surface, contact.points.dim
-        x = body.displacements.x[:, :gdim]
-        with raised_together(body.comm):
-            height = surface.distance(surface.relative(x))
-        highest, deepest = (body.highest(values) for values in (height, -height))
-        inside = body.largest(-contact.present.gap)
-        if highest < DEEP * deepest:
-            said = f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
-        elif inside > DEEP * body.extent:
-            said = f"the body starts {inside:.3g} deep inside {surface}, more than a tenth of its size: check point and normal, or move the plane by surface.displacement step by step"  # fmt: skip
-        else:
-            continue
-        warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
-
-
-def _check_through(contact: Contact, body: ElasticBody) -> None:
-    """Refuse two sides of one part of the mesh that would be pressed together through it.  Collective."""
-    part, parts = body.parts
-    sides = contact.nodes, contact.placement.opposite
-    here = body.total([np.bincount(part[nodes], minlength=parts) for nodes in sides])
-    depth = contact.placement.depth(contact.history.frames)
-    depth = body.largest(np.array([depth]))
-    if (here > 0).all(axis=0).any() and depth > 1.0:
-        raise ValueError(
-            f"both sides of {contact!r} belong to one part of the mesh, and stand inside each other by {depth:.3g} times the smallest facet, "
-            "like its head and its foot: the gap would be closed through the body. Name facets that face each other."
-        )
+        said = contact.geometry.check_start(contact, body)
+        if said:
+            warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
 
 
 def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:

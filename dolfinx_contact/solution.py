@@ -74,7 +74,7 @@ def _levels(problem: ContactProblem, step: LoadStep) -> list:
 
 def _digits_later(problem: ContactProblem) -> bool:
     """Whether the step is solved to as many digits as its geometry needs first: all digits take cycles of multigrid."""
-    renewed = any(c.surface.deformable and c.changes for c in problem.contacts)
+    renewed = any(c.geometry.renews_rows for c in problem.contacts)
     return renewed and not (problem.body.exact or problem.body.nonlinear)
 
 

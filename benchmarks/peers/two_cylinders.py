@@ -89,7 +89,7 @@ def told(problem) -> dict:
     far = np.flatnonzero(np.isclose(np.abs(x).max(axis=1), demo.L))
     young = [2 * G * (1 + nu) for G, nu in zip(demo.SHEAR, demo.NU)]
     return dict(
-        x=x, cells=cells, above=above, near=np.union1d(contact.nodes, contact.placement.opposite),
+        x=x, cells=cells, above=above, near=np.union1d(contact.nodes, contact.geometry.opposite),
         far=far, mu=demo.MU, programme=np.array(PROGRAMME),
         young=young, poisson=demo.NU, r=np.mean(young) / demo.A,
     )  # fmt: skip

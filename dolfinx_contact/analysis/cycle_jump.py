@@ -391,7 +391,7 @@ def _is_record(record: Any) -> bool:
         and np.isfinite([record["next"], *(number for row in rows for number in row)]).all()
         and record["next"] >= SHORTEST
         and len(errors) == 3
-        and min(errors) >= 0.0
+        and all(error >= 0.0 for error in errors)
         and at < len(rows)
         and np.array_equal(np.cumsum([row[3] for row in rows]), [row[2] for row in rows])
         and counts[0] == rows[-1][2]
@@ -479,5 +479,5 @@ def _sums(contact: Contact) -> dict[str, np.ndarray]:
 def _take_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
     """Let the next step start from other ``sums``, none of them negative.  Collective where a deformable surface wears."""
     sums = contact.history.sums | {name: frozen(of) for name, of in sums.items()}
-    worn = contact.placement.everywhere(sums[OPPOSITE]) if OPPOSITE in sums else None
+    worn = contact.geometry.everywhere(sums[OPPOSITE]) if OPPOSITE in sums else None
     contact.go_back(contact.history.but(sums=sums, worn=worn))

@@ -231,7 +231,7 @@ class Slopes(Check):
     def run(self, step: CheckedStep) -> str | None:
         contact, u = self._contact, step.u
         length, force = ALONG * step.body.extent, contact.reaction[:, -1]
-        (_, x), squares = contact.placement.ended_at(u), np.zeros(len(force))
+        (_, x), squares = contact.geometry.ended_at(u), np.zeros(len(force))
         with raised_together(contact.comm):
             for along in contact.frame[:-1]:
                 ends = [

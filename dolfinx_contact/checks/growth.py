@@ -120,7 +120,7 @@ def _moved(contact: Contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.nda
     """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
     if not contact.surface.curved or contact.surface.deformable:
         return contact.points.motion(motions), contact.present.gap
-    surface, there = contact.placement.ended_at(u)
+    surface, there = contact.geometry.ended_at(u)
     y = surface.relative(there)
     frames = surface.turned(surface.frames(y))
     return frames @ motions[contact.points.dofs], surface.distance(y) + contact.opening

@@ -28,7 +28,7 @@ class Strayed(_OfContact):
 
     def run(self, step: CheckedStep) -> str | None:
         contact = self._contact
-        slid, most = max(contact.comm.allgather(contact.placement.strayed(contact.present)))
+        slid, most = max(contact.comm.allgather(contact.geometry.strayed(contact.present)))
         if slid <= most:
             return None
         return (
@@ -44,7 +44,7 @@ class BetterSlave(_OfContact):
 
     def run(self, step: CheckedStep) -> str | None:
         contact = self._contact
-        found = contact.placement.sides(contact.present, contact.points)
+        found = contact.geometry.sides(contact.present, contact.points)
         if found is None:
             return None
         size, stiff = found
@@ -63,7 +63,7 @@ class HeldAlong(_OfContact):
     def run(self, step: CheckedStep) -> str | None:
         body, contact = step.body, self._contact
         force = contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
-        without = contact.placement.clamped(body.fixed, contact.history.frames)
+        without = contact.geometry.clamped(body.fixed, contact.history.frames)
         carried, lost, count = body.total([force.sum(), force[without].sum(), without.sum()])
         if lost > LOST * carried:
             return (

@@ -28,7 +28,7 @@ from dolfinx_contact.contact.input import (
 )
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.laws import Laws
-from dolfinx_contact.contact.placement import Placed, Placement
+from dolfinx_contact.contact.rigid import RigidGeometry
 from dolfinx_contact.contact.state import OPPOSITE, History, State, frozen_state
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.support.attributes import Guarded, frozen
@@ -39,6 +39,7 @@ from dolfinx_contact.surfaces.surface import Surface
 if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # before 0.6 it has another name
 
+    from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.law.wear import Wear
 
 
@@ -112,14 +113,15 @@ class Contact(Guarded):
         with raised_together(mesh.comm):
             surface.check_at(surface.relative(x))
         extent = mesh.comm.allreduce(np.abs(mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
+        given = surface, x, dofs, extent, mesh.comm
         if surface.deformable:
-            from dolfinx_contact.contact.mortar_points import MortarPlacement
+            from dolfinx_contact.contact.mortar_points import MortarGeometry
 
-            self.placement = MortarPlacement(self, facets, self.displacements.owned, extent)
+            self.geometry = MortarGeometry(*given, contact=self, facets=facets)
         else:
-            self.placement = Placement(surface, x, dofs, self.points_in, extent, mesh.comm)
+            self.geometry = RigidGeometry(*given, points_in=self.points_in)
         self.laws = Laws()
-        self._begin(self.placement.standing(surface.varies))
+        self._begin(self.geometry.standing(surface.varies))
         self.laws.assign(self, friction, empty=True)
         self.wear = wear
         self.laws.check(self)
@@ -188,8 +190,7 @@ class Contact(Guarded):
     @property
     def changes(self) -> bool:
         """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
-        changes = self.placement.changes(self.history)
-        return changes or (self.laws.textured and not self.surface.deformable)
+        return self.geometry.changes(self.history, self.laws.textured)
 
     @property
     def slip_before_touching(self) -> np.ndarray:
@@ -215,12 +216,12 @@ class Contact(Guarded):
     def reset(self) -> None:
         """Clear the history: undeformed, unworn body, no reactions, the surface in its present position."""
         frames, moves = self.history.frames, wanders(self)
-        if self.placement.follows(moves, self.history):
-            frames = self.placement.standing(moves, frames)
+        if self.geometry.follows(moves, self.history):
+            frames = self.geometry.standing(moves, frames)
         self._begin(frames)
 
-    def _begin(self, frames: Placed) -> None:
-        self.go_back(History.of(self.placement.at_rest(frames), frames))
+    def _begin(self, frames: Frames) -> None:
+        self.go_back(History.of(self.geometry.at_rest(frames), frames))
 
     def go_back(self, history: History) -> None:
         """Let this be the history; of a law of fields the numbers go along."""
@@ -299,7 +300,7 @@ class Contact(Guarded):
     @property
     def opening(self) -> np.ndarray:
         """Depth by which wear of both sides opens the gap at each node, ``shape=(n,)``."""
-        return self.placement.opening(self.points, self.history)
+        return self.geometry.opening(self.points, self.history)
 
     @property
     def slip_kept(self) -> np.ndarray:
@@ -356,14 +357,8 @@ class Contact(Guarded):
             ValueError: a deformable surface without ``u``, which contacts know relative to the other body alone.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
-        if not self.surface.deformable:
-            arms = self.placement.arms(self.displacement, self.history.frames)
-        elif u is None:
-            raise ValueError(
-                "contact.moment on a deformable surface needs the displacement: contact.moment(problem.u)."
-            )
-        else:
-            _, arms = self.placement.ended_at(u.x.array)
+        x = None if u is None else u.x.array
+        arms = self.geometry.arms(self.displacement, self.history.frames, x)
         if arms.shape[1] == 2:
             moments = (arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]).sum(axis=0)
         else:
@@ -377,8 +372,7 @@ class Contact(Guarded):
         The integral of the node's shape function times ``weight`` over the facets, projected on the surface; facets facing away
         do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
         """
-        whole = self.whole_area
-        return frozen(whole * self.covered) if self.surface.deformable else whole
+        return frozen(self.whole_area * self.covered)
 
     @property
     def whole_area(self) -> np.ndarray:
@@ -401,12 +395,12 @@ class Contact(Guarded):
     @property
     def opposite(self) -> np.ndarray:
         """Local indices of this rank's nodes on the deformable surface, none on rigid ones, ``shape=(k,)``."""
-        return self.placement.opposite
+        return self.geometry.opposite
 
     @property
     def covered(self) -> np.ndarray:
         """Part of each node's area that is opposite a deformable surface, ``shape=(n,)``; one on rigid ones."""
-        return self.placement.covered(self.history.frames)
+        return self.geometry.covered(self.history.frames)
 
     @property
     def pressure(self) -> np.ndarray:

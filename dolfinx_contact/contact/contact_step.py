@@ -2,19 +2,21 @@
 # SPDX-License-Identifier: MIT
 """A contact in one load step: what follows at its nodes from a displacement of the body.
 
-Kinematics is affine in a step: frames, gaps and ways along the surface were taken for one position, see ``placement.py``.  Surfaces
+Kinematics is affine in a step: frames, gaps and ways along the surface were taken for one position, see ``geometry.py``.  Surfaces
 that force drives move by further unknowns ``c``, see ``surfaces/driven.py``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
 
-from dolfinx_contact.contact.placement import Placed, carried
+from dolfinx_contact.contact.geometry import Frames, carried
 from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status, frozen_state
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction
@@ -24,7 +26,6 @@ from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross
 
 if TYPE_CHECKING:
-    from mpi4py import MPI
     from petsc4py import PETSc
 
     from dolfinx_contact.contact.contact import Contact
@@ -56,7 +57,7 @@ class ContactStep:
     """
 
     given: Contact
-    frames: Placed
+    frames: Frames
     friction: Friction
     law: ContactLaw
     last: State
@@ -76,7 +77,7 @@ class ContactStep:
 
     def where_it_stands(self) -> ContactStep:
         """The same with the surface where it stands now."""
-        return self.but(moved=self.given.placement.surface_moved(self.frames))
+        return self.but(moved=self.given.geometry.surface_moved(self.frames))
 
     def with_friction(self, friction: Friction) -> ContactStep:
         """The same with another law."""
@@ -171,7 +172,7 @@ class ContactStep:
         surface, motion = self.surface, self.points.motion(u)
         lengths = (surface.point, surface.displacement, motion)
         largest = max(np.abs(length).max(initial=0.0) for length in lengths)
-        return self.given.placement.gap_rounding_of(largest)
+        return self.given.geometry.gap_rounding_of(largest)
 
     def motion_rounding(self, u: np.ndarray, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
@@ -179,7 +180,7 @@ class ContactStep:
         That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
         """
         terms = self.points.magnitudes(u) + np.abs(self.moved)
-        x, point = self.given.placement.x, self.surface.point
+        x, point = self.given.geometry.x, self.surface.point
         coordinates = max(np.abs(a).max(initial=0.0) for a in (x, point))
         gap = terms[:, -1] + coordinates + self.opening
         slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
@@ -286,7 +287,7 @@ class ContactStep:
     def with_slip_past_edges(self, state: State, u: np.ndarray) -> State:
         """A state in which nodes that have left what was opposite have slipped past its edge.  Collective between bodies."""
         given = self.given
-        found = given.placement.slip_past_edge(u, self.frames, given.history)
+        found = given.geometry.slip_past_edge(u, self.frames, given.history)
         if found is None:
             return state
         left, slip = found
@@ -295,10 +296,10 @@ class ContactStep:
     def with_own_gaps(self, state: State, u: np.ndarray) -> State:
         """A state whose open nodes on a deformable surface have the gaps of a displacement, not of the rows that a step used.  Collective."""
         given = self.given
-        if not (self.surface.deformable and given.changes):
+        if not given.geometry.renews_rows:
             return state
-        gap, points = given.placement.gap_at(u, self.frames)
-        gap = gap + given.placement.opening(points, given.history, self.depth)
+        gap, points = given.geometry.gap_at(u, self.frames)
+        gap = gap + given.geometry.opening(points, given.history, self.depth)
         return state._replace(gap=np.where(state.reaction[:, -1] > 0.0, state.gap, gap))
 
     def ended(self, state: State, u: np.ndarray | None = None) -> History:
@@ -308,22 +309,22 @@ class ContactStep:
             state: The state.
             u: Its displacement, owned degrees of freedom; needed between bodies.
         """
-        given, placement, frames = self.given, self.given.placement, self.frames
+        geometry, frames = self.given.geometry, self.frames
         if self.surface.spin is not None:
-            turned = placement.turned_past(state.displacement, frames)
+            turned = geometry.turned_past(state.displacement, frames)
             state = state._replace(displacement=turned)
         state = frozen_state(state)
         sums, worn, doubtful, unloads = self._summed(state)
         bare = None
-        if self.surface.deformable and u is not None and given.changes:
-            bare = placement.gap_at(u, frames)[1].alone
-        ended = placement.ended(frames)
+        if geometry.renews_rows and u is not None:
+            bare = geometry.gap_at(u, frames)[1].alone
+        ended = geometry.ended(frames)
         return History(state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads)  # fmt: skip
 
     def _summed(self, state: State) -> tuple:
         """Sums, depths of the other side, doubtful work, and what unloads nodes, of ``History``.  Collective where the other side wears."""
         given, friction = self.given, self.friction
-        history, repeats, covered = given.history, given.repeats, given.placement.covered
+        history, repeats, covered = given.history, given.repeats, given.geometry.covered
         slip = history.slip_kept + state.slip_increment
         sticks = (friction.mu.any(axis=-1) & (state.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
@@ -343,7 +344,7 @@ class ContactStep:
             depth, added["wear_depth"], more = worn_by(self, work)
             if more is not None:
                 sums[OPPOSITE] = sums.get(OPPOSITE, 0.0) + more
-                worn = given.placement.everywhere(sums[OPPOSITE])
+                worn = given.geometry.everywhere(sums[OPPOSITE])
         sums |= {name: sums[name] + part for name, part in added.items()}
         turns = self.points.dim == 3 and (friction.mu.ndim > 1 or not friction.isotropic)
         doubtful = float(np.abs(turned.sum(axis=1)).sum()) if turns else None
@@ -424,7 +425,7 @@ class ContactStep:
 def step_of(
     contact: Contact,
     stiffness: NodalStiffness | None = None,
-    frames: Placed | None = None,
+    frames: Frames | None = None,
     begins: bool = False,
 ) -> ContactStep:
     """The contact as a step has it that begins at its last state, where the surface stands.  Collective on deformable surfaces.
@@ -435,14 +436,14 @@ def step_of(
         frames: Of the step; None are those of the last one.
         begins: Whether fields get their present values.  Collective.
     """
-    placement, laws, history = contact.placement, contact.laws, contact.history
+    geometry, laws, history = contact.geometry, contact.laws, contact.history
     frames = history.frames if frames is None else frames
     friction, begun = laws.at_start(contact, frames) if begins else (laws.friction, None)
     same = friction is laws.friction
     law = laws.kernel if same else friction.law(contact.displacements.dim)
-    last, moved = placement.last_in(frames, history), placement.surface_moved(frames)
-    given = frames, friction, law, last, moved, placement.opening(frames.points, history)
-    return ContactStep(contact, *given, placement.clear, stiffness, begun=begun)
+    last, moved = geometry.last_in(frames, history), geometry.surface_moved(frames)
+    given = frames, friction, law, last, moved, geometry.opening(frames.points, history)
+    return ContactStep(contact, *given, geometry.clear, stiffness, begun=begun)
 
 
 def wanders(contact: Contact) -> bool:
@@ -451,22 +452,22 @@ def wanders(contact: Contact) -> bool:
 
 
 def frames_of(
-    contact: Contact, start: np.ndarray, at: np.ndarray | None = None, before: Placed | None = None
-) -> Placed:
-    """Frames and gaps of a step, where the surface is at present, see ``Placement.following``.  Collective."""
-    history, placement = contact.history, contact.placement
+    contact: Contact, start: np.ndarray, at: np.ndarray | None = None, before: Frames | None = None
+) -> Frames:
+    """Frames and gaps of a step, where the surface is at present, see ``Geometry.following``.  Collective."""
+    history, geometry = contact.history, contact.geometry
     moves = wanders(contact)
-    if not placement.follows(moves, history):
+    if not geometry.follows(moves, history):
         return history.frames
-    return placement.following(start, at, moves, history, before)
+    return geometry.following(start, at, moves, history, before)
 
 
 def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
     """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
-    history, placement = contact.history, contact.placement
-    frames = placement.met(fixed, history.frames)
+    history, geometry = contact.history, contact.geometry
+    frames = geometry.met(fixed, history.frames)
     if frames is not history.frames:
-        last = placement.turned(frames, history, contact.opening)
+        last = geometry.turned(frames, history, contact.opening)
         contact.go_back(history.but(last=last, frames=frames))
 
 
@@ -493,3 +494,11 @@ def nodal_stiffness(
                 "external work) and the moduli."
             )
     return stiffness
+
+
+def components(contacts: Sequence[ContactStep]) -> int:
+    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
+    smooth = all(contact.friction.frictionless for contact in contacts)
+    if contacts[0].comm.allreduce(smooth, op=MPI.LAND):
+        return 1
+    return contacts[0].points.dim

@@ -74,8 +74,8 @@ class SurfaceMeasure:
         if self._whole is None:
             surface, x = contact.surface, contact.x[:, : contact.points.dim]
             turn = none = np.eye(x.shape[1])
-            if not (surface.curved or surface.deformable):
-                arms = contact.placement.arms(contact.displacement, contact.history.frames)
+            if not surface.curved:
+                arms = contact.geometry.arms(contact.displacement, contact.history.frames)
                 turn = turn_of_nodes(x, arms, contact.comm)
             if np.abs(turn - none).max() <= TILTED:
                 turn = none
@@ -95,7 +95,7 @@ class SurfaceMeasure:
 
     def renew(self, contact: Contact) -> None:
         """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""
-        if self._whole is None or contact.surface.curved or contact.surface.deformable:
+        if self._whole is None or contact.surface.curved:
             return
         if np.abs(contact.surface.rotation - self._seen_from).max() > TILTED:
             self._whole = None

@@ -18,7 +18,7 @@ from dolfinx_contact.support.checks import finite, place
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
-    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.contact.geometry import Frames
 
 # Part of a direction that has to lie in the plane.
 ALONG = 1e-8
@@ -40,7 +40,7 @@ def on_nodes(
     contact: Contact,
     friction: Friction,
     state: dict[str, np.ndarray],
-    frames: Placed,
+    frames: Frames,
     axes: Any = None,
 ) -> Friction:
     """The law with coefficients and axes for each owned node of a contact.
@@ -133,7 +133,7 @@ def directions(contact: Contact, friction: Friction) -> np.ndarray:
     return (values / np.linalg.norm(values, axis=0)).T.copy()
 
 
-def _axes(contact: Contact, friction: Friction, frames: Placed):
+def _axes(contact: Contact, friction: Friction, frames: Frames):
     if not is_field(friction.given()["axes"]):
         return friction.given()["axes"]
     frame = frames.own if friction.of == "surface" else frames.frame
@@ -162,8 +162,7 @@ def axes_at(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
-    if contact.surface.deformable:
-        values = contact.placement.directions(values, of, points)
+    values = contact.geometry.directions(values, of, points)
     if len(values) == 2:
         along = values
     elif contact.surface.curved:

@@ -5,17 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact.support.checks import STILL
-
-if TYPE_CHECKING:
-    from dolfinx_contact.contact.contact_step import ContactStep
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
 FREE = 1e-12
@@ -291,11 +287,3 @@ def add_to(K: PETSc.Mat, values: sparse.csr_matrix) -> None:
         columns = values.indices[part].astype(PETSc.IntType)
         K.setValues([first + row], columns, values.data[part], addv=PETSc.InsertMode.ADD_VALUES)
     K.assemble()
-
-
-def components(contacts: Sequence[ContactStep]) -> int:
-    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
-    smooth = all(contact.friction.frictionless for contact in contacts)
-    if contacts[0].comm.allreduce(smooth, op=MPI.LAND):
-        return 1
-    return contacts[0].points.dim

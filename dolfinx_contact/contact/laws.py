@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dolfinx_contact.contact.geometry import times
 from dolfinx_contact.contact.input import check_coefficients, check_law, check_wear, warn_of_percent
-from dolfinx_contact.contact.placement import times
 from dolfinx_contact.law.friction import Friction, as_friction, at_most_rough, is_field
 from dolfinx_contact.support.collective import agree, raised_together
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.contact_step import ContactStep
-    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.law.wear import Wear
     from dolfinx_contact.surfaces.surface import Surface
 
@@ -79,7 +79,7 @@ class Laws:
         empty: bool = False,
         axes: Any = None,
         pressure: np.ndarray | None = None,
-        frames: Placed | None = None,
+        frames: Frames | None = None,
     ) -> Friction:
         """A law of fields at the nodes in some frames: of the present state, or as before anything has touched if ``empty``.  Collective."""
         frames = contact.history.frames if frames is None else frames
@@ -134,13 +134,13 @@ class Laws:
             points: Rows there, of a deformable surface.
         """
         contact, friction = used.given, used.friction
-        axes, deformable = friction.axes, contact.surface.deformable
-        if not (self.textured or deformable) or friction.isotropic or used.points.dim == 2:
+        axes, both = friction.axes, contact.geometry.renews_rows
+        if not (self.textured or both) or friction.isotropic or used.points.dim == 2:
             return 0.0
         new = axes
         if self._axes_vary:
             new = _fields().axes_at(contact, self._field, at, frame, points)
-        if deformable:  # their frames turn as well
+        if both:  # their frames turn as well
             old = used.frames.frame
             new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
             new = times(old[:, :2], np.einsum("ni,nij->nj", new, frame[:, :2]))
@@ -153,7 +153,7 @@ class Laws:
         """Whether friction follows the pressure at the end of the step."""
         return self._field is not None and "pressure" in _fields().followed(self._field)
 
-    def at_start(self, contact: Contact, frames: Placed) -> tuple[Friction, Friction | None]:
+    def at_start(self, contact: Contact, frames: Frames) -> tuple[Friction, Friction | None]:
         """The law with which a step begins in some frames, and that itself where it follows the state; else None.  Collective."""
         if self._field is None:
             return self.friction, None
@@ -162,7 +162,7 @@ class Laws:
         return friction, friction if _fields().followed(self._field) else None
 
     def under(
-        self, contact: Contact, pressure: np.ndarray, before: Friction, frames: Placed
+        self, contact: Contact, pressure: np.ndarray, before: Friction, frames: Frames
     ) -> Friction:
         """The law of other pressures, ``shape=(n,)``, with the axes of the one before, or that itself if nothing changes.  Collective."""
         if not self.follow_pressure:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -22,6 +22,14 @@ from scipy.spatial.transform import Rotation
 from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import nearest_rotation
+from dolfinx_contact.contact.geometry import (
+    CLEAR,
+    Frames,
+    NodalGeometry,
+    carried,
+    times,
+    turned_back,
+)
 from dolfinx_contact.contact.interface import (
     FREE,
     ContactPoints,
@@ -30,14 +38,16 @@ from dolfinx_contact.contact.interface import (
     nodal_blocks,
 )
 from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
-from dolfinx_contact.contact.placement import CLEAR, Placed, Placement, carried, times, turned_back
+from dolfinx_contact.contact.rigid import LONGEST
 from dolfinx_contact.contact.state import History, State
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import frames_along
 
 if TYPE_CHECKING:
+    from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.displacements import Displacements
 
 STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
@@ -45,17 +55,20 @@ STRAYED = 0.5  # part of a facet by which a slave node may slide with the coeffi
 LEAVES = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
 
 
-class MortarPlacement(Placement):
+class MortarGeometry(NodalGeometry):
     """Frames, gaps and motions of the slave nodes of a contact relative to the opposite mesh.
 
     In a step they are linear in the displacement, with the coefficients of one state: the undeformed one if sliding is small;
     else the last one for which ``geometry_error`` was too large, see ``lagged/end_geometry.py``.
     """
 
-    def __init__(self, contact: Contact, facets: np.ndarray, owned: tuple, extent: float):
+    shares_nodes = False
+
+    def __init__(self, *given: Any, contact: Contact, facets: np.ndarray):
+        super().__init__(*given)
         of, nodes, comm = contact.displacements, contact.nodes, contact.comm
         self._slave = Skin(of, facets, comm, contact.measure.density)
-        self._master = Skin(of, contact.surface.facets, comm)
+        self._master = Skin(of, self.surface.facets, comm)
         numbers = _numbers(of.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)
         self._slave.keep(self._mine)
@@ -65,18 +78,20 @@ class MortarPlacement(Placement):
         self._projected: tuple = (None, None)
         self._began: tuple = (None, None)
         self._planes: list = []  # directions and places along which supports hold nodes in one plane
-        self._owned = owned
-        super().__init__(
-            contact.surface, contact.x[:, : of.dim], of.dofs(nodes), contact.points_in, extent, comm
-        )
+        self._owned = of.owned
 
-    def standing(self, wanders: bool, before: Placed | None = None) -> Placed:
-        """See ``Placement``: where the undeformed bodies stand.  Collective."""
+    @property
+    def renews_rows(self) -> bool:
+        """See ``Geometry``."""
+        return self.surface.sliding == "large"
+
+    def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
+        """See ``Geometry``: where the undeformed bodies stand.  Collective."""
         found = self.projected(np.zeros(self._owned[0]))
         self._undeformed = found.frame
         return found
 
-    def projected(self, u: np.ndarray, left: np.ndarray | None = None) -> Placed:
+    def projected(self, u: np.ndarray, left: np.ndarray | None = None) -> Frames:
         """Frames, gaps and rows of the state with a displacement of owned degrees of freedom, without nodes that have left.  Collective."""
         left = np.zeros(len(self.x), dtype=bool) if left is None else left
         (known, found), key = self._projected, np.append(u, left)
@@ -102,7 +117,7 @@ class MortarPlacement(Placement):
         points.met, points.turns, points.sides = self._supported, turns, (moved, there)
         still = self.surface.rotation
         home, frames, flat, at = map(frozen, (home, frames, flat, u.view()))
-        found = Placed(
+        found = Frames(
             home, still, frames, frames, flat, points, None, None, still, at=at, left=left
         )
         self._projected = key, found
@@ -140,9 +155,14 @@ class MortarPlacement(Placement):
             lines[points.alone] = points.turns[1]
         return np.einsum("nij,jn->in", lines, given)
 
-    def twist(self, u: np.ndarray, start: np.ndarray) -> float:
-        """Radians by which one side has turned against the other since the start of the step.  Collective."""
-        return _between(*self._since(start, self._turns_at(u)))[2]
+    def too_long(self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None) -> tuple[float, str]:  # fmt: skip
+        """See ``Geometry``.  Collective."""
+        turned = 0.0
+        if last is not None:
+            turned = _between(*self._since(last, self._turns_at(u)))[2]
+        if turned <= LONGEST:
+            return 2.0, ""
+        return 0.0, f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST:g} is the most"  # fmt: skip
 
     def _turns_at(self, u: np.ndarray) -> list[np.ndarray]:
         """Rotations of both sides as a whole at a displacement.  Collective."""
@@ -158,7 +178,7 @@ class MortarPlacement(Placement):
             self._began = start, began
         return [new @ old.T for new, old in zip(turns, began)]
 
-    def _way(self, placed: Placed, start: np.ndarray) -> np.ndarray:
+    def _way(self, placed: Frames, start: np.ndarray) -> np.ndarray:
         """By what slip past what is opposite is more than its chord, ``shape=(n, gdim - 1)``, local frame.  Collective.
 
         What was apart by ``d`` at the start has slipped by it as both sides see it: turned by the half of what each has, and as long as
@@ -178,9 +198,9 @@ class MortarPlacement(Placement):
         at: np.ndarray | None,
         wanders: bool,
         history: History,
-        before: Placed | None,
-    ) -> Placed:
-        """See ``Placement``; rows are those of the last step, or of where the step is likely to end, then of where it has ended."""
+        before: Frames | None,
+    ) -> Frames:
+        """See ``Geometry``; rows are those of the last step, or of where the step is likely to end, then of where it has ended."""
         none = np.zeros(len(self.x), dtype=bool)
         begun = history.frames._replace(start=start, left=none, renewed=-1, leaving=False)
         if at is None:
@@ -195,8 +215,8 @@ class MortarPlacement(Placement):
         way = frozen(self._way(found, start))
         return found._replace(start=start, left=left, renewed=renewed, leaving=leaving, way=way)
 
-    def last_in(self, frames: Placed, history: History) -> State:
-        """See ``Placement``; slip of the step is that of the material points which the new rows name.  Collective."""
+    def last_in(self, frames: Frames, history: History) -> State:
+        """See ``Geometry``; slip of the step is that of the material points which the new rows name.  Collective."""
         before, last = history.frames, history.last
         if frames.points is before.points:
             return last
@@ -207,9 +227,9 @@ class MortarPlacement(Placement):
         return last._replace(displacement=moved, reaction=turned, gap=gap)
 
     def slip_past_edge(
-        self, u: np.ndarray, frames: Placed, history: History
+        self, u: np.ndarray, frames: Frames, history: History
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """See ``Placement``: by the rows of the start."""
+        """See ``Geometry``: by the rows of the start."""
         if not frames.leaving:
             return None
         before, alone = history.frames, frames.points.alone
@@ -219,40 +239,53 @@ class MortarPlacement(Placement):
         frames.points.without_held(slip)
         return alone & ~before.points.alone, slip
 
-    def saved_at(self, at: np.ndarray | None, before: Placed) -> Placed:
-        """See ``Placement``: rows of a displacement that was saved."""
+    def saved_at(self, at: np.ndarray | None, before: Frames) -> Frames:
+        """See ``Geometry``: rows of a displacement that was saved."""
         return self.projected(np.zeros(self._owned[0]) if at is None else at)
 
-    def end_of(self, frames: Placed, state: State, u: np.ndarray) -> Ended:
-        """What a state would be with the rows of its own displacement ``u``, owned degrees of freedom.  Collective."""
+    def missed(self, contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray) -> tuple:
+        """See ``Geometry``; forces of the nodes of both sides, too, in the place of normals, with the rows of ``u`` itself."""
+        from dolfinx_contact.contact.end import dragged, pressed
+
+        frames, given = contact.frames, contact.given
         start, there = frames.start, self.projected(u, frames.left)
+        alone = there.points.alone
         slip, used = (of.points.motion(u - start) for of in (there, frames))
         slip[:, :-1] += self._way(there, start)
         used[:, :-1] += 0.0 if frames.way is None else frames.way
         slip[:, -1] = used[:, -1] = 0.0
-        missed = times(frames.frame, turned_back(there.frame, slip)) - used
+        slip = times(frames.frame, turned_back(there.frame, slip)) - used
         reaction = carried(state.reaction, frames.frame, there.frame)
-        reaction[there.points.alone] = 0.0
+        reaction[alone] = 0.0
         forces = np.zeros(self._owned[0])
         there.points.add_forces(reaction, forces)
         frames.points.add_forces(-state.reaction, forces)
+        forces[fixed] = 0.0
         gap = there.flat + there.points.motion(u)[:, -1]
-        return Ended(
-            gap, missed[:, :-1], forces, there.home, there.frame, there.points.alone, there.points
+        gap += self.opening(there.points, given.history, contact.depth)
+        with raised_together(contact.comm):  # the user's functions
+            angle = given.laws.turned(contact, there.home, there.frame, there.points)
+        turned = np.linalg.norm(state.reaction[:, :-1], axis=1) * angle
+        turned[alone] = 0.0
+        came = contact.points.alone & ~alone  # opposite something at the end alone
+        return (
+            pressed(contact, state, gap, contact.points.closed & ~came),
+            np.append(forces, turned),
+            dragged(contact, state, slip[:, :-1]),
         )
 
     def everywhere(self, worn: np.ndarray) -> np.ndarray:
-        """See ``Placement``.  Collective."""
+        """See ``Geometry``.  Collective."""
         return self._master.everywhere(worn[:, None])[:, 0]
 
     def opened(self, points: MortarPoints, worn: np.ndarray | None) -> np.ndarray | None:
-        """See ``Placement``."""
+        """See ``Geometry``."""
         return None if worn is None else points.m @ worn
 
     def taken(
-        self, volume: np.ndarray, area: np.ndarray, frames: Placed, history: History
+        self, volume: np.ndarray, area: np.ndarray, frames: Frames, history: History
     ) -> np.ndarray:
-        """See ``Placement``: node b loses ``sum_a m_ab V_a``, but no negative volume, the sum as it is.  Collective.
+        """See ``Geometry``: node b loses ``sum_a m_ab V_a``, but no negative volume, the sum as it is.  Collective.
 
         Vertices of triangles of second order, which have no area, are worn as the nodes beside them.
 
@@ -276,28 +309,37 @@ class MortarPlacement(Placement):
             np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
-    def gap_at(self, u: np.ndarray, frames: Placed) -> tuple[np.ndarray, MortarPoints]:
+    def gap_at(self, u: np.ndarray, frames: Frames) -> tuple[np.ndarray, MortarPoints]:
         """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length, and these; what is opposite nothing is open.  Collective."""
         there = self.projected(u, frames.left)
         gap = there.flat + there.points.motion(u)[:, -1]
         return np.where(there.points.alone, np.maximum(gap, self._apart), gap), there.points
 
-    def depth(self, frames: Placed) -> float:
-        """See ``Placement``."""
+    def check_start(self, contact: Contact, body: ElasticBody) -> str:
+        """See ``Geometry``: two sides of one part of the mesh that would be pressed together through it are refused."""
+        part, parts = body.parts
+        sides, frames = (contact.nodes, self.opposite), contact.history.frames
+        here = body.total([np.bincount(part[nodes], minlength=parts) for nodes in sides])
         lengths = np.append(-frames.flat[~frames.points.alone], 0.0)
-        return float(lengths.max()) / self._master.smallest
+        depth = body.largest(lengths) / self._master.smallest
+        if (here > 0).all(axis=0).any() and depth > 1.0:
+            raise ValueError(
+                f"both sides of {contact!r} belong to one part of the mesh, and stand inside each other by {depth:.3g} times the smallest facet, "
+                "like its head and its foot: the gap would be closed through the body. Name facets that face each other."
+            )
+        return ""
 
-    def changes(self, history: History) -> bool:
-        """See ``Placement``."""
-        return self.surface.sliding == "large"
+    def changes(self, history: History, textured: bool = False) -> bool:
+        """See ``Geometry``."""
+        return self.renews_rows
 
     @property
     def opposite(self) -> np.ndarray:
-        """See ``Placement``."""
+        """See ``Geometry``."""
         return self._master.nodes
 
-    def covered(self, frames: Placed) -> np.ndarray:
-        """See ``Placement``."""
+    def covered(self, frames: Frames) -> np.ndarray:
+        """See ``Geometry``."""
         return frames.points.share
 
     def slid(self, motion: np.ndarray, history: History) -> float:
@@ -307,8 +349,8 @@ class MortarPlacement(Placement):
         return float(np.linalg.norm(along, axis=1).max(initial=0.0)) / self._master.smallest
 
     def strayed(self, state: State) -> tuple[float, float]:
-        """See ``Placement``: from the opposite point of the undeformed state, and half of the smallest facet."""
-        if self.surface.sliding == "large":
+        """How far a node has slid from the opposite point of the undeformed state, and how far it may: half of the smallest facet."""
+        if self.renews_rows:
             return 0.0, np.inf
         slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
         slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
@@ -329,8 +371,11 @@ class MortarPlacement(Placement):
         size, stiff = np.median(found, axis=1) if found.size else (None, None)
         return None if size is None else (float(size), float(stiff))
 
-    def clamped(self, fixed: np.ndarray, frames: Placed) -> np.ndarray:
-        """See ``Placement``: on a plane of symmetry nodes of the other side are held as well.  Collective."""
+    def clamped(self, fixed: np.ndarray, frames: Frames) -> np.ndarray:
+        """Nodes without friction because supports hold them along the surface, ``shape=(n,)``; ``fixed`` degrees of freedom.  Collective.
+
+        On a plane of symmetry nodes of the other side are held as well: these do not count.
+        """
         master, found = self._master, np.zeros(len(self.x), dtype=bool)
         held = master.everywhere(np.isin(master.own, fixed))
         size = CLEAR * self._extent
@@ -342,10 +387,18 @@ class MortarPlacement(Placement):
         return found
 
     def follows(self, wanders: bool, history: History) -> bool:
-        """See ``Placement``."""
-        return self.changes(history)
+        """See ``Geometry``."""
+        return self.renews_rows
 
-    def met(self, fixed: np.ndarray, frames: Placed) -> Placed:
+    def arms(self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None) -> np.ndarray:
+        """See ``Geometry``: about the origin."""
+        if u is None:
+            raise ValueError(
+                "contact.moment on a deformable surface needs the displacement: contact.moment(problem.u)."
+            )
+        return self.x + u[self._dofs]
+
+    def met(self, fixed: np.ndarray, frames: Frames) -> Frames:
         """Frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
         held = np.isin(self._dofs, fixed)
         if not self._comm.allreduce(bool((held != frames.points.met).any())):
@@ -357,18 +410,6 @@ class MortarPlacement(Placement):
             if where.size and np.ptp(where) <= CLEAR * self._extent:
                 self._planes.append((k, where.mean()))
         return self.projected(frames.at)._replace(start=frames.start, renewed=frames.renewed)
-
-
-class Ended(NamedTuple):
-    """What a state would be with the rows of its own displacement."""
-
-    gap: np.ndarray  # without wear, (n,)
-    slip: np.ndarray  # less the one that was used, in its frame, (n, gdim - 1)
-    forces: np.ndarray  # of the reactions on owned degrees of freedom, less those that were used
-    home: np.ndarray  # where on the undeformed surface nodes are, (n, gdim)
-    frame: np.ndarray  # (n, gdim, gdim)
-    alone: np.ndarray  # opposite nothing, (n,)
-    points: MortarPoints
 
 
 class Skin:

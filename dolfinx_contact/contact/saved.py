@@ -28,7 +28,7 @@ def saved_of(contact: Contact) -> dict[str, np.ndarray]:
         arrays["law_of_last_step"] = rows(history.friction, contact.nodes.size)
     if surface.placed.any():
         arrays["placed_rotation_of_plane"] = surface.placed
-    return arrays | contact.placement.save(history.frames)
+    return arrays | contact.geometry.save(history.frames)
 
 
 def _of(history: History) -> dict[str, np.ndarray]:
@@ -58,20 +58,20 @@ def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
 
 def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     """Take back what ``saved_of`` returned, with the same nodes on this rank; see ``check_saved``."""
-    surface, placement, frames = contact.surface, contact.placement, contact.history.frames
+    surface, geometry, frames = contact.surface, contact.geometry, contact.history.frames
     placed = frozen(np.array(arrays.get("placed_rotation_of_plane", surface.placed)))
     surface.place(arrays.get("rotation_of_plane", np.zeros_like(surface.rotation)), placed)
-    if placement.follows(wanders(contact), contact.history):
+    if geometry.follows(wanders(contact), contact.history):
         at = arrays["home"] if surface.varies else arrays.get("at")
-        frames = placement.saved_at(at, frames)
+        frames = geometry.saved_at(at, frames)
     surface.displacement = arrays["plane"]
     found = arrays.get("found_rotation_of_plane", surface.rotation)
-    frames = placement.ended(frames, found)
+    frames = geometry.ended(frames, found)
     last, worn = State(*(frozen(np.array(arrays[name])) for name in FIELDS)), None
     sums = {name: frozen(np.array(arrays[name])) for name in (*SUMS, KEPT)}
     if OPPOSITE in arrays:
         sums[OPPOSITE] = frozen(np.array(arrays[OPPOSITE]))
-        worn = placement.everywhere(sums[OPPOSITE])
+        worn = geometry.everywhere(sums[OPPOSITE])
     contact.go_back(History(last, frames, sums, worn=worn))
     contact.go_back(contact.history.but(friction=contact.laws.load(contact, arrays)))
     surface.turn_to(found)

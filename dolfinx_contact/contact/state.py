@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx_contact.support.attributes import frozen
 
 if TYPE_CHECKING:
-    from dolfinx_contact.contact.placement import Placed
+    from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.law.friction import Friction
 
 
@@ -69,7 +69,7 @@ class History:
     """
 
     last: State
-    frames: Placed
+    frames: Frames
     sums: dict[str, np.ndarray]
     friction: Friction | None = None
     worn: np.ndarray | None = None
@@ -79,7 +79,7 @@ class History:
     unloads: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
-    def of(state: State, frames: Placed) -> History:
+    def of(state: State, frames: Frames) -> History:
         """No history: a state, and all sums zero."""
         sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
         sums[KEPT] = frozen(np.zeros_like(state.slip_increment))

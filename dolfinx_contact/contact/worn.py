@@ -34,7 +34,7 @@ def worn_by(step: ContactStep, work: np.ndarray) -> tuple[np.ndarray, ...]:
         return depth, depth, None
     other = depth * wear.opposite_share(work, contact.laws.wear_field)
     given = contact.whole_area * other, contact.opposite_area, step.frames, contact.history
-    return depth, depth - other, contact.placement.taken(*given)
+    return depth, depth - other, contact.geometry.taken(*given)
 
 
 def wear_rates(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.contact.placement import times, turned_back
+from dolfinx_contact.contact.geometry import times, turned_back
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> 
         alone = before[k][:, -1] / contact.stiffness.normal
         pressed = np.maximum(alone if moved is None else of.motion(moved)[:, -1], 0.0)
         beside = (
-            contact.given.placement.covered(contact.frames) == 0.0
+            contact.given.geometry.covered(contact.frames) == 0.0
         )  # left the other side along the surface: that is no gap
         way = pressed + np.where(beside, 0.0, np.maximum(one.gap, 0.0))
         part = np.divide(pressed, way, np.ones_like(way), where=way > 0.0)

@@ -44,6 +44,9 @@ MIXED_DEPTHS = 20
 # as many rounds do without.
 FALL, PATIENCE = 0.7, 10
 
+# In these rounds depths go this part of the way: the whole one may lead to and fro for ever.
+CAUTIOUS = 0.5
+
 # Part of its force that what a step wears under the force at its start takes from a node, at most.
 START = 0.01
 
@@ -124,7 +127,9 @@ class WearOfStep(Lagged):
         if self._stale < PATIENCE:
             mixed, _ = self._anderson.step(kappa * depth, change)
             following = np.maximum(mixed, 0.0) / kappa
-        elif self._stale >= 3 * PATIENCE:  # some rounds without differences are over
+        else:
+            following = depth + CAUTIOUS * (following - depth)
+        if self._stale >= 3 * PATIENCE:  # some rounds without differences are over
             self._anderson.restart()
             self._best, self._stale = off, 0
         self._depth = following

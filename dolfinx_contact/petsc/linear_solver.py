@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
+from scipy import sparse
 
 from dolfinx_contact import compat
-from dolfinx_contact.petsc.entries import with_entries
 
 if TYPE_CHECKING:
     from dolfinx_contact.petsc.multigrid import Multigrid
@@ -97,7 +97,10 @@ def _to_factorise(A: PETSc.Mat):
     """
     symmetric = A.isSymmetric(_ROUNDING * A.norm(PETSc.NormType.INFINITY))
     starts, columns, values = A.getValuesCSR()
-    A = with_entries(A, starts, columns, values, values != 0.0)
+    rows = sparse.csr_matrix((values, columns, starts), (len(starts) - 1, A.getSize()[1]))
+    rows.eliminate_zeros()
+    csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
+    A = PETSc.Mat().createAIJ(A.getSizes(), csr=csr, comm=A.comm)
     if not symmetric:
         return A, DIRECT
     n, entries = A.getSize()[0], A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]

@@ -8,7 +8,6 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from dolfinx_contact._kernel import SymmetricBlocks
-from dolfinx_contact.petsc.entries import with_entries
 
 # Sizes of blocks that the kernel knows.
 SIZES = 1, 2, 3
@@ -110,3 +109,12 @@ def _are_own(A: PETSc.Mat, rows: sparse.csr_matrix) -> np.ndarray:
     """Which entries are in columns of this rank."""
     first, last = A.getOwnershipRange()
     return (rows.indices >= first) & (rows.indices < last)
+
+
+def with_entries(
+    A: PETSc.Mat, starts: np.ndarray, columns: np.ndarray, values: np.ndarray, kept: np.ndarray
+) -> PETSc.Mat:
+    """A matrix of the layout of A with some of the entries in rows of this rank, ``kept`` true.  Collective."""
+    starts = np.append(0, np.cumsum(kept))[starts].astype(PETSc.IntType)
+    csr = starts, columns[kept].astype(PETSc.IntType), values[kept]
+    return PETSc.Mat().createAIJ(A.getSizes(), csr=csr, comm=A.comm)

@@ -82,7 +82,7 @@ def _arrays(problem: ContactProblem, accepted: Accepted | None = None) -> dict[s
         saved = [saved_of(contact) for contact in contacts]
     for k, (contact, of_contact) in enumerate(zip(contacts, saved)):
         mine |= {f"contact{k}_{name}": array for name, array in of_contact.items()}
-        if contact.surface.deformable:
+        if contact.history.frames.at is not None:
             placed = body.displacements.rows(contact.history.frames.at)
             worn = np.zeros(len(placed))
             worn[contact.opposite] = contact.opposite_wear_depth

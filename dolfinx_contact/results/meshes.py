@@ -238,10 +238,11 @@ class SurfaceMesh:
         contact, gap = self._contact, self._contact.gap
         gaps = self._placed(np.where(np.isinf(gap), np.nan, gap))  # pictures leave it out
         others = np.setdiff1d(np.arange(self._owned.size), self._at)
-        if others.size and not contact.surface.deformable:
+        if others.size:
             dim = moved.shape[1]
             x = contact.displacements.x[self._owned[others], :dim] + moved[others]
-            gaps[others] = contact.surface.distances(x)
+            found = contact.geometry.distances(x)
+            gaps[others] = np.where(np.isinf(found), np.nan, found)
         return gaps
 
 

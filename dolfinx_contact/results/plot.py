@@ -113,10 +113,9 @@ def _seen(
         [mesh.at_nodes["status"][at] for mesh, at in zip(foot, touching)]
     )
     for k, (contact, mesh) in enumerate(zip(contacts, foot)):
-        if not contact.surface.deformable:
-            box, found = _distances(contact, _standing(mesh, factor), factor)
-            if np.isfinite(found).all():
-                seen |= {f"box{k}": box, f"distance{k}": found}
+        box, found = _distances(contact, _standing(mesh, factor), factor)
+        if np.isfinite(found).all():
+            seen |= {f"box{k}": box, f"distance{k}": found}
     if contacts[0].points.dim == 3:
         seen["view"] = (
             foot[0].at_nodes["normal"][foot[0].at_nodes["contact_node"] == 1].mean(axis=0)
@@ -138,4 +137,4 @@ def _distances(contact: Contact, x: np.ndarray, factor: float) -> tuple[np.ndarr
     axes = [np.linspace(a, b, int(n)) for a, b, n in box.T]
     z, y, x = np.meshgrid(*reversed(axes), indexing="ij")  # x runs fastest, as in VTK's grids
     points = np.column_stack((x.ravel(), y.ravel(), z.ravel()))[:, :dim]
-    return box, contact.surface.distances(points - (factor - 1.0) * contact.surface.displacement)
+    return box, contact.geometry.distances(points - (factor - 1.0) * contact.surface.displacement)

@@ -154,7 +154,7 @@ def record(
     gap, penetration, of_vertices = 0.0, 0.0, 0.0
     for contact, nodes in zip(step.contacts, state.nodes):
         given = contact.given
-        if given.displacements.degree > 1 and given.wear is None and not given.surface.deformable:
+        if given.displacements.degree > 1 and given.wear is None:
             of_vertices = max(of_vertices, _penetration_between(given, state.x))
         gap += contact.bipotential_gap(nodes).sum()
         penetration = max(penetration, -nodes.gap.min(initial=0.0))
@@ -211,5 +211,5 @@ def _penetration_between(contact: Contact, u: np.ndarray) -> float:
     """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
     of = contact.displacements
     here = of.rows(u)[contact.left_out]
-    gaps = contact.surface.distances(of.x[contact.left_out, : of.dim] + here)
+    gaps = contact.geometry.distances(of.x[contact.left_out, : of.dim] + here)
     return max(0.0, -contact.comm.allreduce(float(gaps.min(initial=0.0)), op=MPI.MIN))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.contact.interface import components
+from dolfinx_contact.contact.contact_step import components
 from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, Solver, SolverResult
 
 if TYPE_CHECKING:

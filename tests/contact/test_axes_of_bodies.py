@@ -113,9 +113,9 @@ def placed(owner, u_of, cells):
     scene = Pair("directions", owner, cells)
     contact, u = scene.contact, fem.Function(scene.V)
     u.interpolate(u_of)
-    found = contact.placement.projected(u.x.array[: contact.points.size].copy())
+    found = contact.geometry.projected(u.x.array[: contact.points.size].copy())
     given = directions(contact.x.T)
-    lines = contact.placement.directions(given, owner, found.points).T
+    lines = contact.geometry.directions(given, owner, found.points).T
     there = ~found.points.alone
     return lines[there], found, contact, there
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from two_bodies import COMM, blocks, dc, rubber
 
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.lagged import end_geometry
+from dolfinx_contact.contact import mortar_points
 from mechanics.two_blocks import box, joined
 
 pytestmark = pytest.mark.ranks
@@ -67,7 +67,7 @@ def test_work_of_a_turn(swapped, step):
 
 def test_a_turn_that_is_too_long(monkeypatch):
     """Beyond two radians, where solvers seldom get, a step is refused; shown with a lower limit."""
-    monkeypatch.setattr(end_geometry, "LONGEST", 0.3)
+    monkeypatch.setattr(mortar_points, "LONGEST", 0.3)
     turn, _ = rings(False)
     for angle in (0.0, 0.2):
         turn(angle)

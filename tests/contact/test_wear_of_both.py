@@ -99,13 +99,13 @@ def test_even_wear_is_even_on_the_other_side(cell, degree):
     scene = blocks(cell, degree, ((4, 2), (7, 2)) if flat else ((2, 2, 1), (3, 3, 1)), mu=0.0)
     scene.way.value[-1] = -0.001
     scene.problem.solve()
-    contact, placement = scene.contact, scene.contact.placement
+    contact, geometry = scene.contact, scene.contact.geometry
     history = contact.history
     worn = 0.25 * contact.whole_area
-    taken = placement.taken(worn, contact.opposite_area, history.frames, history)
+    taken = geometry.taken(worn, contact.opposite_area, history.frames, history)
     assert taken == pytest.approx(0.25, rel=1e-10)
-    worn = placement.everywhere(taken)
-    assert placement.opened(contact.points, worn) == pytest.approx(0.25, rel=1e-10)
+    worn = geometry.everywhere(taken)
+    assert geometry.opened(contact.points, worn) == pytest.approx(0.25, rel=1e-10)
 
 
 def test_a_worn_track_stays_with_its_body():

@@ -11,7 +11,7 @@ from way_scenes import COMM, ring, slab
 
 import dolfinx_contact as dc
 from dolfinx_contact.contact.contact_step import nodal_stiffness
-from dolfinx_contact.contact.placement import _round
+from dolfinx_contact.contact.rigid import _round
 from dolfinx_contact.lagged.end_geometry import REPEATED
 
 pytestmark = pytest.mark.ranks

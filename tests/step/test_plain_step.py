@@ -13,8 +13,8 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts programs
 # What a linear body on one plane imports, friction a number: whoever adds a module to these lists says why. What is needed by the solver follows.
 PLAIN = {
     "accepted", "checks.check", "checks.scene", "bodies.elastic", "bodies.input", "bodies.rigid_motion", "compat",
-    "contact.contact", "contact.contact_step", "contact.displacements", "contact.fields", "contact.input", "contact.interface", "contact.laws", "contact.placement",
-    "contact.state", "law.dissipation", "law.friction", "law.maps", "next_step", "petsc.entries", "petsc.linear_solver", "problem", "problem_input",
+    "contact.contact", "contact.contact_step", "contact.displacements", "contact.fields", "contact.input", "contact.interface", "contact.laws", "contact.geometry", "contact.rigid",
+    "contact.state", "law.dissipation", "law.friction", "law.maps", "next_step", "petsc.linear_solver", "problem", "problem_input",
     "results.record", "solution", "solvers.base", "step.errors", "step.load_step",  "support.attributes",
     "support.checks", "support.collective", "surfaces.plane", "surfaces.surface",
 }  # fmt: skip

@@ -166,7 +166,7 @@ def test_a_pad_rocks(mu, solver):
         assert left[:2] == pytest.approx([0, 0], abs=1e-11)
         pressing = contact.reaction[:, 2]
         centre = COMM.allreduce(
-            pressing @ contact.placement.arms(contact.displacement, contact.history.frames)[:, :2]
+            pressing @ contact.geometry.arms(contact.displacement, contact.history.frames)[:, :2]
         )
         assert centre / 0.01 == pytest.approx([x, y], abs=1e-4)
     assert lifted >= 3

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from dolfinx_contact.contact.interface import components
+from dolfinx_contact.contact.contact_step import components
 from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.petsc.linear_solver import LinearSolver
 from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, SolverName, SolverResult
@@ -134,7 +134,7 @@ class BoundCondensedNewton(BoundSolver):
                     W = self._surfaces.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
                 del W  # copied
-                slides = any(c.given.changes and c.surface.deformable for c in contacts)
+                slides = any(c.given.geometry.renews_rows for c in contacts)
                 if not slides:  # else the next solution has other rows
                     self.operator.prepare()  # pays after some ten iterations
         self.friction = joint_friction(self._laws, self._contacts, self.gather)

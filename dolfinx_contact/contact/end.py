@@ -1,0 +1,152 @@
+# Copyright (c) 2025 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
+"""What the geometry with which a step was solved misses at its end, as forces on nodes; the way of nodes along a rigid surface.
+
+A length counts as its product with the stiffness of its node, an angle as its product with the reaction.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dolfinx_contact.support.checks import place
+from dolfinx_contact.support.collective import raised_together
+from dolfinx_contact.surfaces.surface import rotation_less_one
+
+if TYPE_CHECKING:
+    from dolfinx_contact.contact.contact_step import ContactStep
+    from dolfinx_contact.contact.rigid import RigidGeometry
+    from dolfinx_contact.contact.state import History, State
+    from dolfinx_contact.surfaces.surface import Surface
+
+# Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
+TURNED, PLACES = 0.5, 32
+
+
+def pressed(
+    contact: ContactStep, state: State, exact: np.ndarray, closed: np.ndarray
+) -> np.ndarray:
+    """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
+    presses = state.reaction[:, -1] > 0.0
+    off = np.where(presses, np.abs(exact - state.gap), np.maximum(-exact, 0.0))
+    off[closed] = 0.0
+    return contact.stiffness.normal * off
+
+
+def dragged(contact: ContactStep, state: State, missed: np.ndarray) -> np.ndarray:
+    """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
+    contact.points.without_held(missed)
+    made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, missed), axis=1)
+    # Friction of what slips turns at most as its slip does.
+    slip = np.linalg.norm(state.slip_increment, axis=1)
+    friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
+    length = np.linalg.norm(missed, axis=1)
+    turns = np.divide(friction * length, slip, made.copy(), where=slip > 0.0)
+    return np.where(friction > 0.0, np.minimum(made, turns), 0.0)
+
+
+def missed_on_rigid(
+    geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
+    r, frames = state.reaction, contact.frames
+    with raised_together(contact.comm):  # the user's functions
+        surface, there = geometry.ended_at(u)
+        y = surface.relative(there)
+        own, distance = surface.frames(y), surface.distance(y)
+        size, friction = np.linalg.norm(r, axis=1), np.linalg.norm(r[:, :-1], axis=1)
+        turned = surface.turned(own)[..., -1, :] - frames.frame[..., -1, :]
+        angle = np.linalg.norm(np.atleast_2d(turned), axis=1)
+        way = geometry.way(surface, y, own, distance, contact.given.history)
+        missed = way - (0.0 if frames.way is None else frames.way)
+        turning = contact.given.laws.turned(contact, y, own)
+    return (
+        pressed(contact, state, distance + contact.opening, contact.points.closed),
+        np.hypot(size * angle, friction * turning),
+        dragged(contact, state, missed),
+    )
+
+
+def too_long_on_rigid(
+    geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
+) -> tuple[float, str]:
+    """After which part of a step a node's way cannot be followed, above one if all can, and why in words.
+
+    The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
+    opens.  Its frame must not turn by more than half a radian, about the normal either: then the way is shorter than half of the least radius, and
+    the side of the surface stays.
+    """
+    with raised_together(contact.comm):  # the user's functions
+        turned = _turned_on_the_way(geometry, contact, state, u)
+    some = np.flatnonzero((turned > TURNED).any(axis=0))
+    if not some.size:
+        return 2.0, ""
+    first = (turned > TURNED)[:, some].argmax(axis=0)
+    part = float(first.min()) / PLACES
+    at = place(contact.x[:, : contact.points.dim], int(some[first.argmin()]))
+    return part, (
+        f"after {part:.2g} of it the contact node at {at} on {contact.surface!r} has gone so far along the surface, or the "
+        f"surface has turned so far about its normal there, that the local frame has turned by {TURNED:g} radians"
+    )
+
+
+def _turned_on_the_way(
+    geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
+) -> np.ndarray:
+    """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
+    surface, there = geometry.ended_at(u)
+    count, dim = there.shape
+    if not count:
+        return np.zeros((PLACES + 1, 0))
+    y = _way(surface, geometry, contact.given.history, surface.relative(there))
+    flat = y.reshape(-1, dim)
+    normals, distance = _looked_at(surface, flat)
+    normals, touches = normals.reshape(y.shape), distance.reshape(-1, count) < 0.0
+    touches[0] |= contact.last.reaction[:, -1] > 0.0
+    touches[-1] |= state.reaction[:, -1] > 0.0
+    touches[:, contact.points.closed] = False
+    touched = np.logical_or.accumulate(touches)[:-1]
+    opens = np.logical_or.accumulate(touches[::-1])[::-1][1:]
+    bends = np.linalg.norm(np.diff(normals, axis=0), axis=2)
+    bends[np.isnan(bends)] = np.pi  # through a place without a normal, such as a centre
+    if dim == 3:  # and about the normal
+        turned = geometry.turned_to(surface, contact.given.history)
+        bends = np.hypot(bends, (normals[-1] @ turned) / PLACES)
+    within = touched & opens
+    return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
+
+
+def _looked_at(surface: Surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals and distances at positions; NaN where there are none."""
+    try:
+        return np.broadcast_to(surface.frames(y)[..., -1, :], y.shape), surface.distance(y)
+    except ValueError:
+        if len(y) == 1:
+            return np.full(y.shape, np.nan), np.full(1, np.nan)
+        halves = [_looked_at(surface, part) for part in np.array_split(y, 2)]
+        return tuple(map(np.concatenate, zip(*halves)))
+
+
+def _way(
+    surface: Surface, geometry: RigidGeometry, history: History, end: np.ndarray
+) -> np.ndarray:
+    """Positions along the way, relative to the surface, in its axes, ``shape=(PLACES + 1, n, gdim)``.
+
+    In space nodes go straight, and the surface moves and turns evenly.
+    """
+    turned = geometry.turned_to(surface, history)
+    start, end = geometry.started(history) - surface.point, end - surface.point
+    parts = np.linspace(0.0, 1.0, PLACES + 1)
+    if not turned.any():
+        return surface.point + start + parts[:, None, None] * (end - start)
+    first = start + start @ rotation_less_one(-turned).T
+    places = []
+    for part in parts:
+        straight = first + part * (end - first)
+        back = (
+            rotation_less_one((1.0 - part) * turned) if part < 1.0 else 0.0 * np.eye(end.shape[1])
+        )
+        places.append(surface.point + straight + straight @ back.T)
+    return np.array(places)
