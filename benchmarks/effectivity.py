@@ -13,7 +13,7 @@ from pathlib import Path
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from mechanics.half_plane import Cylinder, FlatPunch
 
 # isort: split
@@ -42,7 +42,7 @@ def plane_strain(scene, law, order: int, facets=None) -> tuple[dc.ContactProblem
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far))]
     face = face if facets is None else face[facets]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), (0, 1)), dc.Friction(0.0))
-    options = dict(solver=dc.CondensedNewton(), petsc_options=DIRECT, tol=1e-9)
+    options = dict(solver=dc.CondensedNewton(), petsc_options=DIRECT_OPTIONS, tol=1e-9)
     return dc.ContactProblem(F, u, [contact], bcs=bcs, **options), held
 
 

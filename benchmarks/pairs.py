@@ -28,7 +28,7 @@ from dolfinx import fem, mesh
 
 from benchmarks.tables import table
 from dolfinx_contact.compat import functionspace, mixed_functionspace
-from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS
 from dolfinx_contact.surfaces.surface import rotation_between
 from mechanics.material import elasticity
 from mechanics.scenes import rotation
@@ -555,7 +555,7 @@ VARIANTS = [
     Variant("roll as function, put into place", dict(surface="roll as function", frame=TURNED, posed=True), lambda name, way: way.surface == "roll", 2e-4),
     Variant("far from the origin", dict(away=1e4), tol=1e-5),
     Variant("from a nonsensical guess", dict(guess=True), lambda name, way: way.form != "finite"),
-    Variant("by multigrid", dict(petsc=MULTIGRID, solver="FixedPoint"), lambda name, way: way.form != "mixed"),
+    Variant("by multigrid", dict(petsc=MULTIGRID_OPTIONS, solver="FixedPoint"), lambda name, way: way.form != "mixed"),
     Variant("FixedPoint", dict(solver="FixedPoint")),
     Variant("CondensedNewton", dict(solver="CondensedNewton"), lambda name, way: way.form != "finite"),
     Variant("SparseNewton", dict(solver="SparseNewton"), _held),

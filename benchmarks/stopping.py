@@ -14,7 +14,7 @@ from time import process_time
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from benchmarks.effectivity import ball_on_flat
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from studies.punch import Parameters
 from studies.punch import accuracy as punches
 from studies.punch.limits import LIMITS
@@ -37,7 +37,7 @@ def solved(
     bcs = [fem.dirichletbc(held, fem.locate_dofs_topological(V, 1, far), V)]
     contact = dc.Contact(V, face, dc.RigidPlane((0, 0), normal), dc.Friction(mu))
     return dc.ContactProblem(
-        F, u, [contact], bcs=bcs, solver=dc.CondensedNewton(), petsc_options=DIRECT
+        F, u, [contact], bcs=bcs, solver=dc.CondensedNewton(), petsc_options=DIRECT_OPTIONS
     ), contact
 
 

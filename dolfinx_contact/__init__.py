@@ -33,14 +33,14 @@ if getattr(_kernel, "stubs", str)() != _stubs:
 
 
 # Name of each public object, and module that has it, as the stub beside this file says.
-_HOME = {
+_MODULE_OF_NAME = {
     name.name: node.module
     for node in parse(Path(__file__).with_suffix(".pyi").read_text()).body
     if isinstance(node, ImportFrom)
     for name in node.names
 }
-_ROOMS = [name for name, home in _HOME.items() if home == __name__]  # of arrays
-__all__ = [name for name in _HOME if name not in _ROOMS]
+_MODULE_NAMES = [name for name, home in _MODULE_OF_NAME.items() if home == __name__]  # of arrays
+__all__ = [name for name in _MODULE_OF_NAME if name not in _MODULE_NAMES]
 
 
 def __getattr__(name: str) -> object:
@@ -48,10 +48,10 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         value = version(__name__)
-    elif name in _ROOMS:
+    elif name in _MODULE_NAMES:
         value = import_module(f"{__name__}.{name}")
-    elif name in _HOME:
-        value = getattr(import_module(_HOME[name]), name)
+    elif name in _MODULE_OF_NAME:
+        value = getattr(import_module(_MODULE_OF_NAME[name]), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
@@ -59,4 +59,6 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*_HOME, *(name for name in globals() if name.startswith("__")), "__version__"})
+    return sorted(
+        {*_MODULE_OF_NAME, *(name for name in globals() if name.startswith("__")), "__version__"}
+    )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.contact_step import meet_supports
-from dolfinx_contact.solvers.base import KEPT
+from dolfinx_contact.solvers.base import KEPT_STARTS
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import FreeState
@@ -82,7 +82,7 @@ def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
     for contact in problem.contacts:
         contact.surface.end_step()
     values = problem.internal.values() if problem.internal else ()
-    starts = before.starts if found.start is None else (*before.starts, found.start)[-KEPT:]
+    starts = before.starts if found.start is None else (*before.starts, found.start)[-KEPT_STARTS:]
     poses, free_state = poses_of(problem.contacts), problem.body.last_free_state
     return Accepted(state.x, before.x, histories, poses, free_state, values, starts, problem.number)  # fmt: skip
 

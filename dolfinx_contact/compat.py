@@ -37,7 +37,7 @@ if np.issubdtype(PETSc.ScalarType, np.complexfloating):
 
 version: str = dolfinx.__version__
 
-_ADD = (la.InsertMode if hasattr(la, "InsertMode") else la.ScatterMode).add
+_INSERT_ADD = (la.InsertMode if hasattr(la, "InsertMode") else la.ScatterMode).add
 
 
 def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
@@ -263,7 +263,7 @@ def assemble_into(x: Any, form: Any) -> None:
 
 def add_to_owners(x: Any) -> None:
     """Add what this rank's ghosts hold in the distributed vector ``x`` to their owners."""
-    x.scatter_reverse(_ADD)
+    x.scatter_reverse(_INSERT_ADD)
 
 
 def petsc_vec(u: fem.Function) -> PETSc.Vec:

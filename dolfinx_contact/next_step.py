@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # How many times as far as supports move bodies may be expected to move in a step; and the part of that within which they are expected
 # to go on as in the step before.
-FARTHER, STEADY = 2.0, 0.05
+FARTHEST_RATIO, STEADY_PART = 2.0, 0.05
 
 
 class StepMaker:
@@ -165,11 +165,13 @@ def _predicted(problem: ContactProblem, last: Accepted, b: np.ndarray) -> np.nda
     x[body.fixed] = b[body.fixed]
     load, exact = b - known.load, body.exact
     more = body.free_state(b) - known.displacement if exact else body.solve(load, rough=True)
-    if body.farthest(last.x + more - x) > STEADY * body.farthest(given):
+    if body.farthest(last.x + more - x) > STEADY_PART * body.farthest(given):
         x = last.x + more
         if not exact:  # six digits
             x += body.solve(load - body.multiply(more), rough=True)
     slid = body.largest(np.array([c.geometry.slid(x - last.x, c.history) for c in sliding]))
-    if slid < problem.geometry_tol or body.farthest(x - last.x) > FARTHER * body.farthest(given):
+    if slid < problem.geometry_tol or body.farthest(x - last.x) > FARTHEST_RATIO * body.farthest(
+        given
+    ):
         return None
     return x

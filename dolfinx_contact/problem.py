@@ -22,7 +22,7 @@ from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.next_step import StepMaker
 from dolfinx_contact.petsc.linear_solver import raise_interrupt
 from dolfinx_contact.problem_input import (
-    NUMBERS,
+    PROBLEM_NUMBERS,
     body_of,
     check_alive,
     check_step,
@@ -43,7 +43,7 @@ from dolfinx_contact.problem_input import (
 )
 from dolfinx_contact.results.record import (
     NO_SOLUTION,
-    UNHELD,
+    NOT_HELD,
     Counts,
     NotConverged,
     Step,
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.staggered import Lagged
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
-LOG = logging.getLogger("dolfinx_contact")
+logger = logging.getLogger("dolfinx_contact")
 
 
 class ContactProblem(Guarded):
@@ -200,7 +200,7 @@ class ContactProblem(Guarded):
         self._bound = self._bound_to = None
         self._maker = StepMaker(self)
         take_contacts(self, self.contacts)
-        self.number, self._before = next(NUMBERS), None
+        self.number, self._before = next(PROBLEM_NUMBERS), None
         self._accepted = self._first = unloaded(self)
         self._made = True
 
@@ -299,7 +299,7 @@ class ContactProblem(Guarded):
             return
         if not refused:
             tried = f"{done}, tol {self.tol:.1e}, by {named(done)}"
-            if done.reason in (NO_SOLUTION, UNHELD):  # untried: errors are of the last state
+            if done.reason in (NO_SOLUTION, NOT_HELD):  # untried: errors are of the last state
                 tried = done.reason
             refused = f"not converged: {tried}. {state.step.refusal(state)}"
         reactions = [nodes.reaction for nodes in state.nodes]
@@ -464,8 +464,8 @@ class ContactProblem(Guarded):
         agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, lagged=len(self.lagged), monitor=self.monitor is not None)  # fmt: skip
 
     def _log(self, line: Callable[[], str]) -> None:
-        if self.body.comm.rank == 0 and LOG.isEnabledFor(logging.INFO):
-            LOG.info(line())
+        if self.body.comm.rank == 0 and logger.isEnabledFor(logging.INFO):
+            logger.info(line())
 
     def counts(self) -> Counts:
         """Contact nodes open, sticking and slipping in the last converged state.  Collective."""

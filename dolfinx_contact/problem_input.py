@@ -18,7 +18,7 @@ from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.input import check_meshes, derivative_of
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.contact_step import components, frames_of, meet_supports
-from dolfinx_contact.petsc.linear_solver import CROWDED, LARGE
+from dolfinx_contact.petsc.linear_solver import CROWDED_SIZE, LARGE_SIZES
 from dolfinx_contact.solvers.base import Solver
 from dolfinx_contact.support.attributes import surfaces_of
 from dolfinx_contact.support.checks import place, positive
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
 
 
 # What to do where a motion of a body that contact alone holds is undetermined.
-UNDETERMINED = ("refused", "nearest")
+UNDETERMINED_CHOICES = ("refused", "nearest")
 
-EXAMPLES = {
+OPTION_EXAMPLES = {
     "petsc_options": '{"pc_type": "lu"}',
     "form_compiler_options": '{"scalar_type": "double"}',
     "jit_options": '{"cffi_extra_compile_args": ["-O3"]}',
 }
 
-NUMBERS = count(
+PROBLEM_NUMBERS = count(
     1
 )  # of problems as they are made, and of times at which surfaces are driven: each larger than the last
 
@@ -178,7 +178,7 @@ def body_of(
 def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
     unknowns = body.comm.allreduce(body.size)
-    solid = body.V.mesh.geometry.dim == 3 and CROWDED <= unknowns <= LARGE[3]
+    solid = body.V.mesh.geometry.dim == 3 and CROWDED_SIZE <= unknowns <= LARGE_SIZES[3]
     if not (contacts and solid and body.options is None) or body.nonlinear:
         return False
     from dolfinx_contact.solvers.automatic import Automatic, most_nodes
@@ -214,9 +214,11 @@ def checked_tolerance(tol: Any) -> float:
 
 
 def checked_undetermined(choice: Any) -> str:
-    """One of ``UNDETERMINED``."""
-    if choice not in UNDETERMINED:
-        raise ValueError(f"undetermined must be one of {', '.join(UNDETERMINED)}, got {choice!r}.")
+    """One of ``UNDETERMINED_CHOICES``."""
+    if choice not in UNDETERMINED_CHOICES:
+        raise ValueError(
+            f"undetermined must be one of {', '.join(UNDETERMINED_CHOICES)}, got {choice!r}."
+        )
     return choice
 
 
@@ -236,7 +238,7 @@ def checked_internal(internal: Any):
 def checked_options(name: str, options: Any) -> dict | None:
     """Options of PETSc or of compilation, a dictionary."""
     if options is not None and not isinstance(options, dict):
-        example = EXAMPLES[name]
+        example = OPTION_EXAMPLES[name]
         raise ValueError(f"{name} must be a dictionary such as {example}, got {options!r}.")
     return options
 
@@ -474,7 +476,7 @@ def check_alive(problem: ContactProblem, body: ElasticBody, contacts: Sequence[C
         )
     for surface in surfaces_of(contacts):
         if surface.driver is not None:
-            surface.driver.take(problem.number, next(NUMBERS))
+            surface.driver.take(problem.number, next(PROBLEM_NUMBERS))
 
 
 def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[Contact]) -> None:

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Penetration over the largest displacement that three digits of it leave no doubt about.
-CERTAIN = 0.1
+CERTAIN_PENETRATION = 0.1
 
-NOTHING = "nothing touches"
+NOTHING_TOUCHES = "nothing touches"
 
 # Tolerance of a solution on the way to the geometry of the end, over that of the geometry.
-PART = 0.03
+ROUGH_TOLERANCE = 0.03
 
 
 def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
@@ -31,7 +31,7 @@ def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
     step, own = problem.load_step(), ()
     goal, levels = step.tol, _levels(problem, step)
     if _digits_later(problem):
-        step = step.but(tol=max(goal, PART * problem.geometry_tol))
+        step = step.but(tol=max(goal, ROUGH_TOLERANCE * problem.geometry_tol))
     starts = problem.accepted.starts
     if not levels:
         return find(problem, step, starts), {}, ""
@@ -147,7 +147,11 @@ def without_reactions(step: LoadStep) -> SolverResult | None:
     if may_touch(step, trial, c):
         return None
     state = refined(step.open(trial, c))
-    return SolverResult(state, 0, 0.0, SolverName.NONE, reason=NOTHING) if state.within else None
+    return (
+        SolverResult(state, 0, 0.0, SolverName.NONE, reason=NOTHING_TOUCHES)
+        if state.within
+        else None
+    )
 
 
 def unmoved(step: LoadStep, reason: str = NO_SOLUTION) -> SolverResult:
@@ -168,12 +172,16 @@ def floating(step: LoadStep) -> SolverResult | None:
     if may_touch(step, x):
         return None
     state = step.open(x)
-    return SolverResult(state, 0, 0.0, SolverName.NONE, reason=NOTHING) if state.within else None
+    return (
+        SolverResult(state, 0, 0.0, SolverName.NONE, reason=NOTHING_TOUCHES)
+        if state.within
+        else None
+    )
 
 
 def presses(step: LoadStep, trial: np.ndarray, c: np.ndarray | None = None) -> bool:
     """Whether a displacement without reactions known to three digits penetrates a plane for certain.  Collective."""
-    return _deepest(step, trial, c) > CERTAIN * step.body.farthest(trial)
+    return _deepest(step, trial, c) > CERTAIN_PENETRATION * step.body.farthest(trial)
 
 
 def may_touch(step: LoadStep, trial: np.ndarray, c: np.ndarray | None = None) -> bool:

@@ -25,7 +25,7 @@ from benchmarks.scaling.elastic_ratio import step_to
 from benchmarks.stress import matrix
 from benchmarks.stress.scenes import scenes
 from benchmarks.tables import chosen, table
-from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS
 from dolfinx_contact.solvers.fixed_point import fixed_point, preconditioner, rigid_balance
 from dolfinx_contact.support.anderson import Anderson
 from studies.punch import Parameters, Punch, programme
@@ -72,7 +72,7 @@ def punch(name: str, solver):
     parameters, mesh, displacements = PUNCHES[name]
     parameters = Parameters(**parameters)
     made = Punch(parameters, solver=solver(), **mesh)
-    made.problem.body.options = MULTIGRID
+    made.problem.body.options = MULTIGRID_OPTIONS
     for displacement in displacements or programme(parameters)[:15]:
         step = step_to(made, displacement)
         yield f"{displacement:.4g} mm", step["iterations"], "failed" in step

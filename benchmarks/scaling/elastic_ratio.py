@@ -23,7 +23,7 @@ from mpi4py import MPI
 import dolfinx_contact as dc
 from benchmarks.measurement import commit, now, peak_memory, timed
 from benchmarks.tables import table
-from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS, LinearSolver
 from studies.punch import Parameters, Punch, programme
 
 COMM = MPI.COMM_WORLD
@@ -40,7 +40,9 @@ def elastic_solve(punch, displacement: float, repeat: int) -> dict:
     punch.move_top(displacement)
     body.refresh()
     b, _ = body.load()
-    solver = LinearSolver(body.K, MULTIGRID | {"ksp_rtol": 1e-10}, "yardstick_", body.rigid_modes)
+    solver = LinearSolver(
+        body.K, MULTIGRID_OPTIONS | {"ksp_rtol": 1e-10}, "yardstick_", body.rigid_modes
+    )
     for _ in range(repeat):
         body.comm.Barrier()
         seconds.append(slowest(timed(solver.solve, b)[0]))
@@ -152,7 +154,7 @@ def main(argv=None) -> None:
         parameters = Parameters(case=case, refine=refine, lowest=options.lowest)
         friction = dict(mu=0.0) if case == "frictionless" else None
         punch = Punch(parameters, solver=dc.FixedPoint(), friction=friction, **mesh)
-        punch.problem.body.options = MULTIGRID
+        punch.problem.body.options = MULTIGRID_OPTIONS
         steps = programme(parameters)[: options.steps]
         results.append(measured(punch, steps, options.repeat, before, kept))
     if options.json:

@@ -12,7 +12,7 @@ from time import process_time
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import functionspace
 from dolfinx_contact.law.dissipation import work_of_friction
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from dolfinx_contact.problem_input import body_of
 
 # isort: split
@@ -60,7 +60,9 @@ def patch(variant: str, slips: bool, tilted: bool, curved: bool) -> dict:
     held.x.array[:] = block.moved(V.tabulate_dof_coordinates().T).T.ravel()
     bc = fem.dirichletbc(held, fem.locate_dofs_topological(V, 2, block.top))
     F = elasticity(u, v, E, NU, block.dx) - block.work(v)
-    body = Body(body_of(F, u, [bc], options=DIRECT), block.contact(V).facets, block.surface.frame)
+    body = Body(
+        body_of(F, u, [bc], options=DIRECT_OPTIONS), block.contact(V).facets, block.surface.frame
+    )
     points = contact_points(variant, body.X, body.T)
     found = Touching(points, body.S).solve(body.free(), dc.Friction(MU, P))
     forces = even(body.X, body.T)[:, None] * block.traction
@@ -86,7 +88,7 @@ def uneven_block(cells: int) -> Body:
     bc = fem.dirichletbc(
         fem.Constant(domain, np.zeros(3)), fem.locate_dofs_topological(V, 2, top), V
     )
-    return Body(body_of(F, u, [bc], options=DIRECT), bottom, UP)
+    return Body(body_of(F, u, [bc], options=DIRECT_OPTIONS), bottom, UP)
 
 
 def stability(points: Points, body: Body, cells: int) -> dict:
@@ -111,7 +113,7 @@ def tetrahedral_punch(n: int) -> tuple[Punch, Body]:
     lowest = start.height / options["layers"] ** 2
     parameters = replace(start, case="A", tol=1e-8, lowest=lowest)
     punch = Punch(
-        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=True, tetrahedra=True, **options
+        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT_OPTIONS, quarter=True, tetrahedra=True, **options
     )  # fmt: skip
     return punch, Body(punch.problem.body, punch.facet_tags.find(CONTACT), UP)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 from dolfinx_contact.compat import second_order
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from dolfinx_contact.problem_input import body_of
 
 # isort: split
@@ -79,7 +79,7 @@ class Ball:
         for k, facets in held:
             dofs = fem.locate_dofs_topological(V.sub(k), 2, facets)
             bcs.append(fem.dirichletbc(zero, dofs, V.sub(k)))
-        return Body(body_of(F, u, bcs, options=DIRECT), top, DOWN)
+        return Body(body_of(F, u, bcs, options=DIRECT_OPTIONS), top, DOWN)
 
     def drag(self, touching: Touching, a: float) -> dict:
         """Pressed until the radius of contact is ``a``, and dragged: errors against H. Hertz, and R. D. Mindlin."""

@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx import fem
 
 from dolfinx_contact import compat
-from dolfinx_contact.analysis.estimate import QUANTITIES, Estimate, estimate, largest
+from dolfinx_contact.analysis.estimate import ESTIMATED_QUANTITIES, Estimate, estimate, largest
 from dolfinx_contact.support.checks import positive
 from dolfinx_contact.support.collective import agree, raised_together
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 # Squares that differ by less, as of cells that symmetry makes equal, are divided together.
-TIES = 1e-6
+EQUAL_SQUARES = 1e-6
 
 Pair = tuple["ContactProblem", "ContactProblem"]
 
@@ -104,7 +104,7 @@ def adapt(
         >>> cube = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2)
         >>> found = dc.adapt(lambda of: (press(of, 1), press(of, 2)), cube, 0.05, "normal_force")
     """
-    mine = {**QUANTITIES, **(quantities or {})}
+    mine = {**ESTIMATED_QUANTITIES, **(quantities or {})}
     with raised_together(mesh.comm):
         accuracy, share = positive("accuracy", accuracy, finite=True), positive("share", share)
         _check(mesh, share, quantity, mine, meshes)
@@ -166,5 +166,5 @@ def _largest(cells: fem.Function, share: float) -> np.ndarray:
     squares = cells.x.array[: _cell_map(cells.function_space.mesh).size_local] ** 2
     falling = np.sort(np.concatenate(comm.allgather(squares)))[::-1]
     sums = np.cumsum(falling)
-    least = (1 - TIES) * falling[np.searchsorted(sums, share * sums[-1])]
+    least = (1 - EQUAL_SQUARES) * falling[np.searchsorted(sums, share * sums[-1])]
     return np.flatnonzero((squares >= least) & (squares > 0)).astype(np.int32)

@@ -19,11 +19,11 @@ from dolfinx_contact.support.collective import agree, raised_together
 Mesh = TypeVar("Mesh")
 
 # Differences from mesh to mesh are taken to shrink at least and at most by these factors: the rest may be chance.
-SHRINK = 2.0, 4.0
+SMALLEST_LARGEST_RATIO = 2.0, 4.0
 # An estimate falls by this factor from one mesh to the next, at most.
-FALL = 8.0
+LARGEST_DECREASE = 8.0
 # Part of the accuracy that is left to the increments.
-SHARE = 0.5
+INCREMENT_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ def converge(
         halved, increments = _halve(lambda k, of=level - 1: at(of, k), halved, halvings, accuracy)
         last, value = at(level - 1, halved), at(level, halved)
         change = abs(value - last)
-        shrunk = SHRINK[0]
+        shrunk = SMALLEST_LARGEST_RATIO[0]
         if level > 1 and change > 0:
-            shrunk = np.clip(abs(last - at(level - 2, halved)) / change, *SHRINK)
-        of_mesh = max(change / (shrunk - 1), of_mesh / FALL)
+            shrunk = np.clip(abs(last - at(level - 2, halved)) / change, *SMALLEST_LARGEST_RATIO)
+        of_mesh = max(change / (shrunk - 1), of_mesh / LARGEST_DECREASE)
         errors = [float(error / abs(value)) for error in (of_mesh, increments)]
         if sum(errors) <= accuracy:
             break
@@ -123,7 +123,7 @@ def _halve(
     while halvings:
         before, half = at(halved), at(halved + 1)
         error = 2 * abs(half - before)
-        if error <= SHARE * accuracy * abs(half) or halved == halvings:
+        if error <= INCREMENT_SHARE * accuracy * abs(half) or halved == halvings:
             return halved, error
         halved += 1
     return 0, 0.0

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.laws import rows
-from dolfinx_contact.contact.state import KEPT, OPPOSITE
+from dolfinx_contact.contact.state import OPPOSITE_WEAR, SLIP_KEPT
 from dolfinx_contact.results.record import NotConverged
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import a_problem, positive
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 # The shortest jump: the cycles of its fine run are simulated one by one.
-SHORTEST = 2
+SHORTEST_JUMP = 2
 
 # Jumps aim at a difference of so many accuracies and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
-AIM, ACCEPTED, GROW, SHRINK = 1.5, 1.5, 6.0, 0.1
+ACCURACIES_AIMED_AT, ACCEPTED_EXCESS, LARGEST_GROWTH, SMALLEST_REDUCTION = 1.5, 1.5, 6.0, 0.1
 
 # Part of the largest mu, or p, by which friction that evolves is to change in a jump.
-CHANGE = 0.25
+FRICTION_CHANGE = 0.25
 
 # Part of all that is worn, of which a jump may have the accuracy as its own error, however little it wears itself.
-SHARE = 0.05
+WORN_SHARE = 0.05
 
-RECORD = "record.json"
+RECORD_FILE = "record.json"
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ class _Run:
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
         self._area = np.concatenate([area for c in self._worn for area in (c.whole_area, c.opposite_area)])  # fmt: skip
         self.end = self.coarse = self.present()
-        self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST), "table": [], "measured": [0] + 3 * [np.inf]}  # fmt: skip
+        self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST_JUMP), "table": [], "measured": [0] + 3 * [np.inf]}  # fmt: skip
 
     def present(self) -> _State:
         """The present state."""
@@ -232,10 +232,10 @@ class _Run:
     def jump(self, cycles: int) -> dict[str, Any]:
         """Make the next jump towards so many cycles; returns its row of the table.  Collective."""
         while True:
-            length = int(max(min(self.record["next"], self._longest), SHORTEST))
+            length = int(max(min(self.record["next"], self._longest), SHORTEST_JUMP))
             left = cycles - self.record["done"]
             length = _even(left, length)
-            late = 2 * length >= left or _even(left - length, length) <= SHORTEST
+            late = 2 * length >= left or _even(left - length, length) <= SHORTEST_JUMP
             row = self._tried(length, late)
             if row is not None:
                 self.show()
@@ -244,7 +244,7 @@ class _Run:
 
     def _tried(self, length: int, late: bool) -> dict[str, Any] | None:
         """The row of a jump of so many cycles, None where it is rejected; says how long the next one may be, and measures a late one.  Collective."""
-        plain = length <= SHORTEST  # the fine run simulates all
+        plain = length <= SHORTEST_JUMP  # the fine run simulates all
         coarse = self._through([length])
         fine = end = coarse
         if length > 1 and (plain or coarse):
@@ -252,10 +252,14 @@ class _Run:
         if coarse and fine and not plain:
             end = self._extrapolated(coarse, fine, length)
         volume, depth, local = self._compared(coarse, fine, end, length)
-        over = max(local / (AIM * self._accuracy), self._changed(end) ** 2)
-        accepted = end is not None and (plain or over <= ACCEPTED)
-        factor = min(max(over**-0.5, SHRINK), GROW if accepted else 0.5) if over > 0.0 else GROW
-        self.record["next"] = max(factor * length, float(SHORTEST))
+        over = max(local / (ACCURACIES_AIMED_AT * self._accuracy), self._changed(end) ** 2)
+        accepted = end is not None and (plain or over <= ACCEPTED_EXCESS)
+        factor = (
+            min(max(over**-0.5, SMALLEST_REDUCTION), LARGEST_GROWTH if accepted else 0.5)
+            if over > 0.0
+            else LARGEST_GROWTH
+        )
+        self.record["next"] = max(factor * length, float(SHORTEST_JUMP))
         if not accepted:
             return None
         if late and not plain and length > self.table[self.record["measured"][0]]["jump"]:
@@ -319,7 +323,9 @@ class _Run:
             off = fine.depth - coarse.depth - (length / last["jump"]) ** 2 * before
         volume, more, new = map(float, body.total([area @ of for of in (end.depth, worn, np.abs(off))]))  # fmt: skip
         depth, deeper, most = (body.largest(np.abs(of)) for of in (end.depth, worn, off))
-        local = max(_part(new, more + SHARE * volume), _part(most, deeper + SHARE * depth))
+        local = max(
+            _part(new, more + WORN_SHARE * volume), _part(most, deeper + WORN_SHARE * depth)
+        )
         return volume, depth, local if last and coarse else np.inf
 
     def _measure(self, fine: _State, end: _State, length: int) -> None:
@@ -356,7 +362,7 @@ class _Run:
         for of in (slice(0, 2), slice(2, 4)):
             before, now = (side.friction[:, of].ravel() for side in (self.end, end))
             parts.append(_part(largest(np.abs(now - before)), largest(np.maximum(before, now))))
-        return max(parts) / CHANGE
+        return max(parts) / FRICTION_CHANGE
 
 
 def _even(left: int, length: int) -> int:
@@ -389,7 +395,7 @@ def _is_record(record: Any) -> bool:
     return (
         all(type(number) is int and number >= 0 for number in whole)
         and np.isfinite([record["next"], *(number for row in rows for number in row)]).all()
-        and record["next"] >= SHORTEST
+        and record["next"] >= SHORTEST_JUMP
         and len(errors) == 3
         and all(error >= 0.0 for error in errors)
         and at < len(rows)
@@ -427,7 +433,7 @@ class _Folder:
         self._written = self._names()
 
     def _record(self, cycles: int) -> dict | None:
-        file = self._path / RECORD
+        file = self._path / RECORD_FILE
         try:
             record = json.loads(file.read_text())
             done, complete = record["done"], _is_record(record)
@@ -459,12 +465,12 @@ class _Folder:
             run.problem.save(self._path / name)
         with raised_together(self._comm):
             if self._comm.rank == 0:
-                unfinished = self._path / f"{RECORD}.unfinished"
+                unfinished = self._path / f"{RECORD_FILE}.unfinished"
                 with open(unfinished, "w") as file:
                     json.dump(run.record, file)
                     file.flush()
                     os.fsync(file.fileno())
-                os.replace(unfinished, self._path / RECORD)
+                os.replace(unfinished, self._path / RECORD_FILE)
                 for name in self._written:  # before
                     with suppress(OSError):
                         (self._path / name).unlink()
@@ -473,11 +479,11 @@ class _Folder:
 
 def _sums(contact: Contact) -> dict[str, np.ndarray]:
     """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
-    return {name: of for name, of in contact.history.sums.items() if name != KEPT}
+    return {name: of for name, of in contact.history.sums.items() if name != SLIP_KEPT}
 
 
 def _take_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
     """Let the next step start from other ``sums``, none of them negative.  Collective where a deformable surface wears."""
     sums = contact.history.sums | {name: frozen(of) for name, of in sums.items()}
-    worn = contact.geometry.everywhere(sums[OPPOSITE]) if OPPOSITE in sums else None
+    worn = contact.geometry.everywhere(sums[OPPOSITE_WEAR]) if OPPOSITE_WEAR in sums else None
     contact.go_back(contact.history.but(sums=sums, worn=worn))

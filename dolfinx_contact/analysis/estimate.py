@@ -73,7 +73,7 @@ def _peak(problem: ContactProblem) -> float:
     return max(problem.body.comm.allgather(float(max(tops))))
 
 
-QUANTITIES = {
+ESTIMATED_QUANTITIES = {
     "normal_force": lambda problem: _sum(problem, lambda of: of.reaction[:, -1].sum()),
     "tangential_force": lambda problem: _sum(problem, lambda of: np.linalg.norm(of.reaction[:, :-1], axis=1).sum()),
     "dissipation": lambda problem: _sum(problem, lambda of: of.dissipation.sum()),
@@ -128,7 +128,7 @@ def estimate(
         _check_pair(problem, reference)
     agree(comm, share=share, quantities=sorted(quantities or ()))
     found = {}
-    for name, of in {**QUANTITIES, **(quantities or {})}.items():
+    for name, of in {**ESTIMATED_QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
             value, better = _numbers(name, of(problem), of(reference))
         agree(comm, **{f"quantity {name!r}": (value.tolist(), better.tolist())})

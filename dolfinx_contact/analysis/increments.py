@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.problem import ContactProblem
 
-LOG = logging.getLogger("dolfinx_contact")
+logger = logging.getLogger("dolfinx_contact")
 
 # Steps in a row after which an increment is doubled again; twice as many each time that the doubled one fails at once.
-EASY = 2
+EASY_STEPS = 2
 
 
 def advance(
@@ -115,7 +115,7 @@ def _in_increments(
     """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
     whole, begun = end - now, now
     # Increments are the whole over ``parts``, of which so many are done.
-    parts, done, easy, wait, grown = 1, 0, 0, EASY, False
+    parts, done, easy, wait, grown = 1, 0, 0, EASY_STEPS, False
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)
         with raised_together(problem.body.comm):
@@ -127,7 +127,7 @@ def _in_increments(
                 raise
             parts, done, easy, wait, grown = 2 * parts, 2 * done, 0, wait * (1 + grown), False
             if problem.body.comm.rank == 0:
-                LOG.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
+                logger.info(f"increments halved to {whole / parts:.3g} at {now:.6g}: {failure}")
             continue
         now, done, easy, grown = at, done + 1, easy + 1, False
         accepted(at, step)

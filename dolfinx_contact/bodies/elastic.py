@@ -24,7 +24,12 @@ from dolfinx_contact.bodies.input import (
     warn_of_unread,
 )
 from dolfinx_contact.contact.displacements import Displacements
-from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, LinearSolver, preconditioner
+from dolfinx_contact.petsc.linear_solver import (
+    DIRECT_OPTIONS,
+    MULTIGRID_OPTIONS,
+    LinearSolver,
+    preconditioner,
+)
 from dolfinx_contact.support.collective import OverRanks, raised_together
 
 if TYPE_CHECKING:
@@ -121,7 +126,9 @@ class ElasticBody(OverRanks):
         self._work, self.displacements = fem.Function(self.V), of or Displacements(self.V)
         self.size = self.displacements.size
         self.support(bcs)
-        default = DIRECT if self.displacements.mixed else None  # a saddle point: no multigrid
+        default = (
+            DIRECT_OPTIONS if self.displacements.mixed else None
+        )  # a saddle point: no multigrid
         self.options = default if options is None else dict(options)
         self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
         self._digest: bytes | None = None  # of the stiffness that is assembled
@@ -351,7 +358,7 @@ class ElasticBody(OverRanks):
 
         Args:
             b: As ``load`` returns it.
-            rough: Three digits are enough, see ``linear_solver.ROUGH``; only where they are cheaper.
+            rough: Three digits are enough, see ``linear_solver.ROUGH_TOLERANCE``; only where they are cheaper.
         """
         known = self.last_free_state
         if known is not None and known.digest.tobytes() != self._digest:
@@ -398,7 +405,7 @@ class ElasticBody(OverRanks):
     @property
     def _usual(self) -> dict[str, Any] | None:
         """PETSc options of the solvers of this body, None for those that a matrix of that size has by default."""
-        return MULTIGRID if self.options is None and self.crowded else self.options
+        return MULTIGRID_OPTIONS if self.options is None and self.crowded else self.options
 
     def solver(self, A: PETSc.Mat) -> LinearSolver:
         """The solver of another matrix on ``V`` by the options of this body."""

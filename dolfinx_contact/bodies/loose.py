@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
 
 # What is smaller than this part of the largest component is not said of a motion.
-SAID = 3e-3
+NEGLIGIBLE_COMPONENT = 3e-3
 
 # Sizes of the body from its middle, beyond which nobody looks for the axis of a rotation.
-NEAR = 3.0
+AXIS_DISTANCE = 3.0
 
 
 class LoosePart(NamedTuple):
@@ -63,15 +63,15 @@ class LooseMotions:
         gdim = part.middle.size
         along, turning = amounts[:gdim], _rotation(amounts[gdim:]) / part.size
         of = "" if part.where == "the body" else f" of {part.where}"
-        if np.linalg.norm(turning) * part.size < SAID * np.linalg.norm(along):
+        if np.linalg.norm(turning) * part.size < NEGLIGIBLE_COMPONENT * np.linalg.norm(along):
             return f"a translation along {_rounded(along)}{of}"
         axis = turning / np.linalg.norm(turning)
         arm = np.cross(axis, np.append(along, np.zeros(3 - gdim))) / np.linalg.norm(turning)
-        if np.linalg.norm(arm) > NEAR * part.size:
+        if np.linalg.norm(arm) > AXIS_DISTANCE * part.size:
             middle = ", ".join(f"{x:.4g}" for x in part.middle)
             return f"a translation along {_rounded(along)} that turns a little about the middle ({middle}){of}"
         at = part.middle + arm[:gdim]
-        at[np.abs(at) < SAID * part.size] = 0.0
+        at[np.abs(at) < NEGLIGIBLE_COMPONENT * part.size] = 0.0
         about = f"({', '.join(f'{x:.4g}' for x in at)}){of}"
         return (
             f"a rotation about {'' if gdim == 2 else f'the axis {_rounded(axis)} through '}{about}"
@@ -88,7 +88,7 @@ class LooseMotions:
             if done == len(rows):
                 break
             largest = done + int(np.abs(rows[done:, column]).argmax())
-            if abs(rows[largest, column]) < SAID * np.abs(rows).max():
+            if abs(rows[largest, column]) < NEGLIGIBLE_COMPONENT * np.abs(rows).max():
                 continue
             rows[[done, largest]] = rows[[largest, done]]
             rows[done] /= rows[done, column]
@@ -114,7 +114,7 @@ def _rotation(amounts: np.ndarray) -> np.ndarray:
 
 def _rounded(vector: np.ndarray) -> str:
     vector = vector / np.linalg.norm(vector)
-    return f"({', '.join(f'{x:.3g}' for x in np.where(np.abs(vector) < SAID, 0.0, vector))})"
+    return f"({', '.join(f'{x:.3g}' for x in np.where(np.abs(vector) < NEGLIGIBLE_COMPONENT, 0.0, vector))})"
 
 
 def times_volume(of: Displacements, modes: np.ndarray) -> np.ndarray:

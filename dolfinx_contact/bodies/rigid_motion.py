@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
 
 # Relative energies and squares of lengths below this are rounding, not stiffness or distance.
-ROUNDING = 1e-13
+RELATIVE_ROUNDING = 1e-13
 
 # Below this a motion is so soft that solving with the stiffness loses digits which contact needs.
-SOFT = 1e-4
+SOFT_MOTION = 1e-4
 
 # About how many cells of a rank are asked for their strain.
-SAMPLED = 2000
+SAMPLED_CELLS = 2000
 
 
 def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
@@ -46,7 +46,7 @@ def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
         modes = of.vectors(rigid_modes(x, part == k, body.comm))
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
-        left_free = vectors[:, values <= ROUNDING * values[-1]]
+        left_free = vectors[:, values <= RELATIVE_ROUNDING * values[-1]]
         free = modes @ left_free
         if free.shape[1] == 0:
             continue
@@ -55,13 +55,13 @@ def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
         scale = body.total(free.T @ (diagonal[:, None] * free))
         root = np.linalg.inv(np.linalg.cholesky(scale))
         relative, vectors = np.linalg.eigh(root @ (energy + energy.T) / 2 @ root.T)
-        if relative[0] < ROUNDING:
+        if relative[0] < RELATIVE_ROUNDING:
             where = f"one of its {parts} separate parts" if parts > 1 else "the body"
-            turned = root.T @ vectors[:, relative < ROUNDING]
+            turned = root.T @ vectors[:, relative < RELATIVE_ROUNDING]
             combination = left_free @ turned
             middle, size = box(x, part == k, body.comm)
             loose.append((where, free @ turned, combination, middle, size))
-        soft.append(free @ (root.T @ vectors[:, relative < SOFT]))
+        soft.append(free @ (root.T @ vectors[:, relative < SOFT_MOTION]))
     if not loose:
         return np.concatenate(soft, axis=1), None
     from dolfinx_contact.bodies.loose import LooseMotions, LoosePart
@@ -103,7 +103,7 @@ def free_modes(body: ElasticBody) -> np.ndarray:
     modes[body.fixed] = 0.0
     products = body.total(modes.T @ modes)
     values, vectors = np.linalg.eigh(products)
-    left = values > ROUNDING * values[-1]
+    left = values > RELATIVE_ROUNDING * values[-1]
     if not left.all():  # conditions fix a component of all nodes
         return modes @ vectors[:, left] / np.sqrt(values[left])
     return np.linalg.solve(np.linalg.cholesky(products), modes.T).T
@@ -127,7 +127,7 @@ def mean_strain(displacements: Displacements, u: np.ndarray) -> float:
     """
     of, mesh = displacements, displacements.V.mesh
     nodes = compat.cell_nodes(of.V)[: mesh.topology.index_map(mesh.topology.dim).size_local]
-    nodes = nodes[:: len(nodes) // SAMPLED + 1]
+    nodes = nodes[:: len(nodes) // SAMPLED_CELLS + 1]
     x, moved = of.x[nodes][..., : of.dim], u[of.dofs(nodes.ravel())].reshape(*nodes.shape, of.dim)
     x, moved = (values - values.mean(axis=1, keepdims=True) for values in (x, moved))
     across = x.transpose(0, 2, 1)

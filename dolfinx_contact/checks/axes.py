@@ -11,7 +11,7 @@ from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.fields import turn_of_nodes
 
 # Radians by which a body may turn under axes that stay in space, though they are the body's.
-STAY = 0.05
+LARGEST_ROTATION = 0.05
 
 
 class AxesStay(Check):
@@ -26,7 +26,7 @@ class AxesStay(Check):
         moved = step.u[contact.displacements.dofs(contact.nodes)]
         turned = turn_of_nodes(x, x + moved, contact.comm)
         angle = float(np.arccos(np.clip((np.trace(turned) - dim + 2) / 2, -1.0, 1.0)))
-        if angle <= STAY:
+        if angle <= LARGEST_ROTATION:
             return None
         return (
             f"the body has turned by {angle:.2g} rad at {contact!r}, and axes of friction that a callable or Function gives for it stay as they are "

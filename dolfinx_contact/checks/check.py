@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from dolfinx_contact.results.record import Counts
 
 # What is rounding, radians, or over the size of a body.
-CLEAR = 1e-6
+NEGLIGIBLE_PART = 1e-6
 
-LOG = logging.getLogger("dolfinx_contact")
+logger = logging.getLogger("dolfinx_contact")
 
 
 class CheckedStep(NamedTuple):
@@ -75,7 +75,7 @@ def run_checks(
         if said and check.level is None:
             warnings.warn(said, stacklevel=3)
         elif said and step.body.comm.rank == 0:
-            LOG.log(check.level, said)
+            logger.log(check.level, said)
     return tuple(left), step.over
 
 
@@ -92,5 +92,5 @@ def checked_checks(checks: Any) -> tuple[Check, ...]:
 
 def place_of(where: Sequence[float]) -> str:
     """A position in words."""
-    where = np.where(np.abs(where) < CLEAR * np.abs(where).max(), 0.0, where)
+    where = np.where(np.abs(where) < NEGLIGIBLE_PART * np.abs(where).max(), 0.0, where)
     return f"({', '.join(f'{x:.3g}' for x in where)})"

@@ -14,28 +14,28 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.checks.check import CLEAR, Check, CheckedStep, place_of
+from dolfinx_contact.checks.check import NEGLIGIBLE_PART, Check, CheckedStep, place_of
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.support.collective import raised_together
 
 # What is missed, over the largest ``r_n / kappa``, above which the user is told.
-SHARE = 1.0
+LARGEST_MISS = 1.0
 
 # A surface stands out between nodes of a round body on its own account if it does by more than so many times the body.
-ROUND = 4.0
+SAG_RATIO = 4.0
 
 # Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
-SLOPES, ALONG = 0.1, 1e-5
+LARGEST_SLOPE, DIFFERENCE_LENGTH = 0.1, 1e-5
 
 # Part of a hollow between nodes that these may be open and still count as touching.
-TOUCHING = 0.1
+TOUCHING_PART = 0.1
 
 # How often points of a facet are taken about the deepest one, and by how much nearer to each other.
-CLOSER, FACTOR = 3, 0.25
+CLOSER_LOOKS, CLOSER_FACTOR = 3, 0.25
 
 # In how many facets of a rank points are moved: the surface may be slow to ask for distances.
-DEEPEST = 64
+DEEPEST_FACETS = 64
 
 
 class Missed(NamedTuple):
@@ -86,7 +86,7 @@ class _OfFacets(Check):
             with raised_together(contact.comm):
                 missed = self._missed(contact, facets, step.u, pushed, worn)
             missed = max(contact.comm.allgather(missed))
-            if missed.length > max(SHARE * pushed, CLEAR * missed.size):
+            if missed.length > max(LARGEST_MISS * pushed, NEGLIGIBLE_PART * missed.size):
                 return self._said(contact, missed, pushed)
         return None
 
@@ -113,8 +113,8 @@ class Straight(_OfFacets):
             flat = facets.at_nodes @ facets.x[:, facets.vertices]
             off = np.linalg.norm(facets.x - flat, axis=-1) / facets.size[:, None]
             sag = np.abs(facets.sag_at_nodes()) / facets.size[:, None]
-            most = max(most, float(np.where(off < CLEAR, sag, 0.0).max(initial=0.0)))
-        return contact.comm.allreduce(most, op=MPI.MAX) > CLEAR
+            most = max(most, float(np.where(off < NEGLIGIBLE_PART, sag, 0.0).max(initial=0.0)))
+        return contact.comm.allreduce(most, op=MPI.MAX) > NEGLIGIBLE_PART
 
     def _missed(
         self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: Any
@@ -191,7 +191,7 @@ def _within(
     """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
     half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
     rule = 2.0 * gauss(facets.dim) - 1.0
-    for _ in range(CLOSER):
+    for _ in range(CLOSER_LOOKS):
         rows, touch = np.arange(len(x)), opened.max(axis=1)[:, None]
         at = np.clip(centre + half * rule, 0.0, 1.0)
         shapes = facets.shapes(at)
@@ -200,9 +200,9 @@ def _within(
         bulge = np.einsum("mqk,mk->mq", shapes, gaps) - there
         bulge[np.isinf(there)] = 0.0
         above = np.einsum("mqk,mk->mq", shapes, opened)
-        hollow = np.where(touch < -TOUCHING * bulge, -bulge, 0.0)
+        hollow = np.where(touch < -TOUCHING_PART * bulge, -bulge, 0.0)
         sunk = bulge - np.maximum(above, 0.0)
-        own = np.abs(bulge) > ROUND * np.abs(facets.sag(facets.hats(at)))
+        own = np.abs(bulge) > SAG_RATIO * np.abs(facets.sag(facets.hats(at)))
         lengths = np.where(own, np.maximum(sunk, hollow), 0.0)
         k = lengths.argmax(axis=1)
         lengths, of_all = lengths[rows, k], np.abs(bulge[rows, k])
@@ -211,8 +211,8 @@ def _within(
         receding = hollow[rows, k] > sunk[rows, k]
         missed = missed.or_more(lengths, points[rows, k], facets.size, needed, receding)
         depth = bulge - above
-        some = np.argsort(-depth.max(axis=1), kind="stable")[:DEEPEST]
-        centre, half = at[some, depth[some].argmax(axis=1)][:, None], half * FACTOR
+        some = np.argsort(-depth.max(axis=1), kind="stable")[:DEEPEST_FACETS]
+        centre, half = at[some, depth[some].argmax(axis=1)][:, None], half * CLOSER_FACTOR
         facets, x, gaps, opened = facets.some(some), x[some], gaps[some], opened[some]
     return missed
 
@@ -230,7 +230,7 @@ class Slopes(Check):
 
     def run(self, step: CheckedStep) -> str | None:
         contact, u = self._contact, step.u
-        length, force = ALONG * step.body.extent, contact.reaction[:, -1]
+        length, force = DIFFERENCE_LENGTH * step.body.extent, contact.reaction[:, -1]
         (_, x), squares = contact.geometry.ended_at(u), np.zeros(len(force))
         with raised_together(contact.comm):
             for along in contact.frame[:-1]:
@@ -242,7 +242,7 @@ class Slopes(Check):
                 squares += np.square(np.where(np.isfinite(slopes), slopes, 0.0))
         sizes = np.array([squares @ force**2, force @ force])
         turned, pressing = np.sqrt(contact.comm.allreduce(sizes))
-        if not turned > SLOPES * pressing:
+        if not turned > LARGEST_SLOPE * pressing:
             return None
         return (
             f"the height of {contact.surface!r} slopes by {turned / pressing:.2g} where nodes press on it, and its normal stays that of the plane: "

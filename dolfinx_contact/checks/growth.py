@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # About how many nodes of a rank are asked how the body turns.
-SAMPLED = 2000
+SAMPLED_NODES = 2000
 
 # Part of a length that is rounding; part of the growth that has to be hindered: as much is left of it where a body is strained.
-ROUNDING, HINDERED = 1e-13, 1e-2
+LENGTH_ROUNDING, HINDERED_PART = 1e-13, 1e-2
 
 
 class Turn:
@@ -41,7 +41,7 @@ class Turn:
     def __init__(self, body: ElasticBody):
         self._body, of = body, body.displacements
         self._part, self._count = body.parts
-        nodes = np.arange(of.count)[:: of.count // SAMPLED + 1]
+        nodes = np.arange(of.count)[:: of.count // SAMPLED_NODES + 1]
         x, here = of.x[nodes, : of.dim], self._part[nodes]
         sums = np.zeros((self._count, of.dim + 1))
         np.add.at(sums, here, np.column_stack((x, np.ones(len(x)))))
@@ -51,7 +51,10 @@ class Turn:
         m = turning.shape[2]
         squares = np.zeros((self._count, m, m))
         np.add.at(squares, here, turning.transpose(0, 2, 1) @ turning)
-        fit = turning @ np.linalg.pinv(body.total(squares), rcond=ROUNDING, hermitian=True)[here]
+        fit = (
+            turning
+            @ np.linalg.pinv(body.total(squares), rcond=LENGTH_ROUNDING, hermitian=True)[here]
+        )
         rows = np.broadcast_to((m * here[:, None] + np.arange(m))[:, None], fit.shape)
         columns = np.broadcast_to(of.dofs(nodes)[:, :, None], fit.shape)
         places = rows.ravel(), columns.ravel()
@@ -131,11 +134,11 @@ def _left(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
     left, rest = rows[:, :2].copy(), rows[:, 2:]
     size = np.sqrt(body.total((rest**2).sum(axis=0)))
     rest = rest / np.where(size > 0.0, size, 1.0)
-    inverse = np.linalg.pinv(body.total(rest.T @ rest), rcond=ROUNDING, hermitian=True)
+    inverse = np.linalg.pinv(body.total(rest.T @ rest), rcond=LENGTH_ROUNDING, hermitian=True)
     for _ in range(2):  # the second time for digits that the first one lost
         left -= rest @ (inverse @ body.total(rest.T @ left))
     squares, all_ = body.total(np.array([(left**2).sum(axis=0), (rows[:, :2] ** 2).sum(axis=0)]))
-    return np.where(squares > np.square([HINDERED, ROUNDING]) * all_, squares, 0.0)
+    return np.where(squares > np.square([HINDERED_PART, LENGTH_ROUNDING]) * all_, squares, 0.0)
 
 
 def _turning(arms: np.ndarray) -> np.ndarray:

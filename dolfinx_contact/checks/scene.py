@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.rigid_motion import mean_strain
-from dolfinx_contact.checks.check import CLEAR, Check, CheckedStep, place_of
+from dolfinx_contact.checks.check import NEGLIGIBLE_PART, Check, CheckedStep, place_of
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 
 # Mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth; a displacement of so many times
 # the size of a body is one in other units.
-STRAINED, LARGE = 0.2, 10.0
+LARGE_STRAIN, LARGE_DISPLACEMENT = 0.2, 10.0
 
 # By what a linear body that turns is too large, over the lengths by which contact and supports deform it.
-GROWN = 0.1
+GROWTH_SHARE = 0.1
 
 # Displacements turn a body by no more than so many times the half of their spread over its thickness: more than the thickness over the
 # root mean square of distances from the middle.
-LEVER = 4.0
+ROTATION_BOUND = 4.0
 
 # Smallest gap over the size of the body, and cosine between facets and a plane, from which on nothing is likely to touch.
-FAR, STEEP = 0.25, 0.1
+FAR_AWAY, FACING_COSINE = 0.25, 0.1
 
 # Part of the frictional work that a turn of slip may leave unknown.
-DOUBTFUL = 0.1
+DOUBTFUL_WORK = 0.1
 
 
 class Size(Check):
@@ -44,9 +44,11 @@ class Size(Check):
     def run(self, step: CheckedStep) -> str | None:
         body = step.body
         largest = body.farthest(step.u[: body.size])
-        if 2.0 * largest <= STRAINED * body.thickness:  # opposite faces may move against each other
+        if (
+            2.0 * largest <= LARGE_STRAIN * body.thickness
+        ):  # opposite faces may move against each other
             return None
-        if largest > LARGE * body.extent:
+        if largest > LARGE_DISPLACEMENT * body.extent:
             return (
                 f"the largest displacement, {largest:.3g}, is {largest / body.extent:.2g} times the size of the body, "
                 f"{body.extent:.3g}: check the units of lengths, loads and moduli."
@@ -54,7 +56,7 @@ class Size(Check):
                 * (not body.nonlinear)
             )
         strain = 0.0 if body.nonlinear else mean_strain(body.displacements, step.u)
-        if strain <= STRAINED:
+        if strain <= LARGE_STRAIN:
             return None
         return (
             f"the body is strained by {strain:.0%} (root mean square of the largest principal strain): F is linear in u, which "
@@ -102,9 +104,9 @@ class Grows(Check):
     def run(self, step: CheckedStep) -> str | None:
         body, contacts, u = step.body, step.contacts, step.u
         pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, step.stiffness)]
-        felt = GROWN * body.largest(np.concatenate(pushed))
+        felt = GROWTH_SHARE * body.largest(np.concatenate(pushed))
         if self._turn is None:
-            most = LEVER * _spread(body, u[: body.size]) / body.thickness  # of rotations
+            most = ROTATION_BOUND * _spread(body, u[: body.size]) / body.thickness  # of rotations
             if body.parts[1] == 1 and 0.5 * most**2 * body.extent <= felt:
                 return None
             from dolfinx_contact.checks.growth import Turn
@@ -115,12 +117,15 @@ class Grows(Check):
         angles = self._turn.angles(u[: body.size])
         theta = float(np.linalg.norm(angles, axis=1).max())
         length = 0.5 * theta**2 * body.extent
-        if theta <= CLEAR or length <= felt:
+        if theta <= NEGLIGIBLE_PART or length <= felt:
             return None
         if length <= -body.highest(-np.concatenate([contact.present.gap for contact in contacts])):
             return None
         share = self._turn.share(contacts, u[: body.size], angles)
-        if not (share > GROWN and 0.5 * theta**2 > GROWN * mean_strain(body.displacements, u)):
+        if not (
+            share > GROWTH_SHARE
+            and 0.5 * theta**2 > GROWTH_SHARE * mean_strain(body.displacements, u)
+        ):
             return None
         return (
             f"the body has turned by {theta:.3g} rad, and F is linear in u: so it grows by theta^2 / 2 = {0.5 * theta**2:.2g} of its "
@@ -147,13 +152,16 @@ class NothingTouches(Check):
         if not counts.open:
             return None
         smallest = smallest_gap(body, contacts)
-        if smallest > FAR * body.extent:
+        if smallest > FAR_AWAY * body.extent:
             return (
                 f"no node touches: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}. If that is not meant, "
                 "check place and units of the surface, the direction of loads and the facets."
             )
         flat = [contact for contact in contacts if not contact.surface.curved]
-        if len(flat) < len(contacts) or max(_facing(body, contact) for contact in flat) > STEEP:
+        if (
+            len(flat) < len(contacts)
+            or max(_facing(body, contact) for contact in flat) > FACING_COSINE
+        ):
             return None
         return (
             f"no node touches, and no facet of the contact faces {flat[0].surface!r}: the normals of all of them are across the "
@@ -190,7 +198,7 @@ class NearestGap(Check):
         if body.total(sum(contact.covered.sum() for contact in contacts)) == 0.0:
             return "no node touches yet, and none is opposite the other body: check the facets of both, if it is not on its way"
         smallest = smallest_gap(body, contacts)
-        if smallest <= CLEAR * body.extent:
+        if smallest <= NEGLIGIBLE_PART * body.extent:
             return None
         return f"no node touches yet: the smallest gap is {smallest:.3g}, in a body of size {body.extent:.3g}"
 
@@ -210,7 +218,7 @@ class OneFarAway(Check):
         if body.largest(contact.reaction[:, -1]) > 0.0:
             return ""
         gap = smallest_gap(body, [contact])
-        if gap <= FAR * body.extent:
+        if gap <= FAR_AWAY * body.extent:
             return None
         return f"no node touches {contact.surface!r} yet: the smallest gap is {gap:.3g}, in a body of size {body.extent:.3g}"
 
@@ -224,7 +232,7 @@ class SlipTurns(Check):
             return None
         sums = [[c.history.doubtful_work for c in may], [c.dissipation.sum() for c in may]]
         doubtful, work = step.body.total(np.sum(sums, axis=1))
-        if doubtful <= DOUBTFUL * work:
+        if doubtful <= DOUBTFUL_WORK * work:
             return None
         return (
             f"slip has turned in this step between directions of different friction, which leaves the frictional work unknown by {doubtful:.2g}, "

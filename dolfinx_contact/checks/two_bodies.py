@@ -10,10 +10,10 @@ from dolfinx_contact.checks.check import Check, CheckedStep
 from dolfinx_contact.contact.contact import Contact
 
 # Ratio of sizes of facets, or of stiffnesses, up to which two sides are alike.
-ALIKE = 2.0
+ALIKE_RATIO = 2.0
 
 # Part of what friction can carry that supports may take.
-LOST = 0.005
+LOST_FRICTION = 0.005
 
 
 class _OfContact(Check):
@@ -48,8 +48,8 @@ class BetterSlave(_OfContact):
         if found is None:
             return None
         size, stiff = found
-        coarse, hard = size > ALIKE, stiff > ALIKE
-        if not ((coarse and stiff > 1 / ALIKE) or (hard and size > 1 / ALIKE)):
+        coarse, hard = size > ALIKE_RATIO, stiff > ALIKE_RATIO
+        if not ((coarse and stiff > 1 / ALIKE_RATIO) or (hard and size > 1 / ALIKE_RATIO)):
             return ""
         return (
             f"{contact!r}: its facets are {size:.2g} times as large as those opposite, and its body is {stiff:.2g} times as stiff. "
@@ -65,7 +65,7 @@ class HeldAlong(_OfContact):
         force = contact.friction.mu.max(axis=-1) * contact.reaction[:, -1]
         without = contact.geometry.clamped(body.fixed, contact.history.frames)
         carried, lost, count = body.total([force.sum(), force[without].sum(), without.sum()])
-        if lost > LOST * carried:
+        if lost > LOST_FRICTION * carried:
             return (
                 f"{count:.0f} contact nodes with {100 * lost / carried:.2g} % of what friction can carry are held along the other body by boundary conditions. "
                 "They have no friction, as if on a plane of symmetry: hold the body elsewhere, or let the other side carry the unknowns."

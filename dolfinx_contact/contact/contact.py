@@ -29,7 +29,7 @@ from dolfinx_contact.contact.input import (
 from dolfinx_contact.contact.interface import ContactPoints
 from dolfinx_contact.contact.laws import Laws
 from dolfinx_contact.contact.rigid import RigidGeometry
-from dolfinx_contact.contact.state import OPPOSITE, History, State, frozen_state
+from dolfinx_contact.contact.state import OPPOSITE_WEAR, History, State, frozen_state
 from dolfinx_contact.law.friction import Friction, as_friction
 from dolfinx_contact.support.attributes import Guarded, frozen
 from dolfinx_contact.support.checks import number, positive
@@ -295,7 +295,7 @@ class Contact(Guarded):
     @property
     def opposite_wear_depth(self) -> np.ndarray:
         """Depth worn off a deformable surface, at its nodes ``opposite``, ``shape=(k,)``, length.  Times ``opposite_area`` it is volume."""
-        return self.history.sums.get(OPPOSITE, np.zeros(self.opposite.size))
+        return self.history.sums.get(OPPOSITE_WEAR, np.zeros(self.opposite.size))
 
     @property
     def opening(self) -> np.ndarray:

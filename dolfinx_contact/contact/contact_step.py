@@ -17,11 +17,18 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.contact.geometry import Frames, carried
-from dolfinx_contact.contact.state import KEPT, OPPOSITE, History, State, Status, frozen_state
+from dolfinx_contact.contact.state import (
+    OPPOSITE_WEAR,
+    SLIP_KEPT,
+    History,
+    State,
+    Status,
+    frozen_state,
+)
 from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.support.attributes import frozen
-from dolfinx_contact.support.checks import EPSILON, place
+from dolfinx_contact.support.checks import UNIT_ROUNDOFF, place
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import cross
 
@@ -186,7 +193,7 @@ class ContactStep:
         slip = terms[:, :-1] + np.abs(self.last.displacement[:, :-1])
         if state.known is None:
             slip[self.points.held] = 0.0
-        return EPSILON * gap, EPSILON * slip
+        return UNIT_ROUNDOFF * gap, UNIT_ROUNDOFF * slip
 
     # -- reactions -----------------------------------------------------------------------------
 
@@ -337,14 +344,14 @@ class ContactStep:
             "dissipation": work.sum(axis=1),
             "slip_path": repeats * (touches * np.linalg.norm(slip, axis=1)),
         }
-        sums, worn, depth = history.sums | {KEPT: kept}, history.worn, np.zeros(len(pressed))
+        sums, worn, depth = history.sums | {SLIP_KEPT: kept}, history.worn, np.zeros(len(pressed))
         if given.wear is not None:
             from dolfinx_contact.contact.worn import worn_by
 
             depth, added["wear_depth"], more = worn_by(self, work)
             if more is not None:
-                sums[OPPOSITE] = sums.get(OPPOSITE, 0.0) + more
-                worn = given.geometry.everywhere(sums[OPPOSITE])
+                sums[OPPOSITE_WEAR] = sums.get(OPPOSITE_WEAR, 0.0) + more
+                worn = given.geometry.everywhere(sums[OPPOSITE_WEAR])
         sums |= {name: sums[name] + part for name, part in added.items()}
         turns = self.points.dim == 3 and (friction.mu.ndim > 1 or not friction.isotropic)
         doubtful = float(np.abs(turned.sum(axis=1)).sum()) if turns else None

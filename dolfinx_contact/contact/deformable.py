@@ -16,7 +16,7 @@ from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.surfaces.surface import Surface, unit
 
-SLIDING = ("large", "small")
+SLIDING_KINDS = ("large", "small")
 
 
 class DeformableSurface(Surface):
@@ -62,8 +62,10 @@ class DeformableSurface(Surface):
         boundary, facets = exterior_facet_indices(mesh.topology), given_facets(facets, mesh)
         with raised_together(mesh.comm):
             found = checked_facets(facets, mesh.topology.index_map(fdim), boundary)
-            if sliding not in SLIDING:
-                raise ValueError(f"sliding must be one of {', '.join(SLIDING)}, got {sliding!r}.")
+            if sliding not in SLIDING_KINDS:
+                raise ValueError(
+                    f"sliding must be one of {', '.join(SLIDING_KINDS)}, got {sliding!r}."
+                )
             if axis is not None:
                 self.axis = frozen(unit("axis", axis, mesh.geometry.dim))
         if mesh.comm.allreduce(found.size) == 0:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 # Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
-TURNED, PLACES = 0.5, 32
+LARGEST_TURN, PLACES_ON_WAY = 0.5, 32
 
 
 def pressed(
@@ -80,15 +80,15 @@ def too_long_on_rigid(
     """
     with raised_together(contact.comm):  # the user's functions
         turned = _turned_on_the_way(geometry, contact, state, u)
-    some = np.flatnonzero((turned > TURNED).any(axis=0))
+    some = np.flatnonzero((turned > LARGEST_TURN).any(axis=0))
     if not some.size:
         return 2.0, ""
-    first = (turned > TURNED)[:, some].argmax(axis=0)
-    part = float(first.min()) / PLACES
+    first = (turned > LARGEST_TURN)[:, some].argmax(axis=0)
+    part = float(first.min()) / PLACES_ON_WAY
     at = place(contact.x[:, : contact.points.dim], int(some[first.argmin()]))
     return part, (
         f"after {part:.2g} of it the contact node at {at} on {contact.surface!r} has gone so far along the surface, or the "
-        f"surface has turned so far about its normal there, that the local frame has turned by {TURNED:g} radians"
+        f"surface has turned so far about its normal there, that the local frame has turned by {LARGEST_TURN:g} radians"
     )
 
 
@@ -99,7 +99,7 @@ def _turned_on_the_way(
     surface, there = geometry.ended_at(u)
     count, dim = there.shape
     if not count:
-        return np.zeros((PLACES + 1, 0))
+        return np.zeros((PLACES_ON_WAY + 1, 0))
     y = _way(surface, geometry, contact.given.history, surface.relative(there))
     flat = y.reshape(-1, dim)
     normals, distance = _looked_at(surface, flat)
@@ -113,7 +113,7 @@ def _turned_on_the_way(
     bends[np.isnan(bends)] = np.pi  # through a place without a normal, such as a centre
     if dim == 3:  # and about the normal
         turned = geometry.turned_to(surface, contact.given.history)
-        bends = np.hypot(bends, (normals[-1] @ turned) / PLACES)
+        bends = np.hypot(bends, (normals[-1] @ turned) / PLACES_ON_WAY)
     within = touched & opens
     return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
 
@@ -138,7 +138,7 @@ def _way(
     """
     turned = geometry.turned_to(surface, history)
     start, end = geometry.started(history) - surface.point, end - surface.point
-    parts = np.linspace(0.0, 1.0, PLACES + 1)
+    parts = np.linspace(0.0, 1.0, PLACES_ON_WAY + 1)
     if not turned.any():
         return surface.point + start + parts[:, None, None] * (end - start)
     first = start + start @ rotation_less_one(-turned).T

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
 
 # Points per direction of a facet: those of Gauss's rule, which no wave has at the same phase.
-POINTS = 5
+GAUSS_POINTS = 5
 
 # Cosine of an angle between normals of a facet and of the body at its vertices above which an edge is a sharp one.
-SHARP = np.cos(np.deg2rad(20.0))
+SHARP_EDGE = np.cos(np.deg2rad(20.0))
 
 
 class Facets(NamedTuple):
@@ -143,7 +143,7 @@ def _with_normals(V: fem.FunctionSpace, x: np.ndarray, groups: list, fdim: int) 
                 np.linalg.inv(monomials(local, len(corners), degree)),
                 monomials(local, len(corners), 1) @ np.linalg.inv(flat),
                 ends + other, 2.0 * np.sign(ends) * both,
-                (np.einsum("mi,mvi->mv", own, n) < SHARP).any(axis=1),
+                (np.einsum("mi,mvi->mv", own, n) < SHARP_EDGE).any(axis=1),
                 _diameters(at),
                 own,
             )
@@ -170,7 +170,7 @@ def _outwards(corners: np.ndarray, middle: np.ndarray) -> np.ndarray:
 
 def gauss(dim: int) -> np.ndarray:
     """Points of the unit square or interval, ``shape=(q, dim)``."""
-    along = 0.5 + 0.5 * np.polynomial.legendre.leggauss(POINTS)[0]
+    along = 0.5 + 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[0]
     return np.stack(np.meshgrid(*[along] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
 
 

@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
 
 # Of the largest integral of a shape function over reference facets: below this it is rounding.
-ZERO = 1e-10
+ZERO_INTEGRAL = 1e-10
 
 # By which Cauchy's inequality may miss equality.
-SQUARE = 1e-10
+CAUCHY_DEFECT = 1e-10
 
 # Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
-TILTED = 0.01
+TILT_OF_AREAS = 0.01
 
 # Largest force of a uniform pressure at a node that is left out, relative to the largest nodal force, without a warning.
-UNEVEN = 0.01
+LEFT_OUT_FORCE = 0.01
 
 
 class SurfaceMeasure:
@@ -77,7 +77,7 @@ class SurfaceMeasure:
             if not surface.curved:
                 arms = contact.geometry.arms(contact.displacement, contact.history.frames)
                 turn = turn_of_nodes(x, arms, contact.comm)
-            if np.abs(turn - none).max() <= TILTED:
+            if np.abs(turn - none).max() <= TILT_OF_AREAS:
                 turn = none
             self._whole = frozen(facing_areas(contact, self.weight, turn))
             self._seen_from = surface.rotation
@@ -97,7 +97,7 @@ class SurfaceMeasure:
         """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""
         if self._whole is None or contact.surface.curved:
             return
-        if np.abs(contact.surface.rotation - self._seen_from).max() > TILTED:
+        if np.abs(contact.surface.rotation - self._seen_from).max() > TILT_OF_AREAS:
             self._whole = None
             self.whole(contact)
 
@@ -183,13 +183,13 @@ def facing_areas(contact: Contact, weight: Any, turn: np.ndarray) -> np.ndarray:
     found = rows[:, 0].copy() if surface.curved else rows @ frames[-1]
     largest = contact.comm.allreduce(np.abs(found).max(initial=0.0), op=MPI.MAX)
     with raised_together(contact.comm):
-        if not np.isfinite(found).all() or (found < -ZERO * largest).any():
+        if not np.isfinite(found).all() or (found < -ZERO_INTEGRAL * largest).any():
             node = int(np.argmin(np.nan_to_num(found, nan=-np.inf)))
             raise ValueError(
                 f"the area of the contact node at {place(contact.x, node)} is {found[node]:.3g}: weight must be positive "
                 "on the facets, or zero on an axis."
             )
-    found[found <= ZERO * largest] = 0.0
+    found[found <= ZERO_INTEGRAL * largest] = 0.0
     return found
 
 
@@ -208,7 +208,7 @@ def turn_of_nodes(x: np.ndarray, there: np.ndarray, comm: MPI.Comm) -> np.ndarra
 def nearest_rotation(products: np.ndarray) -> np.ndarray:
     """The rotation ``R`` for which ``tr(R^T products)`` is largest, ``shape=(gdim, gdim)``; none where they do not tell."""
     left, sizes, right = np.linalg.svd(products)
-    if not sizes[len(sizes) - 2] > ZERO * sizes[0]:
+    if not sizes[len(sizes) - 2] > ZERO_INTEGRAL * sizes[0]:
         return np.eye(len(sizes))
     left[:, -1] *= np.linalg.det(left @ right)
     return left @ right
@@ -226,7 +226,7 @@ def grows_with_radius(V: fem.FunctionSpace, weight: Any) -> bool:
     terms = (weight * weight, weight * r, r * r)
     here = [fem.assemble_scalar(fem.form(term * ufl.dx(V.mesh))) for term in terms]
     squares = V.mesh.comm.allreduce(np.array(here, dtype=float))
-    return bool(squares[1] ** 2 >= (1 - SQUARE) * squares[0] * squares[2] > 0.0)
+    return bool(squares[1] ** 2 >= (1 - CAUCHY_DEFECT) * squares[0] * squares[2] > 0.0)
 
 
 def contact_nodes(
@@ -249,7 +249,7 @@ def contact_nodes(
         return nodes, nodes[:0]
     comm = V.mesh.comm
     weights = areas(V, facets, weight is None, weight)[V.mesh.geometry.dim * nodes]
-    zero = ZERO * comm.allreduce(np.abs(weights).max(initial=0.0), op=MPI.MAX)
+    zero = ZERO_INTEGRAL * comm.allreduce(np.abs(weights).max(initial=0.0), op=MPI.MAX)
     with raised_together(comm):
         if (weights < -zero).any():
             node = int(np.argmin(weights))
@@ -273,7 +273,7 @@ def _warn_of_curved_edges(
     acting = np.abs(areas(V, facets, weight=weight))
     most = [acting[dim * of].max(initial=0.0) for of in (left_out, kept)]
     missed, largest = (comm.allreduce(float(of), op=MPI.MAX) for of in most)
-    if missed > UNEVEN * largest:
+    if missed > LEFT_OUT_FORCE * largest:
         warnings.warn(
             f"edges of contact facets are curved: a uniform pressure would make forces of up to {missed / largest:.1%} of "
             "the largest at vertices of second-order tetrahedra, which are no contact nodes. Results are off by about that "

@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.geometry import Frames
 
 # Part of a direction that has to lie in the plane.
-ALONG = 1e-8
+TANGENTIAL_PART = 1e-8
 
 # Part of a direction that is rounding beside a principal one.
-STRAIGHT = 1e-12
+PRINCIPAL_ROUNDING = 1e-12
 
 # Arrays of a contact that coefficients may follow: arguments of callables.
-STATE = ("pressure", "slip_path", "dissipation", "wear_depth")
+STATE_NAMES = ("pressure", "slip_path", "dissipation", "wear_depth")
 
 
 def followed(friction: Friction) -> list[str]:
     """Names of the arrays of a contact that a law's coefficients follow."""
     asked = {name for key in ("mu", "p") for name in _arguments(friction.given()[key])}
-    return [name for name in STATE if name in asked]
+    return [name for name in STATE_NAMES if name in asked]
 
 
 def on_nodes(
@@ -74,7 +74,7 @@ def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray)
         nodes, along: Those held in any direction, and ``f`` of each, ``shape=(k, 2)``, local frame, zero where there is none.
     """
     turned = friction.at(nodes).along_axes(along)
-    oblique = (np.abs(turned) > STRAIGHT).all(axis=1)
+    oblique = (np.abs(turned) > PRINCIPAL_ROUNDING).all(axis=1)
     if not oblique.any():
         return friction
     nodes, along = nodes[oblique], along[oblique]
@@ -95,7 +95,7 @@ def _arguments(given: Callable) -> list[str]:
     if not callable(given) or hasattr(given, "function_space"):
         return []
     try:
-        return [name for name in STATE if name in signature(given).parameters]
+        return [name for name in STATE_NAMES if name in signature(given).parameters]
     except (TypeError, ValueError):
         return []
 
@@ -170,8 +170,8 @@ def axes_at(
     else:
         along = frame[:2] @ values
     length, full = np.linalg.norm(along, axis=0), np.linalg.norm(values, axis=0)
-    if not (length > ALONG * full).all():
-        node = int(np.argmin(length - ALONG * full))
+    if not (length > TANGENTIAL_PART * full).all():
+        node = int(np.argmin(length - TANGENTIAL_PART * full))
         raise ValueError(
             f"axes has no direction along the plane at {place(contact.x, node)}: {values[:, node].tolist()}."
         )
@@ -202,7 +202,7 @@ def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> Non
     try:
         signature(given, follow_wrapped=False).bind(None, **state)
     except TypeError as wrong:
-        also = f", and {', '.join(STATE)} if it has arguments of these names" if name in ("mu", "p") else " alone"  # fmt: skip
+        also = f", and {', '.join(STATE_NAMES)} if it has arguments of these names" if name in ("mu", "p") else " alone"  # fmt: skip
         raise ValueError(f"{name} is called with x{also}: {wrong} in {given!r}.") from None
     except ValueError:  # arguments that Python does not know
         pass

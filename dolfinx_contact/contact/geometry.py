@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.state import History
 
 # Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
-CLEAR = 1e-9
+CLEAR_GAP = 1e-9
 
 
 class Frames(NamedTuple):
@@ -163,7 +163,7 @@ class NodalGeometry(Geometry):
 
     def __init__(self, surface: Surface, x: np.ndarray, dofs: np.ndarray, extent: float, comm: MPI.Comm):  # fmt: skip
         self.surface, self.x, self._comm = surface, x, comm
-        self._dofs, self._extent, self._apart = dofs, extent, CLEAR * extent
+        self._dofs, self._extent, self._apart = dofs, extent, CLEAR_GAP * extent
 
     def covered(self, frames: Frames) -> np.ndarray:
         """Part of each node's area that has a surface opposite."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 # Coefficients of friction between these are hardly meant.
-PERCENT = 10.0, 1000.0
+PER_CENT_RANGE = 10.0, 1000.0
 
 
 def check_space(V: Any) -> None:
@@ -144,7 +144,7 @@ def check_opposite(V: Any, surface: Surface) -> None:
 def warn_of_percent(friction: Friction | float) -> None:
     """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
     largest = friction.mu.max(initial=0.0)
-    if PERCENT[0] < largest < PERCENT[1]:
+    if PER_CENT_RANGE[0] < largest < PER_CENT_RANGE[1]:
         warnings.warn(
             f"a coefficient of friction of {largest:g}: it is force over force, so that 30 % is 0.3 and an angle of 30 degrees is "
             f"tan(30 degrees) = 0.577. For what never slips take inf.",

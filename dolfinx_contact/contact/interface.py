@@ -11,10 +11,10 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from dolfinx_contact.support.checks import STILL
+from dolfinx_contact.support.checks import NEGLIGIBLE_LENGTH
 
 # Part of a direction that is free of boundary conditions, but for rounding, and of a motion that may be rounding.
-FREE = 1e-12
+FREE_PART = 1e-12
 
 
 class NodalStiffness(NamedTuple):
@@ -108,7 +108,7 @@ class ContactPoints:
                 0, 2, 1
             )
             carried -= self.along[:, :, None] * (self.along[:, None, :] @ carried)
-            self._given = np.where(np.abs(carried) < FREE, 0.0, carried)
+            self._given = np.where(np.abs(carried) < FREE_PART, 0.0, carried)
 
     def known(self, motion: np.ndarray, terms: Iterable[np.ndarray]) -> np.ndarray | None:
         """Tangential part of a motion that boundary conditions prescribe, ``shape=(n, gdim - 1)``; None if it is rounding.
@@ -123,7 +123,7 @@ class ContactPoints:
         if not part.any():
             return None
         size = sum(np.abs(term) for term in terms)[self.supported].sum(axis=1)
-        still = np.abs(part).max(axis=1) <= STILL * size
+        still = np.abs(part).max(axis=1) <= NEGLIGIBLE_LENGTH * size
         part[still] = 0.0
         known = np.zeros((self.count, self.dim - 1))
         known[self.supported] = part
@@ -185,7 +185,7 @@ class ContactPoints:
         sums.data *= free[sums.indices]
         directions = turns @ self.frames
         kept = block_diagonal(directions) @ sums
-        fixed = np.sqrt(kept.multiply(kept).sum(axis=1)) < FREE  # but for rounding
+        fixed = np.sqrt(kept.multiply(kept).sum(axis=1)) < FREE_PART  # but for rounding
         directions[np.reshape(fixed, directions.shape[:2])] = 0.0
         numbers = sums.data, sums.indices + self.first, sums.indptr
         return block_diagonal(directions), sparse.csr_matrix(numbers, (sums.shape[0], self._whole))

@@ -28,17 +28,17 @@ from dolfinx_contact.contact.shapes import monomials
 
 # Points of Gauss's rules in each direction of a triangle or interval: as many as integrate products of shape functions exactly, and
 # more where quadrilaterals are no parallelograms, whose inverse maps are no polynomials.
-POINTS, MORE = 2, 10
+GAUSS_POINTS, MORE_GAUSS_POINTS = 2, 10
 
 # Part of a node's area that has to be covered, by the degree: with less, rows sum up to one by terms that are several times larger,
 # up to 3 in first order, 7 in second.
-COVERED = {1: 0.05, 2: 0.2}
+LEAST_COVERED = {1: 0.05, 2: 0.2}
 
 # Area of a node over the largest that is none: of vertices of triangles of second order.
-NOTHING = 1e-9
+NO_AREA = 1e-9
 
 # Departure from a straight facet, over its size, that is rounding.
-STRAIGHT = 1e-12
+STRAIGHT_FACET = 1e-12
 
 
 # Arrays of a ``Side`` with a row for each facet.
@@ -122,8 +122,8 @@ def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Ro
     area, whole, *csr = _kernel.mortar_rows(*sides, own, _rules())
     m = sparse.csr_matrix((own, count))
     m.data, m.indices, m.indptr = csr  # in order: nothing to check
-    least = max((COVERED[side.degree] for side in slaves), default=0.0)
-    covered = area > np.maximum(least * whole, NOTHING * whole.max(initial=0.0))
+    least = max((LEAST_COVERED[side.degree] for side in slaves), default=0.0)
+    covered = area > np.maximum(least * whole, NO_AREA * whole.max(initial=0.0))
     inverse = np.divide(1.0, area, out=np.zeros_like(area), where=covered)
     m.data *= np.repeat(inverse, np.diff(m.indptr))
     m.eliminate_zeros()
@@ -145,7 +145,10 @@ def _for_kernel(side: Side) -> tuple:
 @lru_cache
 def _rules() -> list[tuple[np.ndarray, np.ndarray]]:
     """Points and weights of Gauss's rules on the unit interval."""
-    rules = [np.polynomial.legendre.leggauss(points) for points in range(POINTS, MORE + 1)]
+    rules = [
+        np.polynomial.legendre.leggauss(points)
+        for points in range(GAUSS_POINTS, MORE_GAUSS_POINTS + 1)
+    ]
     return [(0.5 + 0.5 * at, 0.5 * weights) for at, weights in rules]
 
 
@@ -161,7 +164,7 @@ def _cuts(side: Side) -> np.ndarray:
         monomials(side.local[corners], len(corners), 1)
     )
     size = np.abs(side.x - side.x[:, :1]).max(initial=0.0)
-    curved = np.abs(side.x - hats @ side.x[:, corners]).max(initial=0.0) > STRAIGHT * size
+    curved = np.abs(side.x - hats @ side.x[:, corners]).max(initial=0.0) > STRAIGHT_FACET * size
     return np.array(_quarters(side.local, corners) if curved else [_cyclic(corners)])
 
 

@@ -23,7 +23,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.contact.facets import facets_of
 from dolfinx_contact.contact.fields import nearest_rotation
 from dolfinx_contact.contact.geometry import (
-    CLEAR,
+    CLEAR_GAP,
     Frames,
     NodalGeometry,
     carried,
@@ -31,14 +31,14 @@ from dolfinx_contact.contact.geometry import (
     turned_back,
 )
 from dolfinx_contact.contact.interface import (
-    FREE,
+    FREE_PART,
     ContactPoints,
     NodalStiffness,
     block_diagonal,
     nodal_blocks,
 )
-from dolfinx_contact.contact.mortar import BY_FACET, NOTHING, Rows, Side, at_nodes, rows_of
-from dolfinx_contact.contact.rigid import LONGEST
+from dolfinx_contact.contact.mortar import BY_FACET, NO_AREA, Rows, Side, at_nodes, rows_of
+from dolfinx_contact.contact.rigid import LONGEST_TURN
 from dolfinx_contact.contact.state import History, State
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
@@ -50,9 +50,9 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.displacements import Displacements
 
-STRAYED = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
+STRAYED_PART = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
 
-LEAVES = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
+LEAVING_RENEWALS = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
 
 
 class MortarGeometry(NodalGeometry):
@@ -160,9 +160,9 @@ class MortarGeometry(NodalGeometry):
         turned = 0.0
         if last is not None:
             turned = _between(*self._since(last, self._turns_at(u)))[2]
-        if turned <= LONGEST:
+        if turned <= LONGEST_TURN:
             return 2.0, ""
-        return 0.0, f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST:g} is the most"  # fmt: skip
+        return 0.0, f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST_TURN:g} is the most"  # fmt: skip
 
     def _turns_at(self, u: np.ndarray) -> list[np.ndarray]:
         """Rotations of both sides as a whole at a displacement.  Collective."""
@@ -208,7 +208,7 @@ class MortarGeometry(NodalGeometry):
         before = begun if before is None else before
         found, renewed, left = self.projected(at, before.left), before.renewed + 1, before.left
         alone = found.points.alone
-        if renewed > LEAVES:
+        if renewed > LEAVING_RENEWALS:
             left = left | (alone & ~before.points.alone)
         leaving = (alone & ~history.frames.points.alone).any()
         leaving = bool(self._comm.allreduce(leaving, op=MPI.LOR))
@@ -297,7 +297,7 @@ class MortarGeometry(NodalGeometry):
         mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
         volumes = self._comm.allreduce(mine)
         area = self._master.everywhere(area[:, None])[:, 0]
-        bears = area > NOTHING * area.max(initial=0.0)
+        bears = area > NO_AREA * area.max(initial=0.0)
         kept = np.where(bears, np.maximum(volumes, 0.0), 0.0)
         if kept.any():
             kept *= volumes.sum() / kept.sum()
@@ -354,7 +354,7 @@ class MortarGeometry(NodalGeometry):
             return 0.0, np.inf
         slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
         slid = slid[state.reaction[:, -1] > 0.0].max(initial=0.0)
-        return float(slid), STRAYED * self._master.smallest
+        return float(slid), STRAYED_PART * self._master.smallest
 
     def sides(self, state: State, points: MortarPoints) -> tuple[float, float] | None:
         """How many times the facets of the slave are as large, and its body as stiff, as those of the other side.  Collective.
@@ -378,9 +378,9 @@ class MortarGeometry(NodalGeometry):
         """
         master, found = self._master, np.zeros(len(self.x), dtype=bool)
         held = master.everywhere(np.isin(master.own, fixed))
-        size = CLEAR * self._extent
+        size = CLEAR_GAP * self._extent
         for k, axis in enumerate(np.eye(self.x.shape[1])):
-            along = np.linalg.norm(frames.frame[:, :-1] @ axis, axis=1) > FREE
+            along = np.linalg.norm(frames.frame[:, :-1] @ axis, axis=1) > FREE_PART
             planes = np.unique(master.x[held[:, k], k])
             beside = np.abs(self.x[:, k, None] - planes).min(axis=1, initial=np.inf) > size
             found |= self._supported[:, k] & along & beside
@@ -407,7 +407,7 @@ class MortarGeometry(NodalGeometry):
         self._planes = []
         for k, at in enumerate(self.x.T):
             where = np.concatenate(self._comm.allgather(at[held[:, k]]))
-            if where.size and np.ptp(where) <= CLEAR * self._extent:
+            if where.size and np.ptp(where) <= CLEAR_GAP * self._extent:
                 self._planes.append((k, where.mean()))
         return self.projected(frames.at)._replace(start=frames.start, renewed=frames.renewed)
 
@@ -650,7 +650,7 @@ class MortarPoints(ContactPoints):
         directions = turns @ self.frames
         own = np.linalg.norm(directions * free[self.dofs][:, None, :], axis=2)
         # Held: then what opposite nodes do is carried.
-        directions[(own < FREE) | self.closed[:, None]] = 0.0
+        directions[(own < FREE_PART) | self.closed[:, None]] = 0.0
         held = np.concatenate(self._comm.allgather(self.first + np.flatnonzero(~free)))
         values, columns, starts = self._sums
         values = np.where(np.isin(columns, held), 0.0, values)
@@ -724,5 +724,5 @@ def _without(held: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Unit normals without the components that supports hold, unless these are all of them."""
     left = np.where(held, 0.0, normals)
     length = np.linalg.norm(left, axis=1, keepdims=True)
-    some = length > FREE  # else the support holds the node along its normal
+    some = length > FREE_PART  # else the support holds the node along its normal
     return np.where(some, left / np.where(some, length, 1.0), normals)

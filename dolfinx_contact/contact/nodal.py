@@ -16,20 +16,20 @@ from typing import NamedTuple
 import numpy as np
 
 from dolfinx_contact.law.maps import NodalLaw, ReturnMap
-from dolfinx_contact.support.checks import EPSILON
+from dolfinx_contact.support.checks import UNIT_ROUNDOFF
 
 # Newton's steps at most, those in which a residual has to halve, the same once it is within the tolerance; those that need not
 # help, and sweeps over the contacts in place of later ones that do not.
-MOST, PATIENCE, AT_END, FREE, SWEEPS = 30, 8, 2, 3, 4
+NEWTON_STEPS, HALVING_STEPS, AT_END, FREE_STEPS, SWEEPS_INSTEAD = 30, 8, 2, 3, 4
 
 # Of the tolerance, what is as good as nothing.
-PART = 1e-2
+TOLERANCE_PART = 1e-2
 
 # A residual that is rounding, over the size of its terms, and what a step has to leave at most.
-ROUNDED, HELPS = 64 * EPSILON, 0.5
+RESIDUAL_ROUNDING, LEAST_REDUCTION = 64 * UNIT_ROUNDOFF, 0.5
 
 # Directions of reactions that change nothing, over the largest: the shortest step leaves them as they are.
-SINGULAR = 1e-11
+SINGULAR_DIRECTION = 1e-11
 
 
 class Part(NamedTuple):
@@ -79,7 +79,7 @@ class NodalProblems:
 
     def _small(self, r: np.ndarray, tol: float) -> np.ndarray:
         """What is a part ``tol`` of the terms, or their rounding."""
-        return max(tol, ROUNDED) * (self._terms + np.linalg.norm(r, axis=1))
+        return max(tol, RESIDUAL_ROUNDING) * (self._terms + np.linalg.norm(r, axis=1))
 
     def balanced(self, r: np.ndarray, tol: float) -> tuple[np.ndarray, np.ndarray]:
         """Reactions that solve the problems, from a start, where the search fails the best of its states; what they leave, ``shape=(m,)``.
@@ -95,20 +95,22 @@ class NodalProblems:
         best, smallest = r, size
         halved, since = size, np.zeros(size.size, dtype=int)
         spent = np.zeros(size.size, dtype=bool)  # sweeps from the best have not helped
-        for _ in range(MOST):
-            patience = np.where(size <= self._small(r, tol), AT_END, PATIENCE)
-            goes_on = ~(size <= self._small(r, PART * tol)) & (since < patience)
+        for _ in range(NEWTON_STEPS):
+            patience = np.where(size <= self._small(r, tol), AT_END, HALVING_STEPS)
+            goes_on = ~(size <= self._small(r, TOLERANCE_PART * tol)) & (since < patience)
             if not goes_on.any():
                 break
             trial = r.copy()
-            trial[goes_on] += times(np.linalg.pinv(slope[goes_on], SINGULAR), left[goes_on])
+            trial[goes_on] += times(
+                np.linalg.pinv(slope[goes_on], SINGULAR_DIRECTION), left[goes_on]
+            )
             trial_left, trial_slope = self._left(trial)
             trial_size = np.linalg.norm(trial_left, axis=1)
-            stays = goes_on & ~(trial_size <= HELPS * size) & (since >= FREE)
+            stays = goes_on & ~(trial_size <= LEAST_REDUCTION * size) & (since >= FREE_STEPS)
             if stays.any():
                 swept = np.where(spent[:, None], r, best)
                 spent = spent | stays
-                for _ in range(SWEEPS):
+                for _ in range(SWEEPS_INSTEAD):
                     swept = self._swept(swept)
                 trial[stays] = swept[stays]
                 trial_left, trial_slope = self._left(trial)
@@ -122,7 +124,7 @@ class NodalProblems:
             better = size < smallest
             best, smallest = np.where(better[:, None], r, best), np.where(better, size, smallest)
             spent &= ~better
-            helps = smallest <= HELPS * halved
+            helps = smallest <= LEAST_REDUCTION * halved
             halved, since = np.where(helps, smallest, halved), np.where(helps, 0, since + 1)
         moved = times(self.stacked.transpose(0, 2, 1), best) - self._force
         return best, smallest + np.linalg.norm(moved, axis=1) + self._small(best, tol)

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import ContactPoints
 
 # Radians up to which a way turns: longer ones are refused.
-LONGEST = 2.0
+LONGEST_TURN = 2.0
 
 # Part of a body that may lie on the other side of a plane at the start.
-DEEP = 0.1
+DEEP_START = 0.1
 
 
 class RigidGeometry(NodalGeometry):
@@ -133,9 +133,9 @@ class RigidGeometry(NodalGeometry):
             height = surface.distance(surface.relative(x))
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.present.gap)
-        if highest < DEEP * deepest:
+        if highest < DEEP_START * deepest:
             return f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
-        if inside > DEEP * body.extent:
+        if inside > DEEP_START * body.extent:
             return f"the body starts {inside:.3g} deep inside {surface}, more than a tenth of its size: check point and normal, or move the plane by surface.displacement step by step"  # fmt: skip
         return ""
 
@@ -209,7 +209,7 @@ def _round(chord: np.ndarray, n0: np.ndarray, n1: np.ndarray, turned: np.ndarray
     if chord.shape[1] == 2:
         across = n0[:, 0] * n1[:, 1] - n0[:, 1] * n1[:, 0]
         psi = np.arctan2(across, (n0 * n1).sum(axis=1))
-        psi = np.clip(psi, -LONGEST, LONGEST)[:, None]
+        psi = np.clip(psi, -LONGEST_TURN, LONGEST_TURN)[:, None]
         turning = psi * np.column_stack((-chord[:, 1], chord[:, 0]))
         return _cot(np.abs(psi) / 2) * chord + turning / 2
     across = np.cross(n0, n1)
@@ -219,7 +219,7 @@ def _round(chord: np.ndarray, n0: np.ndarray, n1: np.ndarray, turned: np.ndarray
     psi -= (n1 @ turned)[:, None] * n1
     size = np.linalg.norm(psi, axis=1, keepdims=True)
     axis = np.divide(psi, size, np.zeros_like(psi), where=size > 0)
-    size = np.minimum(size, LONGEST)
+    size = np.minimum(size, LONGEST_TURN)
     along = (axis * chord).sum(axis=1, keepdims=True) * axis
     return _cot(size / 2) * (chord - along) + along + size * np.cross(axis, chord) / 2
 

@@ -11,13 +11,20 @@ import numpy as np
 
 from dolfinx_contact.contact.contact_step import wanders
 from dolfinx_contact.contact.laws import rows
-from dolfinx_contact.contact.state import KEPT, OPPOSITE, SUMS, History, State, Status
+from dolfinx_contact.contact.state import (
+    OPPOSITE_WEAR,
+    SLIP_KEPT,
+    SUM_NAMES,
+    History,
+    State,
+    Status,
+)
 from dolfinx_contact.support.attributes import frozen
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
 
-FIELDS = State._fields[:-1]
+STATE_FIELDS = State._fields[:-1]
 
 
 def saved_of(contact: Contact) -> dict[str, np.ndarray]:
@@ -32,8 +39,10 @@ def saved_of(contact: Contact) -> dict[str, np.ndarray]:
 
 
 def _of(history: History) -> dict[str, np.ndarray]:
-    sums = {name: of for name, of in history.sums.items() if name != OPPOSITE}  # of other nodes
-    return {name: getattr(history.last, name) for name in FIELDS} | sums
+    sums = {
+        name: of for name, of in history.sums.items() if name != OPPOSITE_WEAR
+    }  # of other nodes
+    return {name: getattr(history.last, name) for name in STATE_FIELDS} | sums
 
 
 def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
@@ -45,7 +54,7 @@ def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
                 f"checkpoint: {name} needs shape {array.shape}, found {found}. It was written "
                 "for another mesh or another contact."
             )
-    wrong = [name for name in SUMS if (arrays[name] < 0).any()]
+    wrong = [name for name in SUM_NAMES if (arrays[name] < 0).any()]
     wrong += ["status"] * (not np.isin(arrays["status"], list(map(int, Status))).all())
     if wrong:
         raise ValueError(
@@ -67,11 +76,11 @@ def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     surface.displacement = arrays["plane"]
     found = arrays.get("found_rotation_of_plane", surface.rotation)
     frames = geometry.ended(frames, found)
-    last, worn = State(*(frozen(np.array(arrays[name])) for name in FIELDS)), None
-    sums = {name: frozen(np.array(arrays[name])) for name in (*SUMS, KEPT)}
-    if OPPOSITE in arrays:
-        sums[OPPOSITE] = frozen(np.array(arrays[OPPOSITE]))
-        worn = geometry.everywhere(sums[OPPOSITE])
+    last, worn = State(*(frozen(np.array(arrays[name])) for name in STATE_FIELDS)), None
+    sums = {name: frozen(np.array(arrays[name])) for name in (*SUM_NAMES, SLIP_KEPT)}
+    if OPPOSITE_WEAR in arrays:
+        sums[OPPOSITE_WEAR] = frozen(np.array(arrays[OPPOSITE_WEAR]))
+        worn = geometry.everywhere(sums[OPPOSITE_WEAR])
     contact.go_back(History(last, frames, sums, worn=worn))
     contact.go_back(contact.history.but(friction=contact.laws.load(contact, arrays)))
     surface.turn_to(found)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.nodal import SINGULAR, NodalProblems, Part, times
+from dolfinx_contact.contact.nodal import SINGULAR_DIRECTION, NodalProblems, Part, times
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.state import State
 
 # By which the product of two unit normals may miss one for them to be the same.
-ALIKE = 1e-12
+SAME_NORMAL = 1e-12
 
 # By how much what a start leaves may have grown before all others are tried.
-KEPT = 2.0
+START_GROWTH = 2.0
 
 
 def shared_nodes(contacts: Sequence[ContactStep], fixed: np.ndarray) -> SharedNodes | None:
@@ -61,7 +61,7 @@ def shares_of(contacts: Sequence[ContactStep], nodes: np.ndarray) -> tuple[np.nd
     found = [np.intersect1d(contact.nodes, nodes, return_indices=True)[1:] for contact in contacts]
     for k, (contact, (rows, slots)) in enumerate(zip(contacts, found)):
         normals[slots, k] = contact.points.frames[rows, -1]
-    alike = normals @ normals.transpose(0, 2, 1) > 1.0 - ALIKE
+    alike = normals @ normals.transpose(0, 2, 1) > 1.0 - SAME_NORMAL
     if contacts[0].comm.allreduce(bool((alike.sum(axis=2) > 1).any()), op=MPI.LOR):
         for k, (contact, (rows, slots)) in enumerate(zip(contacts, found)):
             area[slots, k] = contact.area[rows]
@@ -198,7 +198,7 @@ class SharedNodes:
             start, least = known.start.copy(), known.least.copy()
         problems = self._problems(contacts, states, force, every)
         r, left = problems.balanced(starts[start, every], tol)
-        lost = np.flatnonzero(~(left <= KEPT * least))
+        lost = np.flatnonzero(~(left <= START_GROWTH * least))
         if lost.size:
             tried = self._problems(contacts, states, force, np.tile(lost, n + 2))
             found, unsolved = tried.balanced(starts[:, lost].reshape(-1, n * dim), tol)
@@ -242,7 +242,7 @@ class SharedNodes:
         """
         _, by_asked, by_motion = split.problems.linearised(split.required)
         C, F, asks = split.problems.coupling, split.problems.stacked, split.problems.asks
-        inverse = C @ np.linalg.pinv(np.eye(C.shape[1]) + by_asked @ C, SINGULAR)
+        inverse = C @ np.linalg.pinv(np.eye(C.shape[1]) + by_asked @ C, SINGULAR_DIRECTION)
         shape = *self._shape, self._shape[-1]
         both = ((by_asked, asks), (by_motion, F))
         asked, moved = ((-inverse @ part @ by).reshape(shape) for part, by in both)

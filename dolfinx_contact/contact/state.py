@@ -47,9 +47,9 @@ def frozen_state(state: State) -> State:
     return State(*(None if array is None else frozen(array) for array in state))
 
 
-SUMS = ("dissipation", "slip_path", "wear_depth")
-KEPT = "slip_kept"
-OPPOSITE = "opposite_wear_depth"  # at nodes of a deformable surface that wears
+SUM_NAMES = ("dissipation", "slip_path", "wear_depth")
+SLIP_KEPT = "slip_kept"
+OPPOSITE_WEAR = "opposite_wear_depth"  # at nodes of a deformable surface that wears
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,8 @@ class History:
     @staticmethod
     def of(state: State, frames: Frames) -> History:
         """No history: a state, and all sums zero."""
-        sums = {name: frozen(np.zeros(len(state.gap))) for name in SUMS}
-        sums[KEPT] = frozen(np.zeros_like(state.slip_increment))
+        sums = {name: frozen(np.zeros(len(state.gap))) for name in SUM_NAMES}
+        sums[SLIP_KEPT] = frozen(np.zeros_like(state.slip_increment))
         return History(frozen_state(state), frames, sums)
 
     @property
@@ -93,7 +93,7 @@ class History:
     @property
     def slip_kept(self) -> np.ndarray:
         """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``."""
-        return self.sums[KEPT]
+        return self.sums[SLIP_KEPT]
 
     def but(self, **parts: Any) -> History:
         """The same with other parts."""

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # How often a step is repeated with the geometry of its end.
-REPEATED = 5
+MOST_REPETITIONS = 5
 
 # The same with deformable surfaces, and differences of ends that are mixed.
-RENEWED, MIXED = 24, 5
+MOST_RENEWALS, MIXED_ENDS = 24, 5
 
 
 class EndGeometry(Lagged):
@@ -84,12 +84,12 @@ class Ends:
 
     def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
         renewed = any(c.geometry.renews_rows for c in contacts)
-        self.most = RENEWED if renewed else REPEATED
+        self.most = MOST_RENEWALS if renewed else MOST_REPETITIONS
         self._turning = surfaces_of(c for c in contacts if c.surface.spins)
         self._arm, self._mix, self._at = body.extent, None, None
         if renewed or self._turning:
             size = body.size + sum(pose.size for pose in self._poses())
-            self._mix = Anderson(size, MIXED, body.total)
+            self._mix = Anderson(size, MIXED_ENDS, body.total)
 
     def _poses(self) -> list[np.ndarray]:
         """Displacement and rotation of each surface that turns freely, as lengths."""
@@ -164,7 +164,9 @@ def too_long(state: StepState) -> str:
 
 def undivided(missed: float, tol: float, repeated: int) -> str:
     """What to say of a step whose geometry stays different, in words."""
-    other = "; if that does not help, let the other body carry the unknowns" * (repeated == RENEWED)
+    other = "; if that does not help, let the other body carry the unknowns" * (
+        repeated == MOST_RENEWALS
+    )
     return (
         f"distances, normals or arms at the end of the step differ by {missed:.1e} of the reactions from those with which it was "
         f"solved, after {repeated} repetitions, geometry_tol is {tol:.1e}: the increment is too large for its surface. Divide "

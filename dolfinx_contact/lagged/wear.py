@@ -35,27 +35,27 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Stiffness with which depths follow, over the node's own.
-STIFF = 2.0
+STIFFNESS_FACTOR = 2.0
 
 # Differences that Anderson's method keeps.
 MIXED_DEPTHS = 20
 
 # What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open, close and stick, and twice
 # as many rounds do without.
-FALL, PATIENCE = 0.7, 10
+LEAST_FALL, FALL_ROUNDS = 0.7, 10
 
 # In these rounds depths go this part of the way: the whole one may lead to and fro for ever.
-CAUTIOUS = 0.5
+CAUTIOUS_PART = 0.5
 
 # Part of its force that what a step wears under the force at its start takes from a node, at most.
-START = 0.01
+START_SHARE = 0.01
 
 # In a jump of many cycles ``1 - theta`` is at most this, where one cycle is gentle: with far less, or with less the longer the jump,
 # a jump would go by another rule than the cycles that it stands for.  What alternates falls to 2/3 in a step.
-JUMP = 0.4
+JUMP_SHARE = 0.4
 
 # Part of ``geometry_tol`` that depths may be off.
-PART = 0.1
+DEPTH_TOLERANCE = 0.1
 
 
 class WearOfStep(Lagged):
@@ -69,9 +69,9 @@ class WearOfStep(Lagged):
     limit = 200
 
     def __init__(self, step: LoadStep, tol: float):
-        self._body, self._tol, self._geometry_tol = step.body, PART * tol, tol
+        self._body, self._tol, self._geometry_tol = step.body, DEPTH_TOLERANCE * tol, tol
         contacts = _wearing(step)
-        self._share = STIFF * _shares([contact.given for contact in contacts])
+        self._share = STIFFNESS_FACTOR * _shares([contact.given for contact in contacts])
         self._anderson = Anderson(self._share.size, MIXED_DEPTHS, step.body.total)
         self._best, self._stale = np.inf, 0
         forces = [contact.last.reaction[:, -1] for contact in contacts]
@@ -122,14 +122,14 @@ class WearOfStep(Lagged):
                 self._depth = following
                 return True
         self._stale += 1
-        if off <= FALL * self._best:
+        if off <= LEAST_FALL * self._best:
             self._best, self._stale = off, 0
-        if self._stale < PATIENCE:
+        if self._stale < FALL_ROUNDS:
             mixed, _ = self._anderson.step(kappa * depth, change)
             following = np.maximum(mixed, 0.0) / kappa
         else:
-            following = depth + CAUTIOUS * (following - depth)
-        if self._stale >= 3 * PATIENCE:  # some rounds without differences are over
+            following = depth + CAUTIOUS_PART * (following - depth)
+        if self._stale >= 3 * FALL_ROUNDS:  # some rounds without differences are over
             self._anderson.restart()
             self._best, self._stale = off, 0
         self._depth = following
@@ -148,9 +148,9 @@ class WearOfStep(Lagged):
         rates = [wear_rates(contact, state, x) for contact, state in both]
         start, c = map(np.concatenate, zip(*rates))
         repeats = np.concatenate([np.full(k.nodes.size, k.given.repeats) for k in contacts])
-        z, part = c * kappa, START * repeats
+        z, part = c * kappa, START_SHARE * repeats
         share = np.divide(part, z, np.ones_like(z), where=z > part)
-        share = np.minimum(share, np.where(repeats > 1.0, JUMP, 0.5))
+        share = np.minimum(share, np.where(repeats > 1.0, JUMP_SHARE, 0.5))
         start, c = share * start, (1.0 - share) * c
         return start + c * np.concatenate(forces), start, c
 

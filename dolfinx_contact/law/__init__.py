@@ -11,11 +11,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Friction", "Wear", "bipotential_gap", "load_function", "project_cone"]
 
-_HOME = dict(zip(__all__, ("friction", "wear", "bipotential", "friction_cone", "friction_cone")))
+_MODULE_OF_NAME = dict(
+    zip(__all__, ("friction", "wear", "bipotential", "friction_cone", "friction_cone"))
+)
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value = getattr(import_module(f"{__name__}.{_MODULE_OF_NAME[name]}"), name)
     return value

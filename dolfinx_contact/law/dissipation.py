@@ -22,7 +22,7 @@ import numpy as np
 from dolfinx_contact.law.friction import Friction, split
 
 # A sticking force this near its cone still points along the previous slip: after a pause it is on the cone but for rounding.
-PAUSED = 1e-3
+PAUSED_FORCE = 1e-3
 
 
 def work_of_friction(
@@ -103,5 +103,5 @@ def slipped_last(friction: Friction, reaction: np.ndarray, slipped: np.ndarray) 
     force, normal = friction.along_axes(reaction[:, :-1]), reaction[:, -1]
     mu = friction.mu[..., : force.shape[1]]
     part = np.divide(force, mu, out=np.zeros_like(force), where=mu > 0.0)
-    on_cone = np.linalg.norm(part, axis=1) >= (1.0 - PAUSED) * normal
+    on_cone = np.linalg.norm(part, axis=1) >= (1.0 - PAUSED_FORCE) * normal
     return slipped | (on_cone & (normal > 0.0))

@@ -22,18 +22,18 @@ from dolfinx_contact.support.checks import finite, number, valued
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not import
 
-OWNERS = ("body", "surface")  # of a texture
+TEXTURE_OWNERS = ("body", "surface")  # of a texture
 
-_SMALLEST, _LARGEST = 1e-50, 1e50
+_SMALLEST_COEFFICIENT, _LARGEST_COEFFICIENT = 1e-50, 1e50
 
-REMEDY = (
+ARRAY_REMEDY = (
     "a Friction is immutable: assign another one, contact.friction = dc.Friction(mu, p); with a pair for each contact node, mu "
     "has shape (n, 2)."
 )
 
 # Replaces infinite coefficients. A node then slides only where its normal reaction is below a thousandth of the tangential one. The error
-# at nodes about to open falls with 1 / ROUGH; with larger values, solvers do not converge reliably.
-ROUGH = 1e3
+# at nodes about to open falls with 1 / ROUGH_COEFFICIENT; with larger values, solvers do not converge reliably.
+ROUGH_COEFFICIENT = 1e3
 
 
 def rough(mu: Any):
@@ -42,7 +42,11 @@ def rough(mu: Any):
         infinite = np.isposinf(mu)
     except (TypeError, ValueError):  # not real numbers: checked elsewhere
         return mu
-    return mu if np.ma.is_masked(mu) or not np.any(infinite) else np.where(infinite, ROUGH, mu)
+    return (
+        mu
+        if np.ma.is_masked(mu) or not np.any(infinite)
+        else np.where(infinite, ROUGH_COEFFICIENT, mu)
+    )
 
 
 def _cone(given: ArrayLike) -> np.ndarray:
@@ -59,8 +63,10 @@ def _cone(given: ArrayLike) -> np.ndarray:
             f"mu must be positive in both directions or zero in both, not {given!r}; "
             "for almost no friction in one direction give a small coefficient"
         )
-    if np.any((mu > 0) & ((mu < _SMALLEST) | (mu > _LARGEST))):
-        raise ValueError(f"mu must be zero or between {_SMALLEST} and {_LARGEST}, not {given!r}")
+    if np.any((mu > 0) & ((mu < _SMALLEST_COEFFICIENT) | (mu > _LARGEST_COEFFICIENT))):
+        raise ValueError(
+            f"mu must be zero or between {_SMALLEST_COEFFICIENT} and {_LARGEST_COEFFICIENT}, not {given!r}"
+        )
     return mu
 
 
@@ -139,7 +145,7 @@ class Friction(Guarded):
     def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, *, k: float | None = None, axes: ArrayLike | Field | None = None, of: str = "body") -> None:  # fmt: skip
         if p is not None and k is not None:
             raise ValueError(f"give p or k, not both (mu={mu!r}, p={p!r}, k={k!r})")
-        if of not in OWNERS or (
+        if of not in TEXTURE_OWNERS or (
             of == "surface" and (not callable(axes) or hasattr(axes, "function_space"))
         ):
             raise ValueError(
@@ -216,14 +222,14 @@ class Friction(Guarded):
         q = q / q.max(axis=-1, keepdims=True)
         # p proportional to mu up to rounding is the associated rule
         q[1.0 - q.min(axis=-1) <= 4 * np.finfo(float).eps] = 1.0
-        if q.min(initial=1.0) < _SMALLEST:
+        if q.min(initial=1.0) < _SMALLEST_COEFFICIENT:
             raise ValueError(
-                f"p/mu must not differ by more than {_LARGEST} between the two directions, "
+                f"p/mu must not differ by more than {_LARGEST_COEFFICIENT} between the two directions, "
                 f"but does with mu={given[0]!r}, p={given[1]!r}, k={given[2]!r}"
             )
         axes = None if axes is None else _unit_vectors(axes, mu)
         self.mu, self.p, self.axes = (
-            whole(f"friction.{name}", array, REMEDY)
+            whole(f"friction.{name}", array, ARRAY_REMEDY)
             for name, array in (("mu", frozen(mu)), ("p", frozen(q * mu)), ("axes", axes))
         )
         self.frictionless = not (mu > 0).any()
@@ -377,9 +383,9 @@ def _angle(axes: np.ndarray | None) -> Any:
 
 def at_most_rough(friction: Friction) -> Friction:
     """The friction with coefficients limited to ``ROUGH``: larger ones act alike, but amplify rounding errors of slip."""
-    if not (friction.mu > ROUGH).any():
+    if not (friction.mu > ROUGH_COEFFICIENT).any():
         return friction
-    mu = np.minimum(friction.mu, ROUGH)
+    mu = np.minimum(friction.mu, ROUGH_COEFFICIENT)
     p = None if friction.associated else np.where(mu > 0, friction.p, 1.0)
     return Friction(mu, p, axes=friction.axes)
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.law.friction import Friction
 
 # Points with larger components are scaled before projection, so that no sum overflows.
-HUGE, HUGE_UNIT = 1e300, 2.0**20
+HUGE_COMPONENT, HUGE_UNIT = 1e300, 2.0**20
 
 
 def as_nodes(
@@ -68,9 +68,9 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
     """
     tau, law = as_nodes("tau", tau, 3), Friction(mu).law(3)
     largest, smallest = (f.reduce(tau, axis=None, initial=0.0) for f in (np.fmax, np.fmin))
-    if max(largest, -smallest) <= HUGE:
+    if max(largest, -smallest) <= HUGE_COMPONENT:
         return law.project(tau)[0]
-    huge = np.isfinite(tau).all(axis=1) & (np.abs(tau) > HUGE).any(axis=1)
+    huge = np.isfinite(tau).all(axis=1) & (np.abs(tau) > HUGE_COMPONENT).any(axis=1)
     scale = np.where(huge, HUGE_UNIT, 1.0)[:, None]
     with np.errstate(over="ignore"):
         return law.project(tau / scale)[0] * scale

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 # A matrix whose anisotropic part is below this has no axes.
-ROUND = 1e-12
+ISOTROPIC_PART = 1e-12
 
 
 def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
@@ -40,7 +40,7 @@ def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
     soft = [_tensor(np.log(np.where(Q > 0, Q, 1.0)), angle) for _, Q, angle in (first, second)]
     sides = np.maximum((a > 0) * 1.0 + (b > 0), 1.0)
     qx, qy = ((one + other) / sides for one, other in zip(soft[0][1:], soft[1][1:]))
-    plain = np.hypot(x, y) <= ROUND * iso
+    plain = np.hypot(x, y) <= ISOTROPIC_PART * iso
     turn = np.where(plain, np.arctan2(qy, qx), np.arctan2(y, x)) / 2
     turn += np.pi / 2 * np.round((first[2] - turn) / (np.pi / 2))  # nearest to the first side's
     cos, sin = np.cos(2 * turn), np.sin(2 * turn)

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from dolfinx_contact.law.maps import NodalLaw
 
 # Relative rounding of directions and of kept friction.
-ROUNDED = 32 * np.finfo(float).eps
+RELATIVE_ROUNDING = 32 * np.finfo(float).eps
 
 # Iteration limit for the slip along a free direction: Newton steps and bisections.
-STEPS = 100
+MOST_STEPS = 100
 
-OPEN, STICK, SLIP = 0, 1, 2
+IS_OPEN, IS_STICKING, IS_SLIPPING = 0, 1, 2
 
 
 def across(friction: Friction, along: np.ndarray) -> np.ndarray:
@@ -43,7 +43,7 @@ def across(friction: Friction, along: np.ndarray) -> np.ndarray:
     ratio = friction.drag(along)
     forward = _dot(ratio, along)[:, None]
     ratio = np.divide(ratio, forward, out=along.copy(), where=forward > 0)
-    straight = np.abs(ratio - along).max(axis=1, keepdims=True) <= ROUNDED
+    straight = np.abs(ratio - along).max(axis=1, keepdims=True) <= RELATIVE_ROUNDING
     return np.where(straight, along, ratio)
 
 
@@ -69,7 +69,7 @@ def supported(
     rough = np.broadcast_to(coefficients.mu[..., 0] > 0.0, nodes.shape)
     ratio, moved, last = across(coefficients, along), known[nodes], last[nodes]
     kept = last - _dot(last, along)[:, None] * ratio
-    kept[np.abs(kept) <= ROUNDED * np.abs(last).max(axis=1, keepdims=True)] = 0.0
+    kept[np.abs(kept) <= RELATIVE_ROUNDING * np.abs(last).max(axis=1, keepdims=True)] = 0.0
     mine = ((moved != 0.0) | (kept != 0.0) | (ratio != along)).any(axis=1) & rough
     if not mine.any():
         return law
@@ -153,7 +153,7 @@ class SupportedLaw:
         answer = _Answer(self, tangential[nodes], R, tau)
         made, status = made.copy(), status.copy()
         made[nodes] = np.column_stack((answer.friction, R))
-        status[nodes] = np.where(R > 0.0, np.where(answer.slips, SLIP, STICK), OPEN)
+        status[nodes] = np.where(R > 0.0, np.where(answer.slips, IS_SLIPPING, IS_STICKING), IS_OPEN)
         if not derivatives:
             return made, status
         return made, status, *answer.derivatives(derivatives, nodes, R > 0.0, normal[nodes])
@@ -230,7 +230,7 @@ def _slipped(
     most = R * np.linalg.norm(friction.mu[..., : known.shape[1]], axis=-1)
     low, high = (-tau - most) / rho, (-tau + most) / rho
     w = -tau / rho
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         d, turn = friction.drag_with_slope(known + w[:, None] * f, f)
         left = rho * w + R * _dot(d, f) + tau
         low, high = np.where(left < 0.0, w, low), np.where(left > 0.0, w, high)

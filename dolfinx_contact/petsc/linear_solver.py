@@ -15,16 +15,16 @@ from dolfinx_contact import compat
 if TYPE_CHECKING:
     from dolfinx_contact.petsc.multigrid import Multigrid
 
-DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+DIRECT_OPTIONS = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
 # Of symmetric matrices half of the factors; the ordering, PORD, leaves up to a third fewer entries than METIS, never more
 # (notes/2026-11-22-condensed-speed.md).
-SYMMETRIC = DIRECT | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
+SYMMETRIC_OPTIONS = DIRECT_OPTIONS | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 
 # Of matrices that are small, or all but full, all orderings are as good, and PORD, which may find no separator in them, ends
 # the process. AMD does not.
-FULL = SYMMETRIC | {"mat_mumps_icntl_7": 0}
-SMALL, DENSE = 100, 0.5
+FULL_OPTIONS = SYMMETRIC_OPTIONS | {"mat_mumps_icntl_7": 0}
+SMALL_SIZE, DENSE_PART = 100, 0.5
 
 # Not PETSc's, of a matrix that is symmetric: sweeps over its lower half smooth the finest level, see ``Multigrid``.
 GAUSS_SEIDEL = "mg_finest_gauss_seidel"
@@ -32,7 +32,7 @@ GAUSS_SEIDEL = "mg_finest_gauss_seidel"
 # Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest level, Chebyshev's polynomial
 # with Jacobi the others, whose matrices may have rows of zeros (notes/2026-11-27-multigrid.md). Every solve starts from zero, so
 # that a run continued from a checkpoint has the same bits.
-MULTIGRID = {
+MULTIGRID_OPTIONS = {
     "ksp_type": "cg",
     "ksp_rtol": 1e-12,
     "pc_type": "gamg",
@@ -48,22 +48,22 @@ MULTIGRID = {
 # Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), by itself 20), once that was too little, and what it answers
 # then (INFOG(1)) [MUMPS users' guide, error codes].  On several ranks the estimate does not know which of them is busy, of
 # matrices that are not definite it does not know the pivots.
-_WORKSPACES = (50, 100, 200, 400, 800)
+_MUMPS_WORKSPACES = (50, 100, 200, 400, 800)
 _SHORT_OF_WORKSPACE = (-8, -9, -17, -20)
 
 # Of a rough solve: enough to see that a body is pressed on a plane, and how hard.
-ROUGH = 1e-3
+ROUGH_TOLERANCE = 1e-3
 
 # Over the largest sum of a row, an entry's difference from the one across the diagonal that is none.
-_ROUNDING = 1e-14
+_SYMMETRY_ROUNDING = 1e-14
 
 # Unknowns beyond which multigrid is the default, by the block size of the matrix, which is the dimension; of two, factors of
 # 500,000 unknowns have some 120 entries a row, and no grading of the mesh slows them down
 # (notes/2026-11-27-multigrid.md).
-LARGE = {2: 500_000, 3: 50_000}
+LARGE_SIZES = {2: 500_000, 3: 50_000}
 
 # The same of solid bodies with so many contact nodes that the fixed point is tried first, see docs/howto/large_meshes.md.
-CROWDED = 20_000
+CROWDED_SIZE = 20_000
 
 
 @contextmanager
@@ -87,7 +87,11 @@ def _options(A: PETSc.Mat, options: dict[str, Any] | None) -> dict:
     """The options, or the default for a matrix of that size and dimension."""
     if options is not None:
         return options
-    return DIRECT if A.getSize()[0] <= LARGE.get(A.getBlockSize(), LARGE[3]) else MULTIGRID
+    return (
+        DIRECT_OPTIONS
+        if A.getSize()[0] <= LARGE_SIZES.get(A.getBlockSize(), LARGE_SIZES[3])
+        else MULTIGRID_OPTIONS
+    )
 
 
 def _to_factorise(A: PETSc.Mat):
@@ -95,16 +99,16 @@ def _to_factorise(A: PETSc.Mat):
 
     Zeros are, among others, all couplings of fixed degrees of freedom.
     """
-    symmetric = A.isSymmetric(_ROUNDING * A.norm(PETSc.NormType.INFINITY))
+    symmetric = A.isSymmetric(_SYMMETRY_ROUNDING * A.norm(PETSc.NormType.INFINITY))
     starts, columns, values = A.getValuesCSR()
     rows = sparse.csr_matrix((values, columns, starts), (len(starts) - 1, A.getSize()[1]))
     rows.eliminate_zeros()
     csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
     A = PETSc.Mat().createAIJ(A.getSizes(), csr=csr, comm=A.comm)
     if not symmetric:
-        return A, DIRECT
+        return A, DIRECT_OPTIONS
     n, entries = A.getSize()[0], A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
-    return A, FULL if n <= SMALL or entries > DENSE * n**2 else SYMMETRIC
+    return A, FULL_OPTIONS if n <= SMALL_SIZE or entries > DENSE_PART * n**2 else SYMMETRIC_OPTIONS
 
 
 @contextmanager
@@ -135,7 +139,9 @@ def _sweeps(options: dict, prefix: str) -> bool:
     """Whether Gauss-Seidel smooths the finest level: the options say so, and the user says nothing of smoothers."""
     database = PETSc.Options(prefix)
     of_levels = {key for key in options if key.startswith("mg_levels_")}
-    said = any(MULTIGRID.get(key) != options[key] or database.hasName(key) for key in of_levels)
+    said = any(
+        MULTIGRID_OPTIONS.get(key) != options[key] or database.hasName(key) for key in of_levels
+    )
     return bool(options.get(GAUSS_SEIDEL)) and not said
 
 
@@ -186,7 +192,11 @@ def check_solved(ksp: PETSc.KSP, options: dict[str, Any] | None = None) -> None:
     raise LinearSolverError(
         f"PETSc's linear solver failed (KSPConvergedReason {ksp.getConvergedReason()}) after {ksp.getIterationNumber()} "
         f"iterations{mumps}{given}."
-        + ("" if direct else f" A factorisation needs no iteration: petsc_options={DIRECT}.")
+        + (
+            ""
+            if direct
+            else f" A factorisation needs no iteration: petsc_options={DIRECT_OPTIONS}."
+        )
     )
 
 
@@ -214,7 +224,7 @@ class LinearSolver:
         near_nullspace: Callable[[], np.ndarray] | None,
     ):
         given, options = options, _options(A, options)
-        if given is None and options is DIRECT:
+        if given is None and options is DIRECT_OPTIONS:
             A, options = _to_factorise(A)
         self._options = options
         self.ksp = PETSc.KSP().create(A.comm)
@@ -226,7 +236,7 @@ class LinearSolver:
                 vectors[-1].array_w[:] = mode
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.unread = self._set_up(A, prefix, options)
-        for workspace in _WORKSPACES:
+        for workspace in _MUMPS_WORKSPACES:
             if _mumps_answer(self.ksp) not in _SHORT_OF_WORKSPACE:
                 break
             self.ksp.reset()  # what MUMPS has analysed cannot be factorised after a failure
@@ -304,7 +314,7 @@ class LinearSolver:
             self._right.array_w[:] = start
         self.ksp.setInitialGuessNonzero(start is not None)
         rtol = self.ksp.getTolerances()[0]
-        self.ksp.setTolerances(rtol=max(rtol, ROUGH) if rough else rtol)
+        self.ksp.setTolerances(rtol=max(rtol, ROUGH_TOLERANCE) if rough else rtol)
         try:
             self.ksp.solve(self._left, self._right)
         finally:  # others use the KSP, too, also after a solve that was interrupted

@@ -10,10 +10,10 @@ from scipy import sparse
 from dolfinx_contact._kernel import SymmetricBlocks
 
 # Sizes of blocks that the kernel knows.
-SIZES = 1, 2, 3
+BLOCK_SIZES = 1, 2, 3
 
 # Part of the sum of a row's magnitudes by which the row across the diagonal may differ: rounding, also where elements are flat.
-ROUNDING = 1e-10
+ROW_ROUNDING = 1e-10
 
 
 class SymmetricMatrix:
@@ -53,7 +53,7 @@ class GaussSeidel:
 
 def halved(A: PETSc.Mat) -> PETSc.Mat | None:
     """A matrix as one with a ``SymmetricMatrix``; None if it is not symmetric: one product tells.  Collective."""
-    size = A.getBlockSize() if A.getBlockSize() in SIZES else 1
+    size = A.getBlockSize() if A.getBlockSize() in BLOCK_SIZES else 1
     rows, own = _rows(A)
     blocks = SymmetricBlocks(own.indptr, own.indices, own.data, size)
     others = None
@@ -68,7 +68,7 @@ def halved(A: PETSc.Mat) -> PETSc.Mat | None:
     A.mult(x, y)
     product = y.array_r.copy()
     found.mult(x, y)
-    differs = (np.abs(y.array_r - product) > ROUNDING * sizes).any()
+    differs = (np.abs(y.array_r - product) > ROW_ROUNDING * sizes).any()
     refused = A.comm.tompi4py().allreduce(differs, op=MPI.LOR)
     for part in (x, y, *((found, others) if refused else ())):
         if part is not None:

@@ -22,7 +22,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.accepted import Accepted, poses_of
 from dolfinx_contact.bodies.elastic import ElasticBody, FreeState
 from dolfinx_contact.contact.saved import check_saved, load_saved, saved_of
-from dolfinx_contact.contact.state import OPPOSITE
+from dolfinx_contact.contact.state import OPPOSITE_WEAR
 from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
 from dolfinx_contact.support.numbering import original_cells, original_nodes
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
 
-VERSION = 3  # of what is written; files of others are refused
+FILE_VERSION = 3  # of what is written; files of others are refused
 
 # Ends of the names of arrays that not every history has.
 MAY_LACK = ("law_of_last_step", "home", "rotation_of_plane")
 
-ANEW = "Take another one, or write it anew with problem.save."
+WRITE_ANEW = "Take another one, or write it anew with problem.save."
 
 
 def save(path: str | PathLike[str], problem: ContactProblem) -> None:
@@ -61,7 +61,7 @@ def save(path: str | PathLike[str], problem: ContactProblem) -> None:
             file = {
                 name: mine[name] if name in same else np.concatenate([p[name] for p in everything])
                 for name in mine
-            } | {"stiffness": np.array(stiffness), "version": np.array(VERSION)}
+            } | {"stiffness": np.array(stiffness), "version": np.array(FILE_VERSION)}
             if starts:
                 last = starts[-1]
                 alike = [step for step in starts if step[0].size == last[0].size]
@@ -182,7 +182,7 @@ def _of_body(mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Co
     if f"{k}_placed" in mine:
         found["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
     if f"{k}_worn" in mine:
-        found[OPPOSITE] = mine[f"{k}_worn"][contact.opposite]
+        found[OPPOSITE_WEAR] = mine[f"{k}_worn"][contact.opposite]
     return found
 
 
@@ -215,7 +215,7 @@ def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: A
     """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
     if not {"nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
-    if file.get("version", 0) != VERSION:
+    if file.get("version", 0) != FILE_VERSION:
         raise ValueError(
             f"checkpoint {path} was written by another version of dolfinx_contact: read it with that one."
         )
@@ -257,7 +257,7 @@ def _number(path: str | PathLike[str], file: dict[str, np.ndarray], name: str) -
     try:
         return number(f"checkpoint {path}: {name}", file.get(name))
     except ValueError as error:
-        raise ValueError(f"{error} {ANEW}") from None
+        raise ValueError(f"{error} {WRITE_ANEW}") from None
 
 
 def _check_arrays(
@@ -266,7 +266,7 @@ def _check_arrays(
     """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
     missing = [name for name in like if name not in file and not name.endswith(MAY_LACK)]
     if missing:
-        raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {ANEW}")
+        raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {WRITE_ANEW}")
     like = like | {name: like["x"] for name in ("load", "free", "rough")}
     for name, array in file.items():
         surface = name.endswith("rigid_plane")  # compared by the contact; without wear it has NaN
@@ -274,12 +274,12 @@ def _check_arrays(
             continue
         if array.dtype.kind not in "iuf":
             raise ValueError(
-                f"checkpoint {path}: {name} must be numbers, not {array.dtype}. {ANEW}"
+                f"checkpoint {path}: {name} must be numbers, not {array.dtype}. {WRITE_ANEW}"
             )
         if not surface and not name.startswith("state_") and not np.isfinite(array).all():
-            raise ValueError(f"checkpoint {path}: {name} must be finite. {ANEW}")
+            raise ValueError(f"checkpoint {path}: {name} must be finite. {WRITE_ANEW}")
         if name.endswith("_worn") and (array < 0.0).any():
-            raise ValueError(f"checkpoint {path}: {name} must not be negative. {ANEW}")
+            raise ValueError(f"checkpoint {path}: {name} must not be negative. {WRITE_ANEW}")
         if name not in like or surface:
             continue
         rows = () if name.endswith("_plane") else file[_nodes_of(name)].shape
@@ -287,7 +287,7 @@ def _check_arrays(
         if array.shape != shape or not np.can_cast(array.dtype, kind, "same_kind"):
             raise ValueError(
                 f"checkpoint {path}: {name} needs shape {shape} and type {kind}, found {array.shape}, {array.dtype}: it was "
-                f"written for another mesh or other contacts, or changed. {ANEW}"
+                f"written for another mesh or other contacts, or changed. {WRITE_ANEW}"
             )
 
 
@@ -306,7 +306,7 @@ def _starts(
     size = int(np.prod(saved.shape[2:])) - tied
     if nodes.shape != order.shape or saved.ndim < 3 or saved.shape[1] != 2 or size < 0 or size % max(len(nodes), 1):  # fmt: skip
         raise ValueError(
-            f"checkpoint {path}: starts and starts_nodes do not belong to each other. {ANEW}"
+            f"checkpoint {path}: starts and starts_nodes do not belong to each other. {WRITE_ANEW}"
         )
     at = _positions(nodes, np.argsort(nodes), order)
     flat = saved.reshape(*saved.shape[:2], -1)

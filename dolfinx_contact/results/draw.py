@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pyvista
 
-STATUS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a")}
+STATUS_COLOURS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a")}
 
 # Size of a node in pixels: this over the root of their number, within limits.
-PIXELS, SMALLEST, LARGEST = 150.0, 4.0, 12.0
+DOT_PIXELS, SMALLEST_DOT, LARGEST_DOT = 150.0, 4.0, 12.0
 
 
 # Part of a picture of a plane body that lies between the legend and the colour bar, or between top and bottom.
-BETWEEN = 0.75
+OPACITY_BETWEEN = 0.75
 
 
 def body(seen: Any) -> pyvista.UnstructuredGrid:
@@ -50,8 +50,8 @@ def draw(seen: Any, picture: str, title: str) -> None:
     if "between" in seen:
         looks["opacity"] = 0.3
     plotter.add_mesh(grid, show_edges=True, edge_opacity=0.25, **looks)
-    size = float(np.clip(PIXELS / np.sqrt(len(seen["nodes"])), SMALLEST, LARGEST))
-    for status, (name, colour) in STATUS.items():
+    size = float(np.clip(DOT_PIXELS / np.sqrt(len(seen["nodes"])), SMALLEST_DOT, LARGEST_DOT))
+    for status, (name, colour) in STATUS_COLOURS.items():
         nodes = seen["nodes"][seen["status"] == status]
         if len(nodes):
             balls = {"point_size": size, "render_points_as_spheres": True, "lighting": False}
@@ -76,7 +76,7 @@ def look(plotter: Any, grid: Any, up: np.ndarray) -> None:
         low, high = np.reshape(plotter.bounds, (3, 2)).T
         width, height = plotter.window_size
         wide, high = (high - low)[:2]
-        plotter.camera.parallel_scale = 0.5 * max(high, wide * height / width) / BETWEEN
+        plotter.camera.parallel_scale = 0.5 * max(high, wide * height / width) / OPACITY_BETWEEN
         return
     up = up / np.linalg.norm(up)
     aside = np.eye(3)[np.abs(up).argmin()]

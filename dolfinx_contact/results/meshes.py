@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
 
 # VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
-TYPES = {
+VTK_TYPES = {
     (1, 2, 2): 3, (2, 3, 3): 5, (2, 4, 4): 9, (3, 4, 4): 10, (3, 8, 8): 12, (3, 6, 6): 13,
     (1, 2, 3): 21, (2, 3, 6): 22, (2, 4, 9): 28, (3, 4, 10): 24, (3, 8, 27): 29,
 }  # fmt: skip
-LINE3, TRIANGLE6 = 21, 22
+VTK_LINE3, VTK_TRIANGLE6 = 21, 22
 
 # VTK's order of vertices, and the vertices (in that order) in whose middle each further node is.
-SQUARE = (0, 1, 3, 2)
-VERTICES = {(2, 4): SQUARE, (3, 8): (*SQUARE, *(4 + k for k in SQUARE))}
-RING = [(0, 1), (1, 2), (2, 3), (3, 0)]
-MIDDLES = {
+SQUARE_ORDER = (0, 1, 3, 2)
+VERTEX_ORDERS = {(2, 4): SQUARE_ORDER, (3, 8): (*SQUARE_ORDER, *(4 + k for k in SQUARE_ORDER))}
+RING_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0)]
+MIDDLE_NODES = {
     (1, 2): [(0, 1)],
     (2, 3): [(0, 1), (1, 2), (2, 0)],
-    (2, 4): [*RING, (0, 1, 2, 3)],
+    (2, 4): [*RING_EDGES, (0, 1, 2, 3)],
     (3, 4): [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
     (3, 8): [
-        *RING, *((a + 4, b + 4) for a, b in RING), (0, 4), (1, 5), (2, 6), (3, 7),
+        *RING_EDGES, *((a + 4, b + 4) for a, b in RING_EDGES), (0, 4), (1, 5), (2, 6), (3, 7),
         (0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7), tuple(range(8)),
     ],
 }  # fmt: skip
@@ -67,11 +67,11 @@ def vtk_order(points: np.ndarray, vertices: np.ndarray) -> tuple[int, np.ndarray
         vertices: Which of them are vertices, in DOLFINx's order.
     """
     dim, count = points.shape[1], len(vertices)
-    corners = points[vertices[list(VERTICES.get((dim, count), range(count)))]]
-    middles = MIDDLES[dim, count] if len(points) > count else []
+    corners = points[vertices[list(VERTEX_ORDERS.get((dim, count), range(count)))]]
+    middles = MIDDLE_NODES[dim, count] if len(points) > count else []
     places = np.array([*corners, *(corners[list(of)].mean(axis=0) for of in middles)])
     apart = np.linalg.norm(places[:, None] - points, axis=2)
-    return TYPES[dim, count, len(points)], apart.argmin(axis=1)
+    return VTK_TYPES[dim, count, len(points)], apart.argmin(axis=1)
 
 
 def gathered(comm: MPI.Comm, *arrays: np.ndarray) -> list[np.ndarray]:
@@ -83,7 +83,7 @@ def gathered(comm: MPI.Comm, *arrays: np.ndarray) -> list[np.ndarray]:
 
 
 # What vertices of second-order tetrahedra, which are no contact nodes, are given.
-RECOVERED = ("pressure", "shear_traction", "slip", "wear_depth")
+RECOVERED_NAMES = ("pressure", "shear_traction", "slip", "wear_depth")
 
 
 def padded(values: np.ndarray) -> np.ndarray:
@@ -220,11 +220,11 @@ class SurfaceMesh:
         }
         gap = self._gaps(moved)
         values["gap"], values["displacement"] = gathered(self._comm, gap, padded(moved))
-        if TRIANGLE6 in self._cells:
-            names = (*RECOVERED, "gap") if contact.surface.deformable else RECOVERED
-            recovered(self._x, self._cells[TRIANGLE6], values, names)
-        if LINE3 in self._cells:
-            recovered_on_axis(self._cells[LINE3], values)
+        if VTK_TRIANGLE6 in self._cells:
+            names = (*RECOVERED_NAMES, "gap") if contact.surface.deformable else RECOVERED_NAMES
+            recovered(self._x, self._cells[VTK_TRIANGLE6], values, names)
+        if VTK_LINE3 in self._cells:
+            recovered_on_axis(self._cells[VTK_LINE3], values)
         return Mesh(self._x, self._cells, values, {})
 
     def _placed(self, values: np.ndarray) -> np.ndarray:
@@ -266,7 +266,7 @@ def recovered(
     x: np.ndarray,
     triangles: np.ndarray,
     values: dict[str, np.ndarray],
-    names: tuple[str, ...] = RECOVERED,
+    names: tuple[str, ...] = RECOVERED_NAMES,
 ) -> None:
     r"""Give vertices of second-order triangles values that fit those at the middles of edges, in place.
 

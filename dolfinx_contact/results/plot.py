@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 # Points per direction of the grid on which a rigid surface is drawn, by dimension, and how far it goes beyond the contact, over its size.
-POINTS, BEYOND = {2: 400, 3: 60}, 0.15
+GRID_POINTS, GRID_MARGIN = {2: 400, 3: 60}, 0.15
 
 
 def plot(
@@ -132,8 +132,8 @@ def _distances(contact: Contact, x: np.ndarray, factor: float) -> tuple[np.ndarr
     dim = contact.points.dim
     inside = np.arange(3) < dim
     low, high = x.min(axis=0), x.max(axis=0)
-    margin = BEYOND * (high - low).max() * inside
-    box = np.array([low - margin, high + margin, np.where(inside, POINTS[dim], 1)])
+    margin = GRID_MARGIN * (high - low).max() * inside
+    box = np.array([low - margin, high + margin, np.where(inside, GRID_POINTS[dim], 1)])
     axes = [np.linspace(a, b, int(n)) for a, b, n in box.T]
     z, y, x = np.meshgrid(*reversed(axes), indexing="ij")  # x runs fastest, as in VTK's grids
     points = np.column_stack((x.ravel(), y.ravel(), z.ravel()))[:, :dim]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 # Lines and triangles between the nodes of a facet, by VTK's type.
-PIECES = {
+VTK_PIECES = {
     3: [(0, 1)],
     21: [(0, 2), (2, 1)],
     5: [(0, 1, 2)],
@@ -29,7 +29,7 @@ PIECES = {
 }
 
 # Nodal forces and works are no densities: between nodes they mean nothing.
-SHOWN = ("pressure", "shear_traction", "gap", "slip", "wear_depth", "displacement")
+PROFILE_NAMES = ("pressure", "shear_traction", "gap", "slip", "wear_depth", "displacement")
 
 
 def profile(
@@ -76,7 +76,8 @@ def profile(
 def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
     """The columns."""
     of = [
-        mesh.cells[kind][:, PIECES[kind]].reshape(-1, len(PIECES[kind][0])) for kind in mesh.cells
+        mesh.cells[kind][:, VTK_PIECES[kind]].reshape(-1, len(VTK_PIECES[kind][0]))
+        for kind in mesh.cells
     ]
     pieces = np.concatenate(of)
     found = [_nearest(mesh.x[pieces], point) for point in at]
@@ -84,7 +85,7 @@ def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
     weights = np.array([weights for _, weights in found])
     steps = np.linalg.norm(np.diff(at, axis=0), axis=1)
     table = {"s": np.concatenate(([0.0], np.cumsum(steps)))} | dict(zip("xyz", at.T))
-    for name in SHOWN:
+    for name in PROFILE_NAMES:
         values = np.einsum("kj,kj...->k...", weights, mesh.at_nodes[name][nodes])
         table |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": column for axis, column in zip("xyz", values.T)}  # fmt: skip
     nearest = np.take_along_axis(nodes, weights.argmax(axis=1)[:, None], axis=1)[:, 0]

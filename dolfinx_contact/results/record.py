@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.support.checks import ROUNDED, RoundingWarning
+from dolfinx_contact.support.checks import ROUNDING_FACTOR, RoundingWarning
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import StepState
 
 # Times the tolerance that errors over the reactions alone may have without a word.
-WORSE = 1e3
+WORSE_THAN_TOLERANCE = 1e3
 
 # Reasons of steps that have no solution, in words.
-NO_SOLUTION, UNHELD = "there is no solution", "a body leaves what held it"
+NO_SOLUTION, NOT_HELD = "there is no solution", "a body leaves what held it"
 
 
 class Counts(NamedTuple):
@@ -199,10 +199,13 @@ def warn_of_contact(step: Step, tol: float) -> None:
     """Warn, in the name of who called ``solve``, of reactions far less accurate than the tolerance, if a smaller one would help."""
     left = max(step.error, step.slip_error, step.forward_error)
     known = max(tol, left)  # where that is more than tol, rounding is warned of
-    if WORSE * known < step.contact_error < np.inf and left > ROUNDED * step.rounding:
+    if (
+        WORSE_THAN_TOLERANCE * known < step.contact_error < np.inf
+        and left > ROUNDING_FACTOR * step.rounding
+    ):
         warnings.warn(
             f"contact carries {left / step.contact_error:.1e} of the forces that act: its own may be off by {step.contact_error:.1e}, "
-            f"more than {WORSE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",
+            f"more than {WORSE_THAN_TOLERANCE:g} times tol = {tol:.1e}. For accurate ones set problem.tol to {max(tol * tol / step.contact_error, 1e-13):.0e}.",
             stacklevel=3,
         )
 

@@ -25,8 +25,8 @@ from dolfinx_contact.support.collective import by_first_rank, raised_together
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
-KINDS = {"f": "Float64", "i": "Int64", "u": "UInt8"}
-COLLECTION, PIECE = "Collection", "UnstructuredGrid"
+VTK_KINDS = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+VTK_COLLECTION, VTK_PIECE = "Collection", "UnstructuredGrid"
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
@@ -47,7 +47,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
 
 def write_vtu(path: Path, mesh: Mesh) -> None:
     """Write a mesh to a file of VTK's XML format."""
-    file = _file(PIECE)
+    file = _file(VTK_PIECE)
     cells = mesh.cells.values()
     counts = [np.full(len(of), of.shape[1]) for of in cells]
     kinds = [np.full(len(of), kind, dtype=np.uint8) for kind, of in mesh.cells.items()]
@@ -80,7 +80,7 @@ def _data(name: str, array: np.ndarray) -> ET.Element:
     """An array in base64, its number of bytes before it."""
     kind = array.dtype.kind
     data = array.astype({"f": "<f8", "i": "<i8", "u": "u1"}[kind]).tobytes()
-    about = {"type": KINDS[kind], "Name": name, "format": "binary"}
+    about = {"type": VTK_KINDS[kind], "Name": name, "format": "binary"}
     if array.ndim > 1:
         about["NumberOfComponents"] = str(array.shape[1])
     element = ET.Element("DataArray", about)
@@ -179,7 +179,7 @@ class Writer:
         for part, mesh in meshes.items():
             path = self._parts()[part]
             write_vtu(path.parent / self._name(part, len(times) - 1), mesh)
-            file = _file(COLLECTION)
+            file = _file(VTK_COLLECTION)
             for k, time in enumerate(times):
                 entry = {"timestep": repr(time), "part": "0", "file": self._name(part, k)}
                 ET.SubElement(file[0], "DataSet", entry)
@@ -188,7 +188,7 @@ class Writer:
     def _times_of_file(self, count: int) -> list[float]:
         """Times of the first steps of an existing series."""
         try:
-            sets = ET.parse(self._path).getroot().findall(f"{COLLECTION}/DataSet")
+            sets = ET.parse(self._path).getroot().findall(f"{VTK_COLLECTION}/DataSet")
             times = [float(entry.attrib["timestep"]) for entry in sets]
         except (OSError, ET.ParseError, KeyError, ValueError) as error:
             raise ValueError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfinx_contact.contact.contact_step import components
-from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, Solver, SolverResult
+from dolfinx_contact.solvers.base import ASTRAY_ERROR, BoundSolver, Solver, SolverResult
 
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
@@ -162,7 +162,7 @@ class BoundAutomatic(BoundSolver):
             if best is None or done or size < smallest:
                 smallest, best = size, found
                 # far from a solution, the state is no better than the other solver's own start
-                start = found.state if smallest <= ASTRAY else None
+                start = found.state if smallest <= ASTRAY_ERROR else None
             if done:
                 break
             if not options and step.slides(found.state):

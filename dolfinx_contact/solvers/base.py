@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-ASTRAY = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
+ASTRAY_ERROR = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
 
-KEPT = 64  # earlier steps in the memory of a problem: more than most load cycles have
+KEPT_STARTS = 64  # earlier steps in the memory of a problem: more than most load cycles have
 
 
 class SolverName(str, Enum):

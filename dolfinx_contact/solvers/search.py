@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations from which the convergence rate is estimated.
-WINDOW = 3
+RATE_WINDOW = 3
 
 # Iterates whose statuses are kept.
-KEPT = 50
+KEPT_ITERATES = 50
 
 
 class Search:
@@ -47,9 +47,9 @@ class Search:
         self.step, self.best, self.nearest = step, state, state
         self.error = self._smallest = self.forward_error = np.inf
         self._rank = self._attempt = (True, np.inf)
-        self._errors: deque[float] = deque(maxlen=WINDOW + 1)
+        self._errors: deque[float] = deque(maxlen=RATE_WINDOW + 1)
         self.iterations = self.left = 0
-        self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT)
+        self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT_ITERATES)
         self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
@@ -99,7 +99,7 @@ class Search:
             self._halved, self._since = self._smallest, self.iterations
         self._lost = not np.isfinite(self.error) or self.iterations - self._since > self._patience
         solved = errors.acts and max(self.error, change) <= tol
-        stalled = len(self._errors) > WINDOW and self._errors[0] <= 4 * errors.balance
+        stalled = len(self._errors) > RATE_WINDOW and self._errors[0] <= 4 * errors.balance
         rounded = stalled and errors.within(0.0)
         if rounded and strays:
             self.strayed, self._lost, rounded = state, True, False

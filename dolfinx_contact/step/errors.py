@@ -32,14 +32,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.support.checks import EPSILON, ROUNDED
+from dolfinx_contact.support.checks import ROUNDING_FACTOR, UNIT_ROUNDOFF
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.law.friction import Friction
 
 # If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
-BLIND = 1e-3
+BLIND_ROUNDING = 1e-3
 
 
 class Errors(NamedTuple):
@@ -66,11 +66,11 @@ class Errors(NamedTuple):
     @property
     def blind(self) -> bool:
         """Whether rounding may hide that loads are not balanced."""
-        return not self.acts or self.rounding > BLIND
+        return not self.acts or self.rounding > BLIND_ROUNDING
 
     def within(self, tol: float) -> bool:
         """Whether both are at most ``tol``, or as small as double precision allows."""
-        rounding = ROUNDED * self.rounding
+        rounding = ROUNDING_FACTOR * self.rounding
         return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
@@ -134,9 +134,9 @@ def as_errors(balance: np.ndarray, contacts: np.ndarray | None = None) -> Errors
     equilibrium, r, f, R, body, change = np.sqrt(balance)
     law, penetration, slip, contact = np.zeros(4) if contacts is None else np.sqrt(contacts)
     rounding, acting = max(body, contact), max(r, f, R)
-    acts = bool(acting > ROUNDED * rounding)
+    acts = bool(acting > ROUNDING_FACTOR * rounding)
     if not acts:
-        acting = rounding / EPSILON
+        acting = rounding / UNIT_ROUNDOFF
     left = np.array([max(equilibrium, law, penetration), slip, rounding, change])
     if acting > 0.0:
         left /= acting

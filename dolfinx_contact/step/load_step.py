@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.results.record import WORSE, Counts, counts_of
+from dolfinx_contact.results.record import WORSE_THAN_TOLERANCE, Counts, counts_of
 from dolfinx_contact.step.errors import Errors, as_errors, contact_defects, contact_rounding
-from dolfinx_contact.support.checks import EPSILON, ROUNDED
+from dolfinx_contact.support.checks import ROUNDING_FACTOR, UNIT_ROUNDOFF
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -362,12 +362,12 @@ class LoadStep:
         for contact, nodes in zip(self.contacts, state.nodes):
             contact.points.add_magnitudes(nodes.reaction, acting)
         change = np.full(1, np.inf) if state.acts_before is None else state.acts - state.acts_before
-        cancelling = EPSILON * (body.cancelling(x) + acting)
+        cancelling = UNIT_ROUNDOFF * (body.cancelling(x) + acting)
         if self.surfaces is not None:
             on_surfaces, terms = self.surfaces.left(state.nodes, state.c)
             mine = slice(None if body.comm.rank == 0 else 0)  # they are the same on all ranks
             left = np.append(left, on_surfaces[mine])
-            cancelling = np.append(cancelling, EPSILON * terms[mine])
+            cancelling = np.append(cancelling, UNIT_ROUNDOFF * terms[mine])
         supports = self.supports(state)
         return self.sums(left, state.reactions, self.external, supports, cancelling, change)
 
@@ -394,14 +394,14 @@ class LoadStep:
         Beside stiff springs they may be so small that it is told; then what the errors leave unknown does not matter either.
         """
         errors = state.errors
-        unknown = max(errors.largest, ROUNDED * errors.rounding)
-        told = unknown > WORSE * self.tol * errors.share
+        unknown = max(errors.largest, ROUNDING_FACTOR * errors.rounding)
+        told = unknown > WORSE_THAN_TOLERANCE * self.tol * errors.share
         return self.scale(state) * max(errors.share, unknown / tol if told else 0.0)
 
     def with_small_slip_as_stick(self, state: StepState) -> StepState:
         """A state whose nodes stick that slip by less than is unknown of it, or than the tolerance of its reactions."""
         errors = state.errors
-        unknown = max(self.tol * errors.share, errors.largest, ROUNDED * errors.rounding)
+        unknown = max(self.tol * errors.share, errors.largest, ROUNDING_FACTOR * errors.rounding)
         unknown *= self.scale(state)
         nodes = []
         for contact, one in zip(self.contacts, state.nodes):

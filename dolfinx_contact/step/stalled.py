@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dolfinx_contact import compat
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolverError
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS, LinearSolverError
 from dolfinx_contact.support.checks import place
 
 if TYPE_CHECKING:
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 # Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
 # where few do, it is not that.
-TALL, MANY_CHANGE = 2.0, 0.05
+TALL_RATIO, MANY_CHANGE = 2.0, 0.05
 
 # The error is where its largest parts make up so much of its square.
-MOST = 0.9
+ERROR_PART = 0.9
 
 # Iterations of an elastic solve from which on its preconditioner is called a bad one; even meshes need 25 to 40.
-MANY = 60
+MANY_ITERATIONS = 60
 
 
 def stalled(
@@ -50,7 +50,7 @@ def stalled(
     mine = (amount, 0.0, "") if largest is None else (amount, amount[largest], place(x, largest))
     found = body.comm.allgather(mine)
     squares = np.sort(np.concatenate([one[0] for one in found]) ** 2)[::-1]
-    few = 1 + int(np.searchsorted(np.cumsum(squares), MOST * squares.sum()))
+    few = 1 + int(np.searchsorted(np.cumsum(squares), ERROR_PART * squares.sum()))
     where = max(found, key=lambda one: one[1])[2]
     said = [
         f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
@@ -63,7 +63,7 @@ def tall(body: ElasticBody, contacts: Sequence[ContactStep]) -> list[str]:
     """That elements at the surface are tall, in the mean, and what to do; nothing if they are not.  Collective."""
     ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
-    if total <= TALL * count:
+    if total <= TALL_RATIO * count:
         return []
     return [
         f"elements at the surface are {total / count:.1f} times as high as wide, which makes steps harder where nodes slip: "
@@ -80,11 +80,11 @@ def slow(body: ElasticBody, forces: np.ndarray) -> str:
     except LinearSolverError:
         pass  # it has counted, too
     count = body.ksp.getIterationNumber()
-    if count <= MANY:
+    if count <= MANY_ITERATIONS:
         return ""
     return (
-        f"without contact, the body takes {count} iterations of its linear solver, {MANY} at most are usual; elements of very "
-        f"different sizes or shapes are hard for multigrid: if its factors fit into memory, petsc_options={DIRECT}"
+        f"without contact, the body takes {count} iterations of its linear solver, {MANY_ITERATIONS} at most are usual; elements of very "
+        f"different sizes or shapes are hard for multigrid: if its factors fit into memory, petsc_options={DIRECT_OPTIONS}"
     )
 
 

@@ -12,9 +12,9 @@ from mpi4py import MPI
 from dolfinx_contact.bodies.loose import times_volume
 from dolfinx_contact.contact.nodal import times
 from dolfinx_contact.law.friction import principal_axes
-from dolfinx_contact.results.record import NO_SOLUTION, UNHELD
-from dolfinx_contact.step.errors import BLIND, contact_rounding
-from dolfinx_contact.support.checks import EPSILON
+from dolfinx_contact.results.record import NO_SOLUTION, NOT_HELD
+from dolfinx_contact.step.errors import BLIND_ROUNDING, contact_rounding
+from dolfinx_contact.support.checks import UNIT_ROUNDOFF
 from dolfinx_contact.support.line_search import halves
 from dolfinx_contact.surfaces.sliding import nothing_holds
 
@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
-ROUNDING, BALANCED, RAYS = 1e-12, 1e-7, 400
+LOAD_ROUNDING, BALANCED_PART, CONE_RAYS = 1e-12, 1e-7, 400
 
 # What reactions may leave of loads in a state that is no more than rounding away from a solution.
-ROUGH = 1e-3
+ROUGH_BALANCE = 1e-3
 
 # Part of a motion that is none.
-SMALL = 1e-6
+NEGLIGIBLE_MOTION = 1e-6
 
 # Balance that takes reactions more than so many times the loads, as of a body jammed between planes, counts as none.
-JAMMED = 1e9
+JAMMED_RATIO = 1e9
 
 # A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
 # body slides away along it if it changes less than the second number, and loads are not balanced.
-UNFELT, SLIDING = 1e-9, 1e-3
+UNFELT_PART, SLIDING_PART = 1e-9, 1e-3
 
 # Where a body is moved to before it is taken back out of the planes, over the largest gap.
-FAR = 30.0
+FAR_RATIO = 30.0
 
 # The shortest part of a step towards the last state that is tried.
-SHORTEST = 2.0**-11
+SHORTEST_STEP = 2.0**-11
 
 
 class Statics:
@@ -89,16 +89,18 @@ class Statics:
                     "conditions, add a soft spring to F, or name the facets that may touch."
                 )
             self.said = f"where the search has moved it, {free} A smaller step stays nearer to what held it in the last one"
-            self.reason = UNHELD
+            self.reason = NOT_HELD
         b = step.free(step.b)
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
-        self.loads = np.where(np.abs(sums) <= ROUNDING * sizes, 0.0, sums)
+        self.loads = np.where(np.abs(sums) <= LOAD_ROUNDING * sizes, 0.0, sums)
         escape, self._balancing = self._escape(self._motion, self.loads)
         if escape is None and step.surfaces is not None:
             escape, _ = self._escape(*self._with_surfaces(step.surfaces))
             self.said = "" if escape is None else nothing_holds(contacts)
         # Planes that move alone are the concern of ``DrivenSurfaces.beyond``.
-        if escape is not None and np.linalg.norm(escape[:m]) > SMALL * np.linalg.norm(escape):
+        if escape is not None and np.linalg.norm(escape[:m]) > NEGLIGIBLE_MOTION * np.linalg.norm(
+            escape
+        ):
             self.said = self.said or (
                 f"The loads drive {body.loose.words(escape[:m])}, which no reactions of the contact nodes within their friction can "
                 "hold: no static state exists"
@@ -139,12 +141,12 @@ class Statics:
         unit = float(np.linalg.norm(loads)) or 1.0
         target, rays, weights = -loads / unit, np.zeros((loads.size, 0)), np.zeros(0)
         rest, kept, balancing = target, [], np.zeros(motion.shape[:2])
-        for _ in range(RAYS):
-            if np.linalg.norm(rest) <= BALANCED:
+        for _ in range(CONE_RAYS):
+            if np.linalg.norm(rest) <= BALANCED_PART:
                 break
             reach, ray, *reaction = self._farthest(motion, rest)
             length = float(np.linalg.norm(ray))
-            if reach <= length * max(1e-14, np.linalg.norm(rest) / JAMMED):
+            if reach <= length * max(1e-14, np.linalg.norm(rest) / JAMMED_RATIO):
                 return self._along_surfaces(-rest, loads, kept, weights), balancing
             rays = np.column_stack((rays[:, weights > 0], ray))
             kept = [one for one, weight in zip(kept, weights) if weight > 0] + [reaction]
@@ -166,7 +168,7 @@ class Statics:
                 motion
                 - np.linalg.lstsq(np.array(normals), np.array(normals) @ motion, rcond=1e-9)[0]
             )
-            if along @ loads > SMALL * np.linalg.norm(loads) * np.linalg.norm(motion):
+            if along @ loads > NEGLIGIBLE_MOTION * np.linalg.norm(loads) * np.linalg.norm(motion):
                 return along
         return motion
 
@@ -223,7 +225,9 @@ class Statics:
         square = np.einsum("ni,nij,nik->jk", weight, self._motion, self._motion)
         sums = np.einsum("ni,nij,ni->j", weight, self._motion, off)
         both = self._body.total(np.concatenate((square.ravel(), sums)))
-        way = -np.linalg.lstsq(both[: m * m].reshape(m, m), both[m * m :], rcond=SMALL**2)[0]
+        way = -np.linalg.lstsq(
+            both[: m * m].reshape(m, m), both[m * m :], rcond=NEGLIGIBLE_MOTION**2
+        )[0]
         self.start = self.last + self._modes @ way
 
     def share(self) -> float:
@@ -243,7 +247,7 @@ class Statics:
             unfelt: A motion is one of them if it changes less than this part of what springs at all nodes would.
         """
         changed = [np.zeros((0, self._felt.size))]
-        least = ROUNDING * self._body.largest(_pressures(state))
+        least = LOAD_ROUNDING * self._body.largest(_pressures(state))
         for contact, nodes in zip(state.step.contacts, state.nodes):
             kappa, given = contact.stiffness.normal, (nodes.reaction, nodes.gap, nodes.slip_increment)  # fmt: skip
             by_motion = contact.measuring_map().linearised(contact.law, *given)[-1]
@@ -263,12 +267,12 @@ class Statics:
 
     def slides(self, state: StepState) -> bool:
         """Whether loads are left along a motion that changes no reaction of a state; says so.  Collective."""
-        motions = self._free_motions(state, self.last, SLIDING)
+        motions = self._free_motions(state, self.last, SLIDING_PART)
         left, sizes = self._left(state)
         driven = (
             motions @ np.linalg.lstsq(motions.T @ motions, motions.T @ self.loads, rcond=None)[0]
         )
-        least = ROUGH * np.linalg.norm(driven) * np.linalg.norm(sizes)
+        least = ROUGH_BALANCE * np.linalg.norm(driven) * np.linalg.norm(sizes)
         if np.linalg.norm(left) > np.linalg.norm(self.loads):
             return False  # reactions of a body that is lost, not of one that slides
         if driven @ self.loads <= least or abs(driven @ left) <= least:
@@ -289,14 +293,14 @@ class Statics:
         """Whether a motion takes nodes into their planes: normal reactions would grow until they hold it.  Collective."""
         velocity = self._motion @ along
         into, fastest = self._body.largest(-velocity[:, -1]), self._body.largest(np.abs(velocity))
-        return into > ROUGH * fastest
+        return into > ROUGH_BALANCE * fastest
 
     def _overcome(self, state: StepState, along: np.ndarray, sizes: np.ndarray) -> bool:
         """Whether loads along a motion are more than normal reactions carry with all their friction.  Collective."""
         velocity = self._motion @ along
         friction = np.linalg.norm(self._mu * velocity[:, :-1], axis=1)
         carried = self._body.total([_pressures(state) @ (friction - velocity[:, -1])])[0]
-        least = ROUGH * np.linalg.norm(along) * np.linalg.norm(sizes)
+        least = ROUGH_BALANCE * np.linalg.norm(along) * np.linalg.norm(sizes)
         return bool(self.loads @ along - carried > least)
 
     def _needed(self, state: StepState) -> str:
@@ -318,10 +322,10 @@ class Statics:
         rounding = [np.zeros(0)]
         for contact in step.contacts:
             rounding.append(contact_rounding(contact, contact.at(self.last), self.last).ravel())
-        forces = np.concatenate(rounding), EPSILON * self._body.cancelling(self.last)
+        forces = np.concatenate(rounding), UNIT_ROUNDOFF * self._body.cancelling(self.last)
         hiding = np.sqrt(max(total(np.square(force / unit).sum()) for force in forces))
         acting = self._body.norm(step.external / unit)
-        if not 0.0 < BLIND * acting <= hiding:
+        if not 0.0 < BLIND_ROUNDING * acting <= hiding:
             return ""
         return (
             f"Loads are {unit * acting:.1e}, and rounding of coordinates and displacements alone makes contact forces of "
@@ -334,7 +338,7 @@ class Statics:
         Along motions without loads reactions may be no more than rounding, and say nothing.
         """
         left, sizes = self._left(state)
-        return bool((np.abs(left) <= ROUGH * sizes)[self.loads != 0.0].all())
+        return bool((np.abs(left) <= ROUGH_BALANCE * sizes)[self.loads != 0.0].all())
 
     def _left(self, state: StepState) -> tuple[np.ndarray, np.ndarray]:
         """Sums of loads and reactions along the motions, and those of their magnitudes.  Collective."""
@@ -358,7 +362,7 @@ class Statics:
             ValueError: on all ranks, if a motion is undetermined and none is to be chosen.
         """
         step, x = state.step, state.x
-        motions = self._free_motions(state, x, UNFELT)
+        motions = self._free_motions(state, x, UNFELT_PART)
         if not motions.size:
             return state
         if choice == "refused":
@@ -375,7 +379,7 @@ class Statics:
             self._body.total(weighed.T @ Z),
         )
         way = Z @ np.linalg.solve(sizes, apart)
-        for length in halves(SHORTEST):
+        for length in halves(SHORTEST_STEP):
             trial = step.measure(x + length * way, before=state)
             if trial.within:
                 return trial
@@ -417,7 +421,7 @@ def _touching(normal: np.ndarray, gap: np.ndarray, force: np.ndarray) -> np.ndar
     length, most = np.abs(gap).max(), np.linalg.norm(against) * np.linalg.norm(normal, axis=1).max()
     if not length * most > 0.0:
         return None
-    far = FAR * length * np.linalg.norm(against) / most * against / np.linalg.norm(against)
+    far = FAR_RATIO * length * np.linalg.norm(against) / most * against / np.linalg.norm(against)
     below = -(gap + normal @ far) / length
     weights, left = _cone_weights(np.vstack((normal.T, below)), np.append(np.zeros(len(far)), 1.0))
     if not left > 1e-14:

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 
 
 # Part of a coordinate, over the largest one, that is rounding of a mesh generator.
-ROUNDING = 1e-12
+COORDINATE_ROUNDING = 1e-12
 
 
-EPSILON = np.finfo(float).eps / 2  # of one operation
+UNIT_ROUNDOFF = np.finfo(float).eps / 2  # of one operation
 
 # Rounding is an estimate: up to this factor, errors may be rounding alone.
-ROUNDED = 2.0
+ROUNDING_FACTOR = 2.0
 
 # Part of a length, or of a motion, that is none.
-STILL = 64 * EPSILON
+NEGLIGIBLE_LENGTH = 64 * UNIT_ROUNDOFF
 
 
 class RoundingWarning(UserWarning):
@@ -94,7 +94,7 @@ def vector(name: str, value: ArrayLike, size: int | None = None) -> np.ndarray:
 
 def place(x: np.ndarray, node: int) -> str:
     """The position of one of some nodes, ``shape=(n, 2 or 3)``, in words: coordinates that are rounding beside theirs are zero."""
-    at = np.where(np.abs(x[node]) < ROUNDING * np.abs(x).max(), 0.0, x[node])
+    at = np.where(np.abs(x[node]) < COORDINATE_ROUNDING * np.abs(x).max(), 0.0, x[node])
     return f"({', '.join(f'{c:.6g}' for c in at)})"
 
 

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike
 
 # Seconds that a rank that failed waits for the others, which may be busy with work of their own.
-PATIENCE = 60.0
+WAITING_SECONDS = 60.0
 
 
 class raised_together:
@@ -70,12 +70,12 @@ def _first_to_fail(comm: MPI.Comm, error: BaseException | None) -> int:
     request = comm.Iallreduce(mine, first, op=MPI.MIN)
     if error is None:
         request.Wait()
-    until = monotonic() + PATIENCE
+    until = monotonic() + WAITING_SECONDS
     while error is not None and not request.Test():
         if monotonic() > until:
             print_exception(type(error), error, error.__traceback__)
             print(
-                f"dolfinx_contact: rank {comm.rank} failed with the error above. {PATIENCE:g} s later others still wait for it "
+                f"dolfinx_contact: rank {comm.rank} failed with the error above. {WAITING_SECONDS:g} s later others still wait for it "
                 "in the midst of what it left: all of them are ended.",
                 file=sys.stderr,
                 flush=True,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 # Part of a step's length by which what is left has to fall [L. Armijo, Pacific J. Math. 16 (1966) 1].
-FALL = 1e-4
+ARMIJO_FACTOR = 1e-4
 
 
 def halves(shortest: float) -> Iterator[float]:
@@ -20,4 +20,4 @@ def halves(shortest: float) -> Iterator[float]:
 
 def enough(length: float) -> float:
     """Part of what is left that may be left after a step of this length."""
-    return 1 - FALL * length
+    return 1 - ARMIJO_FACTOR * length

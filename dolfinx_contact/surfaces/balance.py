@@ -19,22 +19,22 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Steps of Newton's method, and lengths of one that are tried.
-STEPS, LENGTHS = 30, 40
+NEWTON_STEPS, LENGTHS_TRIED = 30, 40
 
 # What may be left of the forces on a plane, over the sum of their magnitudes: rounding.
-BALANCED = 16 * np.finfo(float).eps
+BALANCE_ROUNDING = 16 * np.finfo(float).eps
 
 # Part of what is left that may come back with the other sign.
-TURNED = 0.1
+REVERSED_PART = 0.1
 
 # Motion over that with which the last node begins to slip, after which all slip in its direction.
-TURNING = 1e3
+TURNING_RATIO = 1e3
 
 # Part of a motion that carries a node along its surface; of less the node says nothing about where all slip.
-CARRIED = 0.5
+CARRIED_PART = 0.5
 
 # Part of the nodes' stiffness that is added to tangents: where all nodes slip, or too few touch, these have none.
-REGULAR = 1e-10
+REGULAR_STIFFNESS = 1e-10
 
 
 class SurfaceBalance:
@@ -70,8 +70,8 @@ class SurfaceBalance:
         elif surfaces.pressing.any():
             c = self._pressed_together(c)
         left, size = self._left(c)
-        for _ in range(STEPS):
-            if (np.abs(left) <= BALANCED * size).all():
+        for _ in range(NEWTON_STEPS):
+            if (np.abs(left) <= BALANCE_ROUNDING * size).all():
                 return c
             if limits is None:
                 limits = self._limits(c)
@@ -105,10 +105,10 @@ class SurfaceBalance:
         """
         size_before = np.linalg.norm(before)
         low, high, length = 0.0, 1.0, 1.0
-        for _ in range(LENGTHS):
+        for _ in range(LENGTHS_TRIED):
             c = start + length * change
             left, size = self._left(c)
-            turned = before @ left < -TURNED * size_before**2
+            turned = before @ left < -REVERSED_PART * size_before**2
             if not turned and np.linalg.norm(left) < size_before:
                 return c, left, size
             if not turned and length == 1.0:
@@ -130,12 +130,16 @@ class SurfaceBalance:
             springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
             pressure = np.maximum(reaction[:, -1] - map.normal * state.gap, 0.0)
             bound = contact.friction.mu.max(axis=-1) * pressure
-            carried = np.where(np.abs(axes[:, :-1]) >= CARRIED, axes[:, :-1], 0.0)
+            carried = np.where(np.abs(axes[:, :-1]) >= CARRIED_PART, axes[:, :-1], 0.0)
             node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
             rate, way = springs[node, row], carried[node, row, motion]
             middle = (state.slip_increment[node, row] - reaction[node, row] / rate) / way
             # In three dimensions directions go on turning to that of the motion.
-            width = (1.0 if contact.points.dim == 2 else TURNING) * bound[node] / (rate * abs(way))
+            width = (
+                (1.0 if contact.points.dim == 2 else TURNING_RATIO)
+                * bound[node]
+                / (rate * abs(way))
+            )
             for side, sign in enumerate((-1, 1)):
                 np.maximum.at(limits[side], motion, width + sign * middle)
         self._body.comm.Allreduce(MPI.IN_PLACE, limits, op=MPI.MAX)
@@ -157,7 +161,7 @@ class SurfaceBalance:
             parts.append(np.array([pressure, map.normal])[:, axes[:, -1, motion] > 0])
         at_first, rho = np.concatenate(parts, axis=1)
         spring, target, moved = surfaces.springs[motion], surfaces.driving(c)[motion], 0.0
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS):
             pressure = np.maximum(at_first + rho * moved, 0.0)
             force, slope = total([pressure.sum(), rho[pressure > 0].sum()])
             if slope + spring == 0.0:  # nothing touches: as far as one node alone would need
@@ -165,7 +169,7 @@ class SurfaceBalance:
                 moved = self._body.comm.allreduce(float(alone), op=MPI.MIN)
                 continue
             left = force + spring * moved - target
-            if abs(left) <= BALANCED * (force + abs(target) + spring * abs(moved)):
+            if abs(left) <= BALANCE_ROUNDING * (force + abs(target) + spring * abs(moved)):
                 break
             moved -= left / (slope + spring)
         return c + moved * np.eye(surfaces.count)[motion]
@@ -193,18 +197,20 @@ class SurfaceBalance:
 
         most = total(np.einsum("ni,n,nj->ij", D, rho, D)) + np.diag(springs)
         moved, least = np.zeros(n), energy(np.zeros(n))
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS):
             pressure, active = least[1], rho * (least[1] > 0)
             sums = np.concatenate(
                 (pressure @ D, pressure @ np.abs(D), np.einsum("ni,n,nj->ij", D, active, D).ravel())
             )
             force, size, slope = np.split(total(sums), [n, 2 * n])
             left = force + springs * moved - target
-            if (np.abs(left) <= BALANCED * (size + np.abs(target) + springs * np.abs(moved))).all():
+            if (
+                np.abs(left) <= BALANCE_ROUNDING * (size + np.abs(target) + springs * np.abs(moved))
+            ).all():
                 break
-            slope = slope.reshape(n, n) + np.diag(springs) + REGULAR * most
+            slope = slope.reshape(n, n) + np.diag(springs) + REGULAR_STIFFNESS * most
             change = -np.linalg.solve(slope, left)
-            for length in halves(2.0 ** (1 - LENGTHS)):
+            for length in halves(2.0 ** (1 - LENGTHS_TRIED)):
                 following = energy(moved + length * change)
                 if following[0] < least[0]:
                     break

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 # Part by which guides may miss unit length and right angles: half of the digits.
-SQUARE = 1e-8
+GUIDE_DEFECT = 1e-8
 
 
 class Motion(NamedTuple):
@@ -217,7 +217,7 @@ class Drive:
     def radial(self) -> bool:
         """Whether a free translation has a component along the first coordinate."""
         along = [motion.axis[0] for motion in self.motions if not motion.turns]
-        return any(abs(part) > SQUARE for part in along)
+        return any(abs(part) > GUIDE_DEFECT for part in along)
 
     def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
         """Force or moment, springs included, that drives each motion in the present position; or the sum of the magnitudes of its terms."""
@@ -283,7 +283,7 @@ def check_guides(value: ArrayLike, size: int) -> np.ndarray:
     """The user's directions, ``shape=(size, size)``, made orthonormal to rounding; a ``ValueError`` if they are not nearly so."""
     rows = finite("surface.guides", value)
     square = rows.shape == (size, size)
-    if not square or np.abs(rows @ rows.T - np.eye(size)).max() > SQUARE:
+    if not square or np.abs(rows @ rows.T - np.eye(size)).max() > GUIDE_DEFECT:
         raise ValueError(
             f"surface.guides must be {size} directions of unit length at right angles, one a row, got {value!r}."
         )

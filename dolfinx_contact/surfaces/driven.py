@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.support.attributes import surfaces_of
-from dolfinx_contact.surfaces.balance import REGULAR, SurfaceBalance
+from dolfinx_contact.surfaces.balance import REGULAR_STIFFNESS, SurfaceBalance
 from dolfinx_contact.surfaces.sliding import slides_away
 
 if TYPE_CHECKING:
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from dolfinx_contact.law.maps import NodalMap
 
 # Part of a motion that has to be along normals for these to resist it.
-RESISTING = 1e-8
+RESISTING_PART = 1e-8
 
 # Stiffness of a spring over that of the contact nodes, beyond which rounding of its force hides theirs.
-STIFFEST = 1e10
+STIFFEST_SPRING = 1e10
 
 # Times that a curved surface far from the body comes nearer.
-APPROACHES, NEAR = 20, 1e-12  # part of the body's extent that is near enough
+MOST_APPROACHES, NEAR_PART = 20, 1e-12  # part of the body's extent that is near enough
 
 
 def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.ndarray) -> None:
@@ -43,11 +43,11 @@ def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.
         in_step: Returns their contacts as a step has them that begins where the surfaces stand.
         u: Last displacement, owned degrees of freedom.
     """
-    for _ in range(APPROACHES):
+    for _ in range(MOST_APPROACHES):
         steps = in_step()
         surfaces = DrivenSurfaces(body, steps)
         none = np.zeros(surfaces.count)
-        moved = surfaces.touched(surfaces.with_columns(steps), u, none, NEAR * body.extent)
+        moved = surfaces.touched(surfaces.with_columns(steps), u, none, NEAR_PART * body.extent)
         if not moved.any():
             return
         surfaces.place(moved)
@@ -131,7 +131,9 @@ class DrivenSurfaces:
         smooth = np.zeros(self.count, dtype=bool)
         for (_, rough), part in zip(self._rough, self.parts):
             smooth[part] = not rough
-        self._loose = smooth & (along <= RESISTING**2 * (along + across)) & (self.springs == 0.0)
+        self._loose = (
+            smooth & (along <= RESISTING_PART**2 * (along + across)) & (self.springs == 0.0)
+        )
         return (along > across) | (smooth & ~self._loose)
 
     def _loaded(self, contact: ContactStep) -> np.ndarray:
@@ -140,7 +142,7 @@ class DrivenSurfaces:
         if self._body.largest(pressing) > 0.0:
             return pressing
         nearest = -self._body.highest(-contact.last.gap)
-        return (contact.last.gap <= nearest + NEAR * self._body.extent).astype(float)
+        return (contact.last.gap <= nearest + NEAR_PART * self._body.extent).astype(float)
 
     def check(self, contacts: Sequence[ContactStep]) -> None:
         """Raise a ``ValueError`` on all ranks if nothing would hold a surface that force drives.  Collective."""
@@ -169,14 +171,14 @@ class DrivenSurfaces:
         for contact, axes in zip(contacts, self.axes):
             sums += np.einsum("n,nim->m", contact.stiffness.normal, axes**2)
         nodes = self._body.total(sums)
-        too_stiff = (self.springs > STIFFEST * nodes) & (nodes > 0.0)
+        too_stiff = (self.springs > STIFFEST_SPRING * nodes) & (nodes > 0.0)
         if too_stiff.any():
             k = int(np.argmax(too_stiff))
             scale = self._lengths[k] ** 2
             raise ValueError(
                 f"surface.stiffness has {self.springs[k] * scale:.3g} for {self.names[k]!r}, {self.springs[k] / nodes[k]:.1g} times as stiff "
                 f"as the contact nodes together: rounding of its force would hide theirs. That is a support: leave {self.names[k]!r} out "
-                f"of surface.free and prescribe the motion, or take a spring of at most {1e-3 * STIFFEST * nodes[k] * scale:.0e}."
+                f"of surface.free and prescribe the motion, or take a spring of at most {1e-3 * STIFFEST_SPRING * nodes[k] * scale:.0e}."
             )
 
     def _pulled(self):
@@ -281,7 +283,7 @@ class DrivenSurfaces:
             sums[0] -= np.tensordot(axes, by_motion @ axes, ((0, 1), (0, 1)))
             sums[1] += np.tensordot(axes, kappa * axes, ((0, 1), (0, 1)))
         stiffness, most = self._body.total(sums)
-        return np.diag(self.springs) + stiffness + REGULAR * most
+        return np.diag(self.springs) + stiffness + REGULAR_STIFFNESS * most
 
     def columns(
         self, contacts: Sequence[ContactStep], blocks: Sequence[np.ndarray] | None = None

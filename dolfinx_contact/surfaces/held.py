@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.support.attributes import surfaces_of
-from dolfinx_contact.support.checks import STILL, place
+from dolfinx_contact.support.checks import NEGLIGIBLE_LENGTH, place
 from dolfinx_contact.support.collective import raised_together
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a motion along a held direction that may be rounding.
-ALONG = 1e-8
+HELD_ROUNDING = 1e-8
 
 
 class Holding(NamedTuple):
@@ -79,14 +79,14 @@ def _held_surface(
     both = np.array([resists, np.max(largest, axis=0)])
     body.comm.Allreduce(MPI.IN_PLACE, both, op=MPI.MAX)
     resists, largest = both
-    which = np.flatnonzero(resists > ALONG * largest)
+    which = np.flatnonzero(resists > HELD_ROUNDING * largest)
     if which.size == 0:
         return None
     names, holding = [motions[k].name for k in which], []
     simple = not surface.curved and not any(motions[k].turns for k in which)
     with raised_together(body.comm):
         for (k, contact), along in zip(on, held):
-            mine = (np.abs(along[:, :, which]) > ALONG * largest[which]).any(axis=(1, 2))
+            mine = (np.abs(along[:, :, which]) > HELD_ROUNDING * largest[which]).any(axis=(1, 2))
             rows = contact.points.supported[mine]
             if mine.any() and (not simple or contact.points.along[mine].any()):
                 where = place(contact.x, int(rows[0]))
@@ -184,7 +184,7 @@ class HeldSurface:
             way = np.linalg.solve(sums[: m * m].reshape(m, m), sums[m * m :])
             axes = np.array([motion.axis for motion in self._motions])
             self._surface.displacement = self._surface.displacement + way @ axes
-            scale = STILL * self._body.largest(np.concatenate(sizes))
+            scale = NEGLIGIBLE_LENGTH * self._body.largest(np.concatenate(sizes))
         apart = self._body.largest(np.abs(s - D @ way)) > scale
         if apart:
             names = ", ".join(repr(motion.name) for motion in self._motions)
@@ -226,7 +226,7 @@ class HeldSurface:
         sums = self._body.total(sums)
         asked = self._surface.driver.pulled_by(self._motions) - sums[:, m]
         with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.linalg.lstsq(sums[:, :m], asked, rcond=ALONG)[0]
+            part = np.linalg.lstsq(sums[:, :m], asked, rcond=HELD_ROUNDING)[0]
         if asked.any() and not np.allclose(sums[:, :m] @ part, asked):
             part = np.where(asked == 0.0, 0.0, np.sign(asked) * np.inf)
         return part

@@ -16,13 +16,13 @@ from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 from dolfinx_contact.surfaces.ufl_distance import by_ufl, is_ufl
 
 # Step of central differences, relative to the size of the nodes' positions: it balances rounding and truncation errors.
-STEP = float(np.cbrt(np.finfo(float).eps))
+DIFFERENCE_STEP = float(np.cbrt(np.finfo(float).eps))
 
 # A gradient may differ from central differences by this part of its length: values may be in single precision.
-APART = 0.05
+GRADIENT_DEFECT = 0.05
 
 # A gradient is treated as zero if it is below this part of the largest one.
-FLAT = 1e-12
+FLAT_GRADIENT = 1e-12
 
 
 class RigidSurface(CurvedSurface):
@@ -99,7 +99,7 @@ class RigidSurface(CurvedSurface):
 
     def _beside(self, y: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
         """Values at a small step along each axis from the positions, and the coordinates there, ``shape=(n, gdim)`` each."""
-        step = STEP * (np.abs(y - self.point).max(initial=0.0) or 1.0)
+        step = DIFFERENCE_STEP * (np.abs(y - self.point).max(initial=0.0) or 1.0)
         moved = [y + side * shift for shift in step * np.eye(y.shape[1])]
         values = [self._of("distance", self._values, z, y.shape[:1]) for z in moved]
         return np.column_stack(values), np.column_stack([z[:, k] for k, z in enumerate(moved)])
@@ -122,7 +122,7 @@ class RigidSurface(CurvedSurface):
         found = np.array([(values - here[:, None]) / (at - y) for values, at in sides])
         off = np.linalg.norm(given - np.clip(given, found.min(axis=0), found.max(axis=0)), axis=1)
         lengths = np.linalg.norm([given, *found], axis=2).max(axis=0)
-        wrong = off > APART * lengths
+        wrong = off > GRADIENT_DEFECT * lengths
         if wrong.any():
             k = int(np.argmax(wrong * off))
             raise ValueError(
@@ -156,7 +156,7 @@ class RigidSurface(CurvedSurface):
 
     def _lengths(self, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         lengths = np.linalg.norm(slopes, axis=1)
-        if not (lengths > FLAT * lengths.max()).all():
+        if not (lengths > FLAT_GRADIENT * lengths.max()).all():
             at = y[np.argmin(lengths)].tolist()
             raise ValueError(
                 f"distance of RigidSurface has no gradient at {at}, relative to it: there is no normal."

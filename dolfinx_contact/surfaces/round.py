@@ -14,7 +14,7 @@ from dolfinx_contact.support.checks import positive, vector
 from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 
 # Within this part of the radius, a position has no direction from the centre.
-NEAR = 1e-9
+CENTRE_RADIUS = 1e-9
 
 
 class _Round(CurvedSurface):
@@ -44,7 +44,7 @@ class _Round(CurvedSurface):
         """
         arms = self._arms(y)
         length = np.linalg.norm(arms, axis=1)
-        if (length <= NEAR * self.radius).any():
+        if (length <= CENTRE_RADIUS * self.radius).any():
             at = y[np.argmin(length)].tolist()
             raise ValueError(
                 f"a contact node is at the centre of {self}, {at} relative to it, where there is no normal: let its facets "

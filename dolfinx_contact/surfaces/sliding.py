@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 # Part of a motion that is not named.
-NONE = 1e-6
+NEGLIGIBLE_PART = 1e-6
 
 # Part of what friction carries that has to be left: where all is used, how far the plane slides is not determined.
-MARGIN = 1e-9
+FRICTION_MARGIN = 1e-9
 
 
 def slides_away(
@@ -113,7 +113,7 @@ class _Driven:
             return ""
         limit = _Limit(self._contacts, motions, self._body, self._weight() if given else None)
         way, pushed, most = limit.weakest(self._driving[motions])
-        if pushed > most * (1 - MARGIN if given else 1):
+        if pushed > most * (1 - FRICTION_MARGIN if given else 1):
             direction = way @ np.array([m.axis for m in self._surface.motions])[motions]
             direction = (direction.round(6) + 0.0).tolist()
             known = "with the normal forces found: the plane slides away"
@@ -140,7 +140,7 @@ class _Driven:
             low, high = np.concatenate(ends, axis=1).max(axis=1)
             low, high = (self._body.comm.allreduce(float(end), op=MPI.MAX) for end in (low, high))
             asked = self._driving[k] / weight
-            room = MARGIN * (low + high)
+            room = FRICTION_MARGIN * (low + high)
             if not -low + room <= asked <= high - room:
                 return (
                     f"surface.force and surface.moment turn {self._surface} about {self._names[k]!r} by more than its contact "
@@ -160,7 +160,7 @@ class _Driven:
             names = [
                 self._names[k]
                 for k, part in zip(motions, way)
-                if abs(part) > NONE * np.abs(way).max()
+                if abs(part) > NEGLIGIBLE_PART * np.abs(way).max()
             ]
             turns = self._turns[motions][np.abs(way).argmax()]
             return (

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.drive import Drive, Motion
 
 # Two vectors are parallel if the part of one across the other is below this.
-PARALLEL = 1e-12
+PARALLEL_PART = 1e-12
 
 # An axis whose tangential part is below this is along the normal.
-ALONG = 1e-8
+TANGENTIAL_PART = 1e-8
 
 # Components of a normal are compared to this many decimals: where two are equal, neither rounding nor solver errors may choose the tangent.
-TIES = 6
+TIE_DECIMALS = 6
 
 
 def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
@@ -283,12 +283,12 @@ def frames_along(
     """
     if normals.shape[1] == 2:
         return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
-    most = np.abs(normals).round(TIES).argmin(axis=1)
+    most = np.abs(normals).round(TIE_DECIMALS).argmin(axis=1)
     t1 = np.eye(3)[most] if axis is None else np.broadcast_to(axis, normals.shape)
     for _ in range(2):  # once more, for a nearly parallel axis
         t1 = t1 - (t1 * normals).sum(axis=1, keepdims=True) * normals
         length = np.linalg.norm(t1, axis=1, keepdims=True)
-        if (length < ALONG).any():
+        if (length < TANGENTIAL_PART).any():
             raise ValueError(
                 f"axis {axis} of {surface} is along the normal at the contact node at {place(at, int(length.argmin()))}, relative to it: give "
                 "another first principal friction direction."
@@ -351,7 +351,7 @@ def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     if after.size == 1:
         return after - before
     size = np.linalg.norm(before) * np.linalg.norm(after)
-    if np.linalg.norm(np.cross(before, after)) <= PARALLEL * size:
+    if np.linalg.norm(np.cross(before, after)) <= PARALLEL_PART * size:
         return after - before
     return composed(after, -before)
 

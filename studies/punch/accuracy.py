@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import dolfinx_contact as dc
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from studies.punch.contact_map import gather
 from studies.punch.model import Parameters, Punch, programme
 
@@ -148,7 +148,7 @@ def build(parameters: Parameters, divisions: int, comm=None) -> Punch:
     lowest = parameters.height / (2 * divisions) ** 2
     given = {} if comm is None else {"comm": comm}
     # the compliance of the contact nodes takes thousands of solves: by a factorisation, on fine meshes, too
-    given |= dict(solver=dc.CondensedNewton(), petsc_options=DIRECT)
+    given |= dict(solver=dc.CondensedNewton(), petsc_options=DIRECT_OPTIONS)
     quarter = min(parameters.target) >= 0 and divisions % 2 == 0
     parameters = replace(parameters, refine=0, lowest=lowest)
     return Punch(parameters, **given, **mesh_options(divisions), quarter=quarter)

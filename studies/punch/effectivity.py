@@ -14,7 +14,7 @@ from pathlib import Path
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from studies.punch.accuracy import mesh_options
 from studies.punch.model import Parameters, Punch, programme
 
@@ -35,7 +35,7 @@ SUMS, FIELDS = ("normal_force", "tangential_force", "dissipation"), ("pressure",
 def build(divisions: int, layers: int, order: int, degree: int, **options) -> Punch:
     """A quarter of the punch with uniform cells of an order, displacements of a degree."""
     return Punch(
-        START, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=True, divisions=divisions, layers=layers,
+        START, solver=dc.CondensedNewton(), petsc_options=DIRECT_OPTIONS, quarter=True, divisions=divisions, layers=layers,
         order=order, degree=degree, **options
     )  # fmt: skip
 
@@ -45,7 +45,11 @@ def fine(divisions: int) -> Punch:
     parameters = replace(START, lowest=START.height / (2 * divisions) ** 2)
     options = mesh_options(divisions)
     return Punch(
-        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=True, **options
+        parameters,
+        solver=dc.CondensedNewton(),
+        petsc_options=DIRECT_OPTIONS,
+        quarter=True,
+        **options,
     )
 
 

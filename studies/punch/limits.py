@@ -11,7 +11,7 @@ from pathlib import Path
 from time import process_time
 
 import dolfinx_contact as dc
-from dolfinx_contact.petsc.linear_solver import DIRECT
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS
 from studies.punch.accuracy import mesh_options
 from studies.punch.model import Parameters, Punch, programme
 
@@ -82,7 +82,11 @@ def build(run: Run, quarter: bool = True, tol: float = 1e-8) -> tuple[Punch, flo
         rim=None if run.rim == 1 else run.rim,
     )
     punch = Punch(
-        parameters, solver=dc.CondensedNewton(), petsc_options=DIRECT, quarter=quarter, **mesh
+        parameters,
+        solver=dc.CondensedNewton(),
+        petsc_options=DIRECT_OPTIONS,
+        quarter=quarter,
+        **mesh,
     )
     punch.press(start.depth)  # the first step makes it
     return punch, process_time() - begin

@@ -14,7 +14,7 @@ from dolfinx import fem
 
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.extend import Solver
-from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS
 from dolfinx_contact.solvers.base import SolverResult
 from mechanics.material import elasticity
 
@@ -47,7 +47,7 @@ def test_rubber_between_frictionless_planes(gdim, solver):
 
 def test_rubber_with_multigrid():
     """Without a factorisation the fixed point solves the linearised steps, and the answer is the same."""
-    scene = block(cells=(4, 3), petsc_options=MULTIGRID)
+    scene = block(cells=(4, 3), petsc_options=MULTIGRID_OPTIONS)
     move(scene, -0.3 * HEIGHT)
     step = scene.problem.solve()
     assert step.solver == dc.SolverName.FIXED_POINT and "linearised" in step.reason
@@ -301,7 +301,7 @@ def test_a_senseless_trial_does_not_make_forces_small():
         scene.problem.solve()
 
 
-@pytest.mark.parametrize("options", [None, MULTIGRID], ids=["factorised", "multigrid"])
+@pytest.mark.parametrize("options", [None, MULTIGRID_OPTIONS], ids=["factorised", "multigrid"])
 def test_no_contact_at_all(options):
     """A rubber block that hangs from its top goes with it, as far as one likes in one step."""
     scene = block(cells=(4, 3), held=True)

@@ -48,7 +48,7 @@ def test_the_fixed_point_passes_the_patch_test(cell, slips):
 @SLIPS
 def test_multigrid_passes_the_patch_test(slips):
     """Multigrid on a body of second order, whose near-nullspace has the rotations of all its nodes."""
-    options = {**linear_solver.MULTIGRID, "ksp_rtol": 1e-13, "pc_gamg_coarse_eq_limit": 50}
+    options = {**linear_solver.MULTIGRID_OPTIONS, "ksp_rtol": 1e-13, "pc_gamg_coarse_eq_limit": 50}
     found = pressed(
         "hexahedron", 2, slips, tilted=True, solver=dc.FixedPoint(), petsc_options=options
     )

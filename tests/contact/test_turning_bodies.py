@@ -67,7 +67,7 @@ def test_work_of_a_turn(swapped, step):
 
 def test_a_turn_that_is_too_long(monkeypatch):
     """Beyond two radians, where solvers seldom get, a step is refused; shown with a lower limit."""
-    monkeypatch.setattr(mortar_points, "LONGEST", 0.3)
+    monkeypatch.setattr(mortar_points, "LONGEST_TURN", 0.3)
     turn, _ = rings(False)
     for angle in (0.0, 0.2):
         turn(angle)

@@ -173,6 +173,17 @@ def test_interfaces_are_few_and_small():
     assert not {of: names for of, names in members.items() if len(names) > MEMBERS}
 
 
+def test_constants_have_two_words():
+    """A constant of the package says what it is: its name has two words or more."""
+    short = []
+    for file, tree in PACKAGE.items():
+        for node in (n for n in tree.body if isinstance(n, (ast.Assign, ast.AnnAssign))):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = [e.id for of in targets for e in ast.walk(of) if isinstance(e, ast.Name)]
+            short += [f"{name(file)}.{n}" for n in names if n.isupper() and "_" not in n.strip("_")]
+    assert not short
+
+
 def test_the_repository_is_light():
     """All tracked files together are below 5 MB: what programs make is made, not tracked."""
     if not (ROOT / ".git").exists():

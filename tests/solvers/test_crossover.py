@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 import dolfinx_contact as dc
 from dolfinx_contact import problem_input
-from dolfinx_contact.petsc.linear_solver import DIRECT, preconditioner
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS, preconditioner
 from dolfinx_contact.solvers import automatic
 from dolfinx_contact.solvers.automatic import most_nodes
 
@@ -47,7 +47,7 @@ def test_many_contact_nodes_have_multigrid_and_factors_for_the_fallback(most, mo
     there for the condensed operator, and the step ends where it ends with factors alone."""
     settings = dict(cells=(8, 8, 4), mu=0.3, p=0.2)
     expected = scenes.block(**settings)
-    monkeypatch.setattr(problem_input, "CROWDED", 100)
+    monkeypatch.setattr(problem_input, "CROWDED_SIZE", 100)
     monkeypatch.setattr(automatic, "most_nodes", lambda unknowns, friction: 50)
     monkeypatch.setattr(automatic, "_fixed_point", lambda: dc.FixedPoint(max_iterations=most))
     many = scenes.block(**settings)
@@ -68,11 +68,15 @@ def test_many_contact_nodes_have_multigrid_and_factors_for_the_fallback(most, mo
 
 @pytest.mark.parametrize(
     "options, cells, solver",
-    [(DIRECT, (8, 8, 4), None), (None, (8, 8), None), (None, (8, 8, 4), dc.CondensedNewton())],
+    [
+        (DIRECT_OPTIONS, (8, 8, 4), None),
+        (None, (8, 8), None),
+        (None, (8, 8, 4), dc.CondensedNewton()),
+    ],
 )
 def test_what_the_user_chooses_and_plane_bodies_have_factors(options, cells, solver, monkeypatch):
     """However many nodes are in contact: options and solvers of the user go first, a plane body is factorised."""
-    monkeypatch.setattr(problem_input, "CROWDED", 100)
+    monkeypatch.setattr(problem_input, "CROWDED_SIZE", 100)
     monkeypatch.setattr(automatic, "most_nodes", lambda unknowns, friction: 5)
     scene = scenes.block(cells=cells, mu=0.3, p=None, petsc_options=options, solver=solver)
     assert not scene.problem.body.crowded
@@ -83,7 +87,7 @@ def test_what_the_user_chooses_and_plane_bodies_have_factors(options, cells, sol
 
 def test_a_body_without_contacts_is_not_crowded(monkeypatch):
     """Whatever its size: it has the solver that its unknowns ask for."""
-    monkeypatch.setattr(problem_input, "CROWDED", 100)
+    monkeypatch.setattr(problem_input, "CROWDED_SIZE", 100)
     scene = scenes.block(cells=(8, 8, 4))
     problem = dc.ContactProblem(scene.F, scene.u, [], bcs=scene.bcs)
     problem.solve()

@@ -6,14 +6,14 @@ import scenes
 from petsc4py import PETSc
 
 import dolfinx_contact as dc
-from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS, LinearSolver
 from dolfinx_contact.petsc.multigrid import Multigrid
 
 
 def stiffened(**options):
     """A block pressed once by the fixed point: its problem, and the multigrid of stiffness and springs."""
     scene = scenes.block(
-        cells=(12, 12, 8), solver=dc.FixedPoint(), petsc_options=MULTIGRID | options
+        cells=(12, 12, 8), solver=dc.FixedPoint(), petsc_options=MULTIGRID_OPTIONS | options
     )
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
@@ -67,7 +67,7 @@ def test_as_good_as_a_hierarchy_of_its_own():
     ksp.setTolerances(rtol=1e-10)
     ksp.setPC(pc)
     ksp.solve(left, right)
-    own = LinearSolver(A, MULTIGRID | {"ksp_rtol": 1e-10}, "own_", body.rigid_modes)
+    own = LinearSolver(A, MULTIGRID_OPTIONS | {"ksp_rtol": 1e-10}, "own_", body.rigid_modes)
     difference = np.abs(own.solve(left.array_r.copy()) - right.array_r).max()
     assert difference <= 1e-8 * right.norm(PETSc.NormType.INFINITY)
     expected = own.ksp.getIterationNumber()

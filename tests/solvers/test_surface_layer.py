@@ -10,7 +10,7 @@ import scenes
 
 import dolfinx_contact as dc
 from dolfinx_contact.law.maps import BipotentialMap, ReturnMap
-from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS
 from dolfinx_contact.solvers.fixed_point.preconditioner import ContactPreconditioner
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 from dolfinx_contact.solvers.search import Search
@@ -74,9 +74,9 @@ def test_near_a_solution_the_contact_is_linearised_at_once(monkeypatch):
     """Steps of steady sliding, which begin near their solutions, take fewer iterations with a tangent from the start, and end where they do without."""
 
     def slid(near):
-        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.NEAR", near)
+        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.NEAR_ERROR", near)
         scene = scenes.block(
-            cells=(8, 8, 3), mu=(0.3, 0.15), p=(0.05, 0.2), petsc_options=MULTIGRID, solver=dc.FixedPoint()
+            cells=(8, 8, 3), mu=(0.3, 0.15), p=(0.05, 0.2), petsc_options=MULTIGRID_OPTIONS, solver=dc.FixedPoint()
         )  # fmt: skip
         for k in range(5):
             scene.move_top(0.004 * k, 0.002 * k, -0.005)
@@ -92,10 +92,12 @@ def test_tangent_saves_iterations_where_slip_is_far_from_the_normal(monkeypatch)
     """Loading and unloading under a strongly non-associated rule take fewer iterations with the tangent."""
 
     def iterations(every):
-        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.EVERY", every)
-        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.NEAR", 0.0)
+        monkeypatch.setattr(
+            "dolfinx_contact.solvers.fixed_point.fixed_point.TANGENT_INTERVAL", every
+        )
+        monkeypatch.setattr("dolfinx_contact.solvers.fixed_point.fixed_point.NEAR_ERROR", 0.0)
         scene = scenes.block(
-            cells=(14, 14, 5), mu=(0.3, 0.15), p=(0.02, 0.3), petsc_options=MULTIGRID,
+            cells=(14, 14, 5), mu=(0.3, 0.15), p=(0.02, 0.3), petsc_options=MULTIGRID_OPTIONS,
             solver=dc.FixedPoint(),
         )  # fmt: skip
         count = 0
@@ -117,7 +119,7 @@ def test_replaced_solvers_give_their_memory_back(monkeypatch):
             return int(file.read().split()[1]) * resource.getpagesize()
 
     monkeypatch.setattr(
-        "dolfinx_contact.solvers.fixed_point.fixed_point.EVERY", 5
+        "dolfinx_contact.solvers.fixed_point.fixed_point.TANGENT_INTERVAL", 5
     )  # the layers are factorised too
     scene = scenes.block(cells=(12, 12, 8), solver=dc.FixedPoint())
 

@@ -8,7 +8,7 @@ from petsc4py import PETSc
 import dolfinx_contact as dc
 from dolfinx_contact.compat import partitioner
 from dolfinx_contact.contact.interface import like
-from dolfinx_contact.petsc.linear_solver import MULTIGRID, LinearSolver
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS, LinearSolver
 from dolfinx_contact.petsc.symmetric_matrix import GaussSeidel, halved, plus
 
 pytestmark = pytest.mark.ranks
@@ -108,12 +108,15 @@ def test_the_users_smoother_goes_before_ours():
     """Options of the levels, among the user's own or in PETSc's database, keep the matrix whole; ours halve it."""
     scene, K = block(cells=(8, 8, 6))
     modes = scene.problem.body.rigid_modes
-    assert LinearSolver(K, MULTIGRID, "ours_", modes).halved is not None
-    assert LinearSolver(K, MULTIGRID | {"mg_levels_pc_type": "sor"}, "own_", modes).halved is None
+    assert LinearSolver(K, MULTIGRID_OPTIONS, "ours_", modes).halved is not None
+    assert (
+        LinearSolver(K, MULTIGRID_OPTIONS | {"mg_levels_pc_type": "sor"}, "own_", modes).halved
+        is None
+    )
     database = PETSc.Options("database_")
     database["mg_levels_ksp_max_it"] = 3
     try:
-        assert LinearSolver(K, MULTIGRID, "database_", modes).halved is None
+        assert LinearSolver(K, MULTIGRID_OPTIONS, "database_", modes).halved is None
     finally:
         del database["mg_levels_ksp_max_it"]
 
@@ -121,7 +124,7 @@ def test_the_users_smoother_goes_before_ours():
 def test_a_loose_body_multiplies_by_its_own_stiffness():
     """Where anchors hold the body, its solver has another matrix than its stiffness."""
     scene = scenes.block(cells=(8, 8, 6))
-    problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], petsc_options=MULTIGRID)
+    problem = dc.ContactProblem(scene.F, scene.u, [scene.contact], petsc_options=MULTIGRID_OPTIONS)
     body = problem.body
     body.refresh()
     assert body.loose is not None

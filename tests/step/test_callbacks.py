@@ -99,7 +99,7 @@ def test_what_converge_and_adapt_call_raises_on_all_ranks():
 LEFT = """
 from mpi4py import MPI
 from dolfinx_contact.support import collective
-collective.PATIENCE = 0.2
+collective.WAITING_SECONDS = 0.2
 with collective.raised_together(MPI.COMM_WORLD):
     if MPI.COMM_WORLD.rank == 0:
         raise OSError("no space left on device")
@@ -118,7 +118,7 @@ def test_a_rank_left_in_the_midst_of_the_users_function_does_not_wait_for_ever()
                           capture_output=True, text=True, env=os.environ, timeout=100)  # fmt: skip
     assert done.returncode != 0
     assert "OSError: no space left on device" in done.stderr and "all of them are ended" in done.stderr  # fmt: skip
-    assert collective.PATIENCE >= 10.0
+    assert collective.WAITING_SECONDS >= 10.0
 
 
 WRONG = [None, 1j, "0.3", np.array([1 + 1j]), [0.1, 0.2], True, np.nan]

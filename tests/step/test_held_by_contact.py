@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.petsc.linear_solver import MULTIGRID
+from dolfinx_contact.petsc.linear_solver import MULTIGRID_OPTIONS
 from dolfinx_contact.step.statics import Statics
 
 pytestmark = pytest.mark.ranks
@@ -50,7 +50,7 @@ class Loose:
             plane = dc.RigidPlane((z - side * gap * length) * self.up, side * self.up)
             contacts.append(dc.Contact(V, facets, plane, dc.Friction(mu)))
         if kind == "multigrid":
-            options["petsc_options"] = MULTIGRID
+            options["petsc_options"] = MULTIGRID_OPTIONS
         bcs = [] if bcs is None else bcs(V)
         self.contacts, self.contact, self.u = contacts, contacts[0], u
         self.problem = dc.ContactProblem(F, u, contacts, bcs=bcs, solver=SOLVERS[kind](), tol=TOL, **options)  # fmt: skip

@@ -13,7 +13,12 @@ from petsc4py import PETSc
 
 import dolfinx_contact as dc
 from dolfinx_contact.compat import functionspace
-from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID, SYMMETRIC, LinearSolver
+from dolfinx_contact.petsc.linear_solver import (
+    DIRECT_OPTIONS,
+    MULTIGRID_OPTIONS,
+    SYMMETRIC_OPTIONS,
+    LinearSolver,
+)
 
 pytestmark = pytest.mark.ranks
 COMM = MPI.COMM_WORLD
@@ -329,7 +334,9 @@ def test_symmetric_stiffness_is_factorised_as_such():
         A = K.copy()
         A.setValue(row, beside, change * np.abs(values).max(), PETSc.InsertMode.ADD_VALUES)
         A.assemble()
-        ours, plain = (LinearSolver(A, options, "factors_", None) for options in (None, DIRECT))
+        ours, plain = (
+            LinearSolver(A, options, "factors_", None) for options in (None, DIRECT_OPTIONS)
+        )
         assert ours.ksp.getPC().getType() == kind
         x, expected = ours.solve(b), plain.solve(b)
         assert np.abs(x - expected).max(initial=0.0) <= 1e-10 * np.abs(expected).max(initial=1.0)
@@ -350,7 +357,7 @@ def test_a_factorisation_short_of_workspace_is_done_with_more():
         A = K.copy()
         A.shift(-shift)
         ample, short = (
-            LinearSolver(A, SYMMETRIC | {"mat_mumps_icntl_14": percent}, "workspace_", None)
+            LinearSolver(A, SYMMETRIC_OPTIONS | {"mat_mumps_icntl_14": percent}, "workspace_", None)
             for percent in (900, -90)
         )
         x, expected = short.solve(b), ample.solve(b)
@@ -367,7 +374,7 @@ def test_a_singular_matrix_is_no_matter_of_workspace():
     for row in range(first, last):
         A.setValue(row, row, float(row > 0))
     A.assemble()
-    solver = LinearSolver(A, DIRECT, "singular_", None)
+    solver = LinearSolver(A, DIRECT_OPTIONS, "singular_", None)
     with pytest.raises(dc.LinearSolverError, match=r"-11.* INFOG\(1\) = -10"):
         solver.solve(np.ones(last - first))
     solver.destroy()
@@ -377,7 +384,7 @@ def test_a_singular_matrix_is_no_matter_of_workspace():
 def test_one_multigrid_cycle_per_iteration_is_enough(case):
     """Without any inner solve, multigrid and fixed point together reach what a factorisation reaches."""
     reference, _ = run(**CASES[case])
-    other, _ = run(petsc_options=MULTIGRID, solver=dc.FixedPoint(), **CASES[case])
+    other, _ = run(petsc_options=MULTIGRID_OPTIONS, solver=dc.FixedPoint(), **CASES[case])
     assert np.abs(other - reference).max() <= 1e-8 * np.abs(reference).max()
 
 

@@ -10,7 +10,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import scenes
 
 from benchmarks import solutions
-from dolfinx_contact.petsc.linear_solver import DIRECT, MULTIGRID
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS, MULTIGRID_OPTIONS
 from studies.punch import Parameters, Punch, programme
 
 pytestmark = pytest.mark.skipif(scenes.COMM.size > 1, reason="programs for one rank")
@@ -30,7 +30,7 @@ def test_fixed_point_agrees_with_newton(case):
     parameters = Parameters(case=case, refine=-1, tol=1e-11)
     newton = Punch(parameters, solver=dc.CondensedNewton())
     others = [Punch(parameters, solver=dc.FixedPoint()) for _ in range(2)]
-    for punch, options in zip(others, (DIRECT, MULTIGRID)):
+    for punch, options in zip(others, (DIRECT_OPTIONS, MULTIGRID_OPTIONS)):
         punch.problem.body.options = options
     largest = np.zeros(2)
     for displacement in programme(parameters):

@@ -16,7 +16,7 @@ from scipy import sparse
 from dolfinx_contact.contact.contact_step import components
 from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.petsc.linear_solver import LinearSolver
-from dolfinx_contact.solvers.base import ASTRAY, BoundSolver, SolverName, SolverResult
+from dolfinx_contact.solvers.base import ASTRAY_ERROR, BoundSolver, SolverName, SolverResult
 from dolfinx_contact.solvers.condensed.compliance import (
     Responses,
     Rows,
@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations for a loose body that seems to slide away, and for any other.
-FEW, MANY = 3000, 6000
+FEW_ITERATIONS, MANY_ITERATIONS = 3000, 6000
 
 # Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
-RIGID = 1e-9
+RIGID_COMPLIANCE = 1e-9
 
 
 class BoundCondensedNewton(BoundSolver):
@@ -128,7 +128,7 @@ class BoundCondensedNewton(BoundSolver):
                 inert = np.setdiff1d(inert, prescribed)
                 W[inert, inert] = usual
                 for rows, block in zip(prescribed, blocks):
-                    W[np.ix_(rows, rows)] += RIGID * usual * block
+                    W[np.ix_(rows, rows)] += RIGID_COMPLIANCE * usual * block
                 tie(W, size, a, body.loose is not None and body.loose.modes.shape[1] == a.size)
                 if self._surfaces is not None:
                     W = self._surfaces.border(W, size)
@@ -249,7 +249,7 @@ class BoundCondensedNewton(BoundSolver):
             if self._shared and error <= step.tol < change:  # moves reactions within nodes, too
                 change = min(change, _next_change(state))
             best = state, force, result, change
-            lost = step.may_slide and result.error > max(ASTRAY, goal)
+            lost = step.may_slide and result.error > max(ASTRAY_ERROR, goal)
             if lost or max(error, change) <= step.tol:
                 break
             # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
@@ -284,7 +284,9 @@ class BoundCondensedNewton(BoundSolver):
         """Limits of the search for a loose body, none for others.  Collective."""
         if step.statics is None:
             return {}
-        most = FEW if state is not None and step.statics.slides(state) else MANY
+        most = (
+            FEW_ITERATIONS if state is not None and step.statics.slides(state) else MANY_ITERATIONS
+        )
         return {"max_iterations": min(most, self._options.max_iterations or most)}
 
     def _shares(self, reaction: np.ndarray) -> list[np.ndarray]:

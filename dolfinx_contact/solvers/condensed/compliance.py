@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.petsc.linear_solver import LinearSolver
 
-UNFELT = 1e-10  # of a motion is what no node feels, over the largest one
-_BLOCK = 256  # right-hand sides at a time: more gain nothing, and cost memory
-_COLUMNS = 60  # of A^-1 at a time, of whole nodes in two and three dimensions
+UNFELT_PART = 1e-10  # of a motion is what no node feels, over the largest one
+_BLOCK_SIZE = 256  # right-hand sides at a time: more gain nothing, and cost memory
+_COLUMN_COUNT = 60  # of A^-1 at a time, of whole nodes in two and three dimensions
 _MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
 
 
@@ -85,8 +85,8 @@ def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
     loads = sparse.vstack([part.all for part in rows]).tocsr()
     W = np.zeros((size, size) if comm.rank == 0 else (0, 0))
     solve_block = block_solver(solver.ksp)
-    for start in range(0, size, _BLOCK):
-        block = slice(start, min(start + _BLOCK, size))
+    for start in range(0, size, _BLOCK_SIZE):
+        block = slice(start, min(start + _BLOCK_SIZE, size))
         answer = solve_block(loads[block])  # (owned dofs, right-hand sides)
         found = comm.reduce(np.concatenate([part.part(answer) for part in rows]), root=0)
         if comm.rank == 0:
@@ -125,11 +125,11 @@ class Responses:
     def needed(self, rows: list[Rows]) -> list[int]:
         """Blocks that these rows need."""
         dofs = np.concatenate([part.sums.indices for part in rows])
-        return np.unique(np.searchsorted(self.dofs, dofs) // _COLUMNS).tolist()
+        return np.unique(np.searchsorted(self.dofs, dofs) // _COLUMN_COUNT).tolist()
 
     def bytes_needed(self, rows: list[Rows]) -> int:
         """Bytes of the blocks with those of these rows."""
-        return 8 * self.dofs.size * _COLUMNS * len(self._solved.union(self.needed(rows)))
+        return 8 * self.dofs.size * _COLUMN_COUNT * len(self._solved.union(self.needed(rows)))
 
     def compliance(self, solver: Any, rows: list[Rows]) -> np.ndarray:
         """As the function of this name: sums of displacements first, which have few entries, then their directions."""
@@ -141,11 +141,13 @@ class Responses:
         directions = along_diagonal([part.directions for part in rows])
         size, at = sums.shape[0], np.searchsorted(self.dofs, sums.indices)
         R = sparse.csr_matrix((sums.data, at, sums.indptr), (size, self.dofs.size))
-        moved = np.zeros((len(needed) * _COLUMNS, size))  # sums by unit forces at what they need
-        for k, first in zip(needed, range(0, len(moved), _COLUMNS)):
+        moved = np.zeros(
+            (len(needed) * _COLUMN_COUNT, size)
+        )  # sums by unit forces at what they need
+        for k, first in zip(needed, range(0, len(moved), _COLUMN_COUNT)):
             block = self._blocks[k]
             moved[first : first + block.shape[1]] = (R @ block).T
-        at = np.searchsorted(needed, at // _COLUMNS) * _COLUMNS + at % _COLUMNS
+        at = np.searchsorted(needed, at // _COLUMN_COUNT) * _COLUMN_COUNT + at % _COLUMN_COUNT
         W = sparse.csr_matrix((sums.data, at, sums.indptr), (size, len(moved))) @ moved
         W = directions @ (directions @ W).T
         return (W + W.T) / 2
@@ -157,7 +159,7 @@ class Responses:
         mine = (self.dofs >= first) & (self.dofs < last)
         solve = block_solver(solver.ksp) if blocks else None
         for k in blocks:
-            columns = self.dofs[k * _COLUMNS : (k + 1) * _COLUMNS]
+            columns = self.dofs[k * _COLUMN_COUNT : (k + 1) * _COLUMN_COUNT]
             count = columns.size
             units = (np.ones(count), columns, np.arange(count + 1))
             answer = solve(sparse.csr_matrix(units, (count, A.getSize()[0])))
@@ -181,7 +183,7 @@ def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
         root = np.sqrt(a)
         _, values, vectors = np.linalg.svd(np.linalg.qr(W[:size, last] * root, mode="r"))
         values = np.append(values, np.zeros(len(a) - len(values)))
-        unfelt = vectors[values <= UNFELT * values[0]].T / root[:, None]
+        unfelt = vectors[values <= UNFELT_PART * values[0]].T / root[:, None]
         W[last, last] = -unfelt @ unfelt.T
 
 
@@ -191,7 +193,7 @@ def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
     W is copied once; with its inverse it then needs a third of that, and a Jacobian with its factors the rest.  Beside W, solving for a block was measured
     to take six times what its solutions take.
     """
-    return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK * unknowns)
+    return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK_SIZE * unknowns)
 
 
 def available_first(comm: MPI.Comm) -> float:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
 
 # Compliance over the mean one that counts as none, as the kernel has it (Tuning::negligible).
-NEGLIGIBLE = 1e-14
+NEGLIGIBLE_COMPLIANCE = 1e-14
 
 
 def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
@@ -64,10 +64,10 @@ def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
             "way to its reaction."
         )
     own = diagonal[dim - 1 :: dim]
-    stiff = np.flatnonzero((own > 0) & (own < NEGLIGIBLE * own.mean()))
+    stiff = np.flatnonzero((own > 0) & (own < NEGLIGIBLE_COMPLIANCE * own.mean()))
     if stiff.size:
         raise ValueError(
-            f"W has the normal diagonal entry {own[stiff[0]]:g} at contact {stiff[0]}, less than {NEGLIGIBLE:g} of their mean: so small a "
+            f"W has the normal diagonal entry {own[stiff[0]]:g} at contact {stiff[0]}, less than {NEGLIGIBLE_COMPLIANCE:g} of their mean: so small a "
             "compliance cannot be told from none, beside the others. Set it to zero if the contact does not give way, or "
             "give contacts units of their own, in which all diagonal entries are about 1: the law does not depend on them."
         )
@@ -114,7 +114,7 @@ def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
     except RuntimeError:  # too many iterations
         return False
     own = W.diagonal()[dim - 1 :: dim]
-    own = np.maximum(own, NEGLIGIBLE * own.mean() or 1.0)  # as the kernel has it
+    own = np.maximum(own, NEGLIGIBLE_COMPLIANCE * own.mean() or 1.0)  # as the kernel has it
     load = np.linalg.norm(np.column_stack((q[:, :-1], np.minimum(gaps, 0))) / own[:, None])
     moved = np.linalg.norm(columns @ y) + eps * np.linalg.norm(np.abs(columns) @ y)
     allowed = math.sqrt(tol) * load * (own @ y)  # the judge would allow tol of it

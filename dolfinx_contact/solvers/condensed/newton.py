@@ -29,18 +29,18 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
 
 
-UNLIMITED = 200_000  # iterations; methods have limits of their own
+UNLIMITED_ITERATIONS = 200_000  # iterations; methods have limits of their own
 
-# Default iteration limit for arrays, which need not have a solution: WORK over the unknowns squared, at least FEWEST and PER_CONTACT, at most
-# MOST.  Random problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; a pile of 156 contacts needs 757.
-WORK, FEWEST, PER_CONTACT, MOST = 9e6, 600, 10, 7000
+# Default iteration limit for arrays, which need not have a solution: ITERATION_WORK over the unknowns squared, at least FEWEST_ITERATIONS and PER_CONTACT, at most
+# MOST_ITERATIONS.  Random problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; a pile of 156 contacts needs 757.
+ITERATION_WORK, FEWEST_ITERATIONS, PER_CONTACT, MOST_ITERATIONS = 9e6, 600, 10, 7000
 
 # Iterations after which infeasibility is tested, and the number of contacts up to which that takes less than a second.
-FIRST, PROVED = 100, 500
+FIRST_ITERATIONS, PROVABLE_CONTACTS = 100, 500
 
 # If a smaller error is needed: tolerances relative to tol; the largest part of the next Newton step that may remain; the multiple of rounding
 # below which it is not tried; the unknowns up to which all methods search again.
-NEARER, GAIN, NEAR_ROUNDING, SMALL = (1e-2, 1e-4), 0.1, 10, 100
+NEARER_TOLERANCES, LEAST_GAIN, NEAR_ROUNDING, ROUNDING_MULTIPLE = (1e-2, 1e-4), 0.1, 10, 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +133,7 @@ class CondensedNewton(Solver):
             tol=tol,
             slip_tol=self.slip_tol or tol,
             max_seconds=self.max_seconds,
-            max_iterations=int(self.max_iterations or UNLIMITED),
+            max_iterations=int(self.max_iterations or UNLIMITED_ITERATIONS),
             newton_iterations=int(self.newton_iterations),
             fallbacks=bool(self.fallbacks),
             monitor=monitor,
@@ -254,16 +254,18 @@ def _found(
     starts: Sequence[np.ndarray],
 ) -> CondensedResult:
     """A solution.  Where few iterations find none, it is asked whether there is any before the search goes on."""
-    least = max(FEWEST, PER_CONTACT * len(q), int(WORK / q.size**2))
-    most = solver.max_iterations or min(MOST, least)
+    least = max(FEWEST_ITERATIONS, PER_CONTACT * len(q), int(ITERATION_WORK / q.size**2))
+    most = solver.max_iterations or min(MOST_ITERATIONS, least)
     problem = operator, friction, q, tol, starts
     try:
-        return replace(solver, max_iterations=min(FIRST, most)).solve_condensed(*problem)
+        return replace(solver, max_iterations=min(FIRST_ITERATIONS, most)).solve_condensed(*problem)
     except CondensedNotConverged as failure:
         best, left = failure.best, solver.max_seconds - failure.best.seconds
-        if left > 0 and len(q) <= PROVED and no_way_out(W, q, tol):
+        if left > 0 and len(q) <= PROVABLE_CONTACTS and no_way_out(W, q, tol):
             raise CondensedNotConverged(replace(best, branch="infeasible")) from None
-        if left <= 0 or best.iterations < FIRST or most <= FIRST:  # nothing else is to be tried
+        if (
+            left <= 0 or best.iterations < FIRST_ITERATIONS or most <= FIRST_ITERATIONS
+        ):  # nothing else is to be tried
             raise
     # the same iterations once more, then others
     return replace(solver, max_iterations=most, max_seconds=left).solve_condensed(*problem)
@@ -283,8 +285,8 @@ def _nearer(
     each other, those of some.  Large problems are not searched by all methods again: where W is rank deficient reactions
     stay open anyway.
     """
-    cheap = solver.fallbacks and q.size <= SMALL
-    most = min(solver.max_iterations or UNLIMITED, 100 * solver.newton_iterations)
+    cheap = solver.fallbacks and q.size <= ROUNDING_MULTIPLE
+    most = min(solver.max_iterations or UNLIMITED_ITERATIONS, 100 * solver.newton_iterations)
     finer = replace(solver, slip_tol=None, fallbacks=cheap, max_iterations=most)
 
     def again(tol: float, **limits: Any):
@@ -298,13 +300,13 @@ def _nearer(
         return replace(nearer, branch=found.branch, **both), done
 
     done = True
-    for factor in NEARER:
+    for factor in NEARER_TOLERANCES:
         if found.change <= tol or found.error <= NEAR_ROUNDING * found.rounding:
             break
         if max(found.error, found.slip_error) > factor * tol:
             nearer, done = again(max(factor * tol, 1e-14))
             before, found = found, nearer if done else _better(nearer, found, tol)
-            if not done or found.change > GAIN * before.change:  # no smaller error tells them
+            if not done or found.change > LEAST_GAIN * before.change:  # no smaller error tells them
                 break
     if done and found.local_error > tol:
         nearer, done = again(tol, local_tol=tol)

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
-STEPS, LEFT = 50, 1e-6
+MOST_STEPS, RESIDUAL_PART = 50, 1e-6
 
 # Part of the stiffness against a motion that may be no more than what they leave.
-NOISE = 1e-4
+NOISE_PART = 1e-4
 
 
 class Border:
@@ -58,7 +58,7 @@ class Border:
         """What their giving way adds to ``A^-1 residual``."""
         pushed = self._body.total(self._follow.T @ residual)
         if self._loose:  # nothing resists some of them where there is no friction
-            return self._follow @ np.linalg.lstsq(self._left, pushed, rcond=NOISE)[0]
+            return self._follow @ np.linalg.lstsq(self._left, pushed, rcond=NOISE_PART)[0]
         return self._follow @ np.linalg.solve(self._left, pushed)
 
 
@@ -78,7 +78,7 @@ def _solved(body: ElasticBody, A: PETSc.Mat, stiffened: Any, C: np.ndarray) -> n
     ksp.setOperators(A)
     ksp.setType("cg")
     ksp.setNormType(PETSc.KSP.NormType.NATURAL)
-    ksp.setTolerances(rtol=LEFT, atol=0.0, max_it=STEPS)
+    ksp.setTolerances(rtol=RESIDUAL_PART, atol=0.0, max_it=MOST_STEPS)
     ksp.getPC().setType("python")
     ksp.getPC().setPythonContext(_Preconditioner(stiffened))
     (x, b), found = A.createVecs(), np.empty_like(C)

@@ -21,26 +21,32 @@ if TYPE_CHECKING:
 
 # Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
 # the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
-PARAMETERS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
+RHO_FACTORS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
-# The contact is linearised every EVERY iterations: after so many, most nodes have found their status, and easy steps are nearly
-# solved. If the error then grows by more than GROWTH, it was too early, and the search goes on from its best state without; the limit rises as
-# much each time, since the same one would repeat the same iterations for ever. If a tangent has not reduced the error below USELESS times its
+# The contact is linearised every TANGENT_INTERVAL iterations: after so many, most nodes have found their status, and easy steps are nearly
+# solved. If the error then grows by more than LARGEST_GROWTH, it was too early, and the search goes on from its best state without; the limit rises as
+# much each time, since the same one would repeat the same iterations for ever. If a tangent has not reduced the error below USELESS_TANGENT times its
 # value by the time the next one is due, the iterations until then use none.
-# If the start has an error below NEAR, as in a repeated step, most nodes have their status at once: a tangent then has to help at once.
-EVERY, GROWTH, USELESS, NEAR = 20, 30.0, 0.9, 0.1
+# If the start has an error below NEAR_ERROR, as in a repeated step, most nodes have their status at once: a tangent then has to help at once.
+TANGENT_INTERVAL, LARGEST_GROWTH, USELESS_TANGENT, NEAR_ERROR = 20, 30.0, 0.9, 0.1
 
 # The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
-PATIENCE = 60
+HALVING_ITERATIONS = 60
 
 # Further attempts: tangents every so many iterations, and where they begin: as the first one, or where half of the loads lead, or in the best
 # state, of which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no
 # solution nearby.
-START, HALF = "from the start", "half the way"
-AGAIN = (EVERY, START), (EVERY, HALF), (EVERY, 0.5), (EVERY, 0.05), (EVERY // 2, 0.05)
+FROM_START, HALF_WAY = "from the start", "half the way"
+FURTHER_ATTEMPTS = (
+    (TANGENT_INTERVAL, FROM_START),
+    (TANGENT_INTERVAL, HALF_WAY),
+    (TANGENT_INTERVAL, 0.5),
+    (TANGENT_INTERVAL, 0.05),
+    (TANGENT_INTERVAL // 2, 0.05),
+)
 
 # If corrections grow by this factor, Anderson's differences mislead.
-ASTRAY = 1e3
+ASTRAY_GROWTH = 1e3
 
 
 @dataclass(frozen=True)
@@ -81,8 +87,8 @@ class FixedPoint(Solver):
     max_seconds: float = math.inf
 
     def __post_init__(self) -> None:
-        if self.map not in PARAMETERS:
-            raise ValueError(f"map must be one of {', '.join(PARAMETERS)}, got {self.map!r}.")
+        if self.map not in RHO_FACTORS:
+            raise ValueError(f"map must be one of {', '.join(RHO_FACTORS)}, got {self.map!r}.")
         if self.rho is not None:
             positive("rho", self.rho, finite=True)
         positive("depth", self.depth, whole=True)
@@ -165,25 +171,25 @@ class BoundFixedPoint(BoundSolver):
         options, step = self._options, search.step
 
         def begin(state: StepState) -> None:
-            search.begin(state, options.max_iterations, PATIENCE)
+            search.begin(state, options.max_iterations, HALVING_ITERATIONS)
 
-        again = AGAIN if options.max_iterations > EVERY else ()
-        for factor in PARAMETERS[options.map] if options.rho is None else (options.rho,):
+        again = FURTHER_ATTEMPTS if options.max_iterations > TANGENT_INTERVAL else ()
+        for factor in RHO_FACTORS[options.map] if options.rho is None else (options.rho,):
             begin(search.best)
-            yield f"rho {factor:g}", factor, EVERY
+            yield f"rho {factor:g}", factor, TANGENT_INTERVAL
             if self.preconditioner.soften():
                 begin(search.best)
-                yield "soft motions", factor, EVERY
+                yield "soft motions", factor, TANGENT_INTERVAL
             for every, where in again:
-                if where == START:
+                if where == FROM_START:
                     begin(step.evaluate(x, step.measuring_maps, c=c).as_start)
-                elif where == HALF:
+                elif where == HALF_WAY:
                     begin(self._half_way(search, factor))
                 else:
                     from dolfinx_contact.solvers.fixed_point.put_back import put_back
 
                     begin(put_back(search.best, where))
-                yield where if where in (START, HALF) else "nodes put back", factor, every
+                yield where if where in (FROM_START, HALF_WAY) else "nodes put back", factor, every
             if _slides(search.best, tried=True):
                 return
 
@@ -191,8 +197,10 @@ class BoundFixedPoint(BoundSolver):
         """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
         step, half = search.step, search.step.half_way()
         other = Search(half, half.start(), self._options.max_seconds)
-        other.begin(other.best, min(2 * EVERY, self._options.max_iterations), PATIENCE)
-        self._fall(other, factor, EVERY)
+        other.begin(
+            other.best, min(2 * TANGENT_INTERVAL, self._options.max_iterations), HALVING_ITERATIONS
+        )
+        self._fall(other, factor, TANGENT_INTERVAL)
         search.count(other.iterations)
         x = other.nearest.x.copy()
         x[step.body.fixed] = step.b[step.body.fixed]
@@ -204,7 +212,11 @@ class BoundFixedPoint(BoundSolver):
         It starts again from the nearest state wherever the error has grown too much since the last tangent.
         """
         step, first = search.step, search.iterations == 0
-        near, growth, anderson = NEAR if first and step.contacts else 0.0, GROWTH, None
+        near, growth, anderson = (
+            NEAR_ERROR if first and step.contacts else 0.0,
+            LARGEST_GROWTH,
+            None,
+        )
         while search.goes_on:
             if anderson is None:
                 known = step.continues and search.iterations == 0
@@ -220,14 +232,14 @@ class BoundFixedPoint(BoundSolver):
             if not search.goes_on:
                 return
             if search.error > limit * tangent:
-                near, growth, anderson = 0.0, GROWTH * growth, None
+                near, growth, anderson = 0.0, LARGEST_GROWTH * growth, None
                 continue
             if search.left <= due or search.error < near:
                 search.error = before.errors.largest
             if search.left <= due or search.error < near:
                 limit = growth if near == 0.0 else 1.0  # one at once has to help at once
                 due, near = search.left - every, 0.0
-                useless = search.error > USELESS * tangent
+                useless = search.error > USELESS_TANGENT * tangent
                 # not if less reduction of the error is left than the last tangent has brought
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
                     self.preconditioner.forget_tangent()
@@ -238,7 +250,9 @@ class BoundFixedPoint(BoundSolver):
                 tangent = np.inf if useless else search.error
             following, norm = anderson.step(x, self.preconditioner.correct(state.residual))
             search.count(1)
-            if norm > ASTRAY * smallest:  # the differences mislead: start again from the best
+            if (
+                norm > ASTRAY_GROWTH * smallest
+            ):  # the differences mislead: start again from the best
                 anderson.restart()
                 following, smallest = search.nearest.x, np.inf
             smallest = min(smallest, norm)

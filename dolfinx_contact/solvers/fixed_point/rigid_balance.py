@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 # A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
 # (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
 # stiffness (up to 2300 times) more than halves its iterations.
-STIFFENED = 200.0
+STIFFENING_FACTOR = 200.0
 
 # Motions whose part of their own, squared, is below this are combinations of others.
-DEPENDENT = 1e-10
+DEPENDENT_PART = 1e-10
 
 # Newton's method ends when the forces along the motions are this small beside those on all nodes.
-SMALL, NEWTON = 1e-3, 20
+SMALL_RESIDUAL, NEWTON_STEPS = 1e-3, 20
 
 # The shortest part of a step of it that is tried.
-SHORTEST = 2.0**-11
+SHORTEST_STEP = 2.0**-11
 
 # Part of the largest slope that is none; lengths that are tried along such a motion, and part of the forces that may be left.
-FREE, ACROSS, TURNED = 1e-9, 60, 0.9
+FREE_SLOPE, LENGTHS_TRIED, RESIDUAL_LEFT = 1e-9, 60, 0.9
 
 
 class RigidBalance:
@@ -68,7 +68,7 @@ class RigidBalance:
         # Motions orthonormal in the energy of A, by the share that K has in it: 1 where no spring acts.
         root = _inverse_root(all_energy)
         share, vectors = np.linalg.eigh(root.T @ (energy + energy.T) @ root / 2)
-        soft = root @ vectors[:, share < 1 / STIFFENED]
+        soft = root @ vectors[:, share < 1 / STIFFENING_FACTOR]
         self.modes, self.forces = modes @ soft, forces @ soft
         self._energy = soft.T @ energy @ soft
         if len(self):  # of unknowns besides displacements nothing counts
@@ -95,11 +95,11 @@ class RigidBalance:
             return start
         x, forces, _ = start
         left, slope, size, before = self.left(x, forces, step, maps, before)
-        for _ in range(NEWTON):
-            if np.linalg.norm(left) <= SMALL * size:
+        for _ in range(NEWTON_STEPS):
+            if np.linalg.norm(left) <= SMALL_RESIDUAL * size:
                 break
             direction = self._limited(np.linalg.lstsq(slope, left, rcond=1e-13)[0])
-            for length in halves(SHORTEST):
+            for length in halves(SHORTEST_STEP):
                 way = length * direction
                 trial = x + self.modes @ way, forces - self.forces @ way
                 result = self.left(*trial, step, maps, before)
@@ -132,16 +132,16 @@ class RigidBalance:
         if self._body.loose is None:
             return None, None
         _, values, vectors = np.linalg.svd(slope)
-        free = vectors[values <= FREE * values[0]]
+        free = vectors[values <= FREE_SLOPE * values[0]]
         way, before = free.T @ (free @ left), np.linalg.norm(left)
         low, high, length = 0.0, np.inf, 1.0
-        for _ in range(ACROSS):
+        for _ in range(LENGTHS_TRIED):
             c = length * way
             if not c.any() or (self._limited(c) != c).any():
                 break
             trial = start[0] + self.modes @ c, start[1] - self.forces @ c
             result = self.left(*trial, step, maps, near)
-            if np.linalg.norm(result[0]) < TURNED * before:
+            if np.linalg.norm(result[0]) < RESIDUAL_LEFT * before:
                 return trial, result
             low, high = (length, high) if result[0] @ way > 0.0 else (low, length)
             length = 2 * length if high == np.inf else (low + high) / 2
@@ -210,5 +210,5 @@ def _inverse_root(energy: np.ndarray) -> np.ndarray:
     """R with R^T energy R the identity, without the directions that are combinations of others."""
     scale = 1 / np.sqrt(np.diag(energy))
     values, vectors = np.linalg.eigh(scale[:, None] * energy * scale)
-    kept = values > DEPENDENT * values[-1]
+    kept = values > DEPENDENT_PART * values[-1]
     return scale[:, None] * vectors[:, kept] / np.sqrt(values[kept])

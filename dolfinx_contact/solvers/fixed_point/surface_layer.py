@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact.interface import like, response, responses
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver
+from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS, LinearSolver
 from dolfinx_contact.solvers.newton.contact_tangent import change_of
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import ContactPoints
     from dolfinx_contact.step.load_step import LoadStep
 
-LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
+ELEMENT_LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
 
 
 class SurfaceLayer:
@@ -85,7 +85,7 @@ class SurfaceLayer:
             part.destroy()
         if self._solver is not None:
             self._solver.destroy()
-        self._solver = LinearSolver(A, DIRECT, self._prefix, None)
+        self._solver = LinearSolver(A, DIRECT_OPTIONS, self._prefix, None)
         A.destroy()  # the solver has its own reference
 
     def correct(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +121,7 @@ def _near(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
         one.add_magnitudes(np.ones((one.count, one.dim)), touched)
         rows = of.rows(touched).any(axis=1)
         near.x.array[gdim * np.flatnonzero(rows)[:, None] + np.arange(gdim)] = 1.0
-    for _ in range(LAYERS - 1):
+    for _ in range(ELEMENT_LAYERS - 1):
         near.x.scatter_forward()
         marked = near.x.array[::gdim] > 0.0
         reached = nodes[marked[nodes].any(axis=1)]

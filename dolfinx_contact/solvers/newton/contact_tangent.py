@@ -11,7 +11,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfinx_contact.contact.interface import like, response, responses, structure
-from dolfinx_contact.petsc.linear_solver import DIRECT, LinearSolver, LinearSolverError, stage
+from dolfinx_contact.petsc.linear_solver import (
+    DIRECT_OPTIONS,
+    LinearSolver,
+    LinearSolverError,
+    stage,
+)
 from dolfinx_contact.solvers.base import BoundSolver
 
 if TYPE_CHECKING:
@@ -52,7 +57,7 @@ class ContactTangent:
     def _factors(self) -> LinearSolver:
         if self._solver is None:
             prefix = f"{self._body.prefix}tangent_"
-            self._solver = LinearSolver(self._A, DIRECT, prefix, None)
+            self._solver = LinearSolver(self._A, DIRECT_OPTIONS, prefix, None)
         return self._solver
 
     @property

@@ -19,11 +19,11 @@ from dolfinx_contact.step.nonlinear import LinearisedStep
 from dolfinx_contact.support.line_search import halves
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
-# largest of the last BEFORE ones.
-MOST, SHORTEST, BEFORE = 30, 2.0**-6, 3
+# largest of the last ERRORS_BEFORE ones.
+MOST_STEPS, SHORTEST_STEP, ERRORS_BEFORE = 30, 2.0**-6, 3
 
-# Tolerance of a linearised step: at most ROUGH, else this part of what is left after it, were errors to fall as squares.
-ROUGH, PART = 1e-3, 0.1
+# Tolerance of a linearised step: at most ROUGH_TOLERANCE, else this part of what is left after it, were errors to fall as squares.
+ROUGH_TOLERANCE, TOLERANCE_PART = 1e-3, 0.1
 
 
 class Linearised(Solver):
@@ -67,8 +67,8 @@ class BoundLinearised(BoundSolver):
         """
         best = step.start() if start is None else start
         state, forward, iterations, used, own = best.as_start, np.inf, 0, [], []
-        errors, last = deque([np.inf], maxlen=BEFORE), np.inf
-        while len(used) < MOST:
+        errors, last = deque([np.inf], maxlen=ERRORS_BEFORE), np.inf
+        while len(used) < MOST_STEPS:
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
                     found = self._linear_step(step, state, last, [*starts, *own])
@@ -98,7 +98,11 @@ class BoundLinearised(BoundSolver):
         """The contact step of the body linearised at a state, whose error is known."""
         body = step.body
         body.linearise(state.x)
-        tol = max(PART * min(error * error, ROUGH / PART), PART * step.tol, 1e-13)
+        tol = max(
+            TOLERANCE_PART * min(error * error, ROUGH_TOLERANCE / TOLERANCE_PART),
+            TOLERANCE_PART * step.tol,
+            1e-13,
+        )
         parts = {part.name: getattr(step, part.name) for part in fields(LoadStep)}
         parts |= dict(b=body.linear_load(step.b, -state.forces), starts=(state.x,), tol=tol)
         linear = LinearisedStep(**parts | dict(motions=state.c, monitor=None))
@@ -121,7 +125,7 @@ class BoundLinearised(BoundSolver):
     def _part(self, state: StepState, to: StepState, most: float) -> StepState | None:
         """The state of the step at a part of the way; None if no part helps."""
         step = state.step
-        for length in halves(SHORTEST):
+        for length in halves(SHORTEST_STEP):
             x = to.x if length == 1.0 else state.x + length * (to.x - state.x)
             trial = step.measure(x, c=to.c, before=state)
             step.tell(trial)

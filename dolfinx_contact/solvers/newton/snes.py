@@ -17,15 +17,15 @@ from dolfinx_contact.law.maps import ReturnMap
 from dolfinx_contact.petsc.linear_solver import LinearSolverError, options_given
 from dolfinx_contact.solvers.base import BoundSolver, Solver, SolverName, SolverResult
 from dolfinx_contact.solvers.newton.contact_tangent import ContactTangent, OnTangent
-from dolfinx_contact.solvers.newton.sparse_newton import NORMAL, Descent
+from dolfinx_contact.solvers.newton.sparse_newton import NORMAL_FACTOR, Descent
 from dolfinx_contact.solvers.search import Search
 
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-DEFAULT = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
-MOST = 10_000  # iterations, far more than snes_max_it
-REASONS = {
+DEFAULT_OPTIONS = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
+MOST_ITERATIONS = 10_000  # iterations, far more than snes_max_it
+DIVERGED_REASONS = {
     value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] in "CD"
 }
 
@@ -75,9 +75,9 @@ class BoundSNES(OnTangent):
         """
         state = step.start() if start is None else start
         search = Search(step, state, math.inf)
-        search.begin(search.best, MOST)
+        search.begin(search.best, MOST_ITERATIONS)
         kappa = [contact.stiffness.normal for contact in step.contacts]
-        maps = [ReturnMap(NORMAL * of, of) for of in kappa]
+        maps = [ReturnMap(NORMAL_FACTOR * of, of) for of in kappa]
         said = "converged at its start"
         with np.errstate(all="ignore"):  # a trial may turn elements inside out
             state = step.evaluate(state.x, maps, before=state.as_start)
@@ -123,13 +123,13 @@ class BoundSNES(OnTangent):
         snes.setConvergenceTest(equations.calls(equations.test))
         given = self._options.petsc_options
         try:
-            with options_given(self._body.prefix, DEFAULT | given) as unread:
+            with options_given(self._body.prefix, DEFAULT_OPTIONS | given) as unread:
                 snes.setFromOptions()
                 snes.solve(None, X)
             warn_of_unread([name for name in unread if name in given])
             equations.search.count(snes.getIterationNumber())
             reason = snes.getConvergedReason()
-            return f"{snes.getType()}, {REASONS.get(reason, reason)}"
+            return f"{snes.getType()}, {DIVERGED_REASONS.get(reason, reason)}"
         except PETSc.Error as failure:  # since 3.25 what a callback raises is hidden behind one
             raise equations.failure or failure from None
         finally:

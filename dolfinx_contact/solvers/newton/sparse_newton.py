@@ -24,17 +24,17 @@ from dolfinx_contact.support.line_search import enough, halves
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-NAME = "SparseNewton"
+SOLVER_NAME = "SparseNewton"
 
-# Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT.
-NORMAL, TANGENTIAL, SHORT = 10.0, (1.0, 0.3, 0.1), 0.1
+# Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT_STEP.
+NORMAL_FACTOR, TANGENTIAL_FACTORS, SHORT_STEP = 10.0, (1.0, 0.3, 0.1), 0.1
 
 # Of the parameter along the normal: with so little predictors are the reactions that the body asks for.
-TINY = 1e-12
+TINY_FACTOR = 1e-12
 
 # Of a step is taken the largest half, quarter, ... after which the residual is smaller than the largest of the last
-# BEFORE ones; below SHORTEST there is none. Iterations in which the smallest error has to halve.
-BEFORE, SHORTEST, PATIENCE = 5, 2.0**-9, 12
+# RESIDUALS_BEFORE ones; below SHORTEST_STEP there is none. Iterations in which the smallest error has to halve.
+RESIDUALS_BEFORE, SHORTEST_STEP, HALVING_ITERATIONS = 5, 2.0**-9, 12
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,13 @@ class BoundSparseNewton(OnTangent):
         """
         state = step.start() if start is None else start
         search = Search(step, state, self._options.max_seconds)
-        search.begin(search.best, self._options.max_iterations, PATIENCE)
+        search.begin(search.best, self._options.max_iterations, HALVING_ITERATIONS)
         descent, self._seen = Descent(step, self._tangent, stands=start is None), state.as_start
         x, forces = state.x, state.forces
         state = start = None  # no more than three are kept
-        for tangential in cycle(TANGENTIAL):
+        for tangential in cycle(TANGENTIAL_FACTORS):
             parameters = [contact.stiffness.normal for contact in step.contacts]
-            maps = [ReturnMap(NORMAL * rho, tangential * rho) for rho in parameters]
+            maps = [ReturnMap(NORMAL_FACTOR * rho, tangential * rho) for rho in parameters]
             try:
                 with np.errstate(all="ignore"):  # a trial may turn elements inside out
                     x, forces = self._fall(search, descent, x, forces, maps)
@@ -119,7 +119,7 @@ class BoundSparseNewton(OnTangent):
             state, length = descent.advance(state, search.error <= step.tol)
             x, forces = state.x, state.forces
             search.count(1)
-            if length < SHORT:
+            if length < SHORT_STEP:
                 return x, forces
 
 
@@ -136,7 +136,7 @@ class Descent:
 
     def begin(self, maps: Sequence[ReturnMap]) -> None:
         """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
-        self._maps, self._sizes, self._free = maps, deque(maxlen=BEFORE), True
+        self._maps, self._sizes, self._free = maps, deque(maxlen=RESIDUALS_BEFORE), True
 
     def advance(self, state: StepState, chord: bool) -> tuple[StepState, float]:
         """The next iterate, and the part of the step that leads to it: 0 if none helps.
@@ -161,7 +161,7 @@ class Descent:
         dx[self._body.fixed] = missing[self._body.fixed]
         self._sizes.append(step.size(here.residual - carried))
         most, self._free = np.inf if self._free else max(self._sizes), False
-        for length in halves(SHORTEST):
+        for length in halves(SHORTEST_STEP):
             following = x + length * dx
             if length == 1.0:
                 following[self._body.fixed] = step.b[self._body.fixed]
@@ -177,7 +177,7 @@ class Descent:
         long as the predictor ``r - rho g`` is positive. With friction they are let go, along the plane, too: held, steps
         that turn back took more iterations.
         """
-        asked = [ReturnMap(TINY * m.normal, m.tangential) for m in self._maps]
+        asked = [ReturnMap(TINY_FACTOR * m.normal, m.tangential) for m in self._maps]
         state = self._step.evaluate(state.x, asked, forces=state.forces, before=state)
         maps = []
         for contact, nodes, map in zip(self._step.contacts, state.nodes, self._maps):
