@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """How good ``dc.estimate`` is: estimated over true error, first against second order on the same mesh.
 
 ``PYTHONPATH=demos python -m benchmarks.effectivity FILE`` writes a record; docs/accuracy.md has the table.  True values are closed

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """How the package is built: floors of imports, length of its text, what a plain load step walks through.
 
 ``python -m benchmarks.house`` prints it all.  A change of module is a call of a function of another module of the package

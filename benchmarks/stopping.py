@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Whether ``dc.converge`` stops where a number is as accurate as asked for: nine scenes, true over asked error.
 
 ``PYTHONPATH=demos python -m benchmarks.stopping FILE`` appends a line of JSON for each; docs/accuracy.md has the table.

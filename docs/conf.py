@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The site: `make docs` writes it to results/site.
 
 Its source directory is the root of the clone, so that links on its pages lead to the same place there and here.

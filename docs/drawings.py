@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The drawings of docs/theory: friction cone, slip rule, projection, common parts of facets with dual shape functions.  From the root: python -m docs.drawings
 
 Curves are computed with the package itself; vector graphics, readable on light and dark ground.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The drawings of docs/theory/algorithms.md.  From the root: python -m docs.drawings_algorithms
 
 Vector graphics, readable on light and dark ground.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The punch as an animation of its stick and slip zones.  From the root of the clone:
 
 python -m docs.moving_pictures  # results/study/cycle.gif, from a run of studies/punch

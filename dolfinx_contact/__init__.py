@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Frictional contact of bodies with rigid or deformable surfaces, for FEniCSx, by the bi-potential method.
 
 A name is imported where it is first used: those of arrays, such as ``solve_condensed``, ``Friction`` and what is in ``law`` and

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 # All public names: __init__.py imports each when it is first used; type checkers and editors read this file.
 from dolfinx_contact import condensed as condensed
 from dolfinx_contact import law as law

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Today's DOLFINx names on yesterday's releases: ``docs/index.md`` lists those that are supported.
 
 The only file of this project that knows which release is installed.  Package, demos and tests
@@ -54,7 +56,7 @@ def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
 
 def mixed_functionspace(mesh: Any, elements: Any) -> fem.FunctionSpace:
     """Mixed space from elements, each as ``functionspace`` takes it; ``basix.ufl.mixed_element`` in DOLFINx >= 0.7."""
-    parts = [functionspace(mesh, of).ufl_element() for of in elements]
+    parts = [functionspace(mesh, element).ufl_element() for element in elements]
     if hasattr(ufl, "MixedElement"):  # legacy UFL elements
         return fem.FunctionSpace(mesh, ufl.MixedElement(*parts))
     import basix.ufl

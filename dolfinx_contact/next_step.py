@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 # How many times as far as supports move bodies may be expected to move in a step; and the part of that within which they are expected
 # to go on as in the step before.
-FARTHEST_RATIO, STEADY_PART = 2.0, 0.05
+FARTHEST_RATIO = 2.0
+STEADY_PART = 0.05
 
 
 class StepMaker:
@@ -103,12 +104,12 @@ class StepMaker:
         old = self._stamps
         if turned or assembled != old.stiffness:
             both = zip(self._contacts, frames)
-            self.stiffness = [nodal_stiffness(c, body.K, of.points) for c, of in both]
+            self.stiffness = [nodal_stiffness(c, body.K, placed.points) for c, placed in both]
             size = body.largest(np.abs(body.displacements.x))
             # Any unit that keeps squares within the range of double precision.
             self._unit = body.largest(body.cancelling(np.full(body.size, size))) or 1.0
         given = zip(self._contacts, self.stiffness, frames)
-        contacts = [step_of(contact, *of, begins=True) for contact, *of in given]
+        contacts = [step_of(contact, *parts, begins=True) for contact, *parts in given]
         laws = [contact.friction for contact in contacts]
         changed = any(one is not other for one, other in zip(laws, self._laws))
         changed = body.comm.allreduce(changed, op=MPI.LOR)

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """An elastic body in contact: one call, one load step."""
 
 from __future__ import annotations
@@ -189,9 +191,9 @@ class ContactProblem(Guarded):
         agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
         self.u, self.monitor, self.lagged = u, None, ()
         self._agree(comm)
-        of = self.contacts[0].displacements if self.contacts else None
+        displacements = self.contacts[0].displacements if self.contacts else None
         before = None if internal is None else internal.before_residual
-        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, of, form_options)  # fmt: skip
+        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, displacements, form_options)  # fmt: skip
         hold(self.contacts, self.body)
         self.body.crowded = crowded(self.solver, self.body, self.contacts)
         check_surfaces(self.contacts, self.body)
@@ -313,8 +315,8 @@ class ContactProblem(Guarded):
 
     def _undo(self, failure: BaseException, began: tuple, checks: tuple) -> None:
         """Nothing has happened, whatever did: also while a step that has converged was booked.  Collective."""
-        said = f"step failed: {type(failure).__name__}: {failure}"
-        self._log(lambda: said)
+        message = f"step failed: {type(failure).__name__}: {failure}"
+        self._log(lambda: message)
         stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
         known = isinstance(failure, NotConverged)
         doubt = self.body.comm.allreduce(2 if stopped else 0 if known else 1, op=MPI.MAX)

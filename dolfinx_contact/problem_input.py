@@ -70,8 +70,12 @@ def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
         check_mesh(contact)
     if len({id(contact) for contact in contacts}) < len(contacts):
         raise ValueError("contacts names the same Contact twice: name it once.")
-    of = [contact.displacements for contact in contacts]
-    if of and of[0].mixed and any((of[0].are != other.are).any() for other in of[1:]):
+    displacements = [contact.displacements for contact in contacts]
+    if (
+        displacements
+        and displacements[0].mixed
+        and any((displacements[0].are != other.are).any() for other in displacements[1:])
+    ):
         raise ValueError(
             "contacts mean different sub-spaces of a mixed space as displacements: build all on the same."
         )
@@ -145,7 +149,7 @@ def body_of(
     options: dict[str, Any] | None = None,
     prefix: str | None = None,
     before_residual: Callable | None = None,
-    of: Displacements | None = None,
+    displacements: Displacements | None = None,
     form_options: dict[str, Any] | None = None,
 ) -> ElasticBody:
     """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
@@ -158,7 +162,7 @@ def body_of(
         options: PETSc options of linear solves.
         prefix: Their prefix.
         before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
-        of: Its ``Displacements``, where they are known.
+        displacements: Its ``Displacements``, where they are known.
         form_options: Of the forms' compilation, see ``compat.compiled``.
 
     Raises:
@@ -169,10 +173,12 @@ def body_of(
         derivative, linear = derivative_of(F, u, J, moving)
         check_meshes(F, u, (form_options or {}).get("entity_maps"))
     if linear:
-        return ElasticBody(F, u, bcs, derivative, options, prefix, of, form_options)
+        return ElasticBody(F, u, bcs, derivative, options, prefix, displacements, form_options)
     from dolfinx_contact.bodies.nonlinear import NonlinearBody
 
-    return NonlinearBody(F, u, bcs, derivative, options, prefix, before_residual, of, form_options)
+    return NonlinearBody(
+        F, u, bcs, derivative, options, prefix, before_residual, displacements, form_options
+    )
 
 
 def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
@@ -270,9 +276,9 @@ def hold_points(
     """
     left_out = [np.zeros((0, 3))]
     with raised_together(body.comm):
-        for contact, of in zip(contacts, points):
-            held = _held_directions(contact, of, body.fixed)
-            of.hold(*held)
+        for contact, point_set in zip(contacts, points):
+            held = _held_directions(contact, point_set, body.fixed)
+            point_set.hold(*held)
             left_out.append(contact.x[held[1]])
     where = np.concatenate(body.comm.allgather(np.concatenate(left_out)))
     nodes = body.comm.allreduce(sum(contact.points.count for contact in contacts))
@@ -354,22 +360,22 @@ def frames_of_step(
         before: Frames with which the same step was solved before.
         known: ``ContactPoints`` for which everything is set up, renewed here.
     """
-    frames = [frames_of(c, start, at, of) for c, of in zip(contacts, before)]
-    changed = [k for k, (of, old) in enumerate(zip(frames, known)) if of.points is not old]
+    frames = [frames_of(c, start, at, placed) for c, placed in zip(contacts, before)]
+    changed = [k for k, (placed, old) in enumerate(zip(frames, known)) if placed.points is not old]
     if changed:
         told = body.comm.allreduce(sum(int(known[k].closed.sum()) for k in changed))
-        of = [contacts[k] for k in changed], [frames[k].points for k in changed]
-        hold_points(*of, body, told=told)
-    known[:] = [of.points for of in frames]
+        given = [contacts[k] for k in changed], [frames[k].points for k in changed]
+        hold_points(*given, body, told=told)
+    known[:] = [placed.points for placed in frames]
     return frames, bool(changed)
 
 
 def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
     """Warn of surfaces that make no sense where the undeformed body stands.  Collective."""
     for contact in contacts:
-        said = contact.geometry.check_start(contact, body)
-        if said:
-            warnings.warn(f"{said}, if that is not meant.", stacklevel=3)
+        message = contact.geometry.check_start(contact, body)
+        if message:
+            warnings.warn(f"{message}, if that is not meant.", stacklevel=3)
 
 
 def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
@@ -429,8 +435,8 @@ def _radius(term: Any) -> tuple[int | None, float]:
     for factor in factors:
         if isinstance(factor, Product):
             factors.extend(factor.ufl_operands)
-    of = [f.ufl_operands for f in factors if isinstance(f, Indexed)]
-    which = [int(i[0]) for a, i in of if isinstance(a, SpatialCoordinate)]
+    indexed = [f.ufl_operands for f in factors if isinstance(f, Indexed)]
+    which = [int(i[0]) for a, i in indexed if isinstance(a, SpatialCoordinate)]
     size = np.prod([abs(float(f)) for f in factors if isinstance(f, ScalarValue)])
     return min(which, default=None), float(size)
 

@@ -97,7 +97,7 @@ def find(problem: ContactProblem, step: LoadStep, starts: Sequence[Any]) -> Solv
 
         statics = Statics(step, problem.accepted.x)
         step = step.but(statics=statics)
-        if statics.said:
+        if statics.message:
             return unmoved(step, statics.reason)
         if not statics.loads.any():
             found = floating(step)

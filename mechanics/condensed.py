@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Random condensed contact problems with a known solution.
 
 Everything here is NumPy alone, written from the paper; of the package nothing is imported.

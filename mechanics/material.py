@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Linear isotropic elasticity, once for all tests, studies and benchmarks."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """One HTML file with all that is shown: figures inside it, tables from rows; nothing is fetched from elsewhere."""
 
 import base64

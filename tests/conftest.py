@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """All tests run alike on one rank and on several (tools/mpitest): no rank is left waiting.
 
 After each test the ranks meet. A rank that the others do not join within JOIN_SECONDS says so and

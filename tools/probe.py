@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What DOLFINx has this interpreter?  PYTHON tools/probe.py [PREFIX]    (for tools/setup)
 
 Prints the interpreter and every module that must never be replaced, as a pip constraints file:

@@ -1,1 +1,3 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Other programs on the same problems."""

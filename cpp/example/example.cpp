@@ -1,3 +1,5 @@
+// Copyright (c) 2026 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
 // A node pressed and dragged over a plane with orthotropic friction: one predictor and corrector.
 #include <dolfinx_contact/law/bipotential.h>
 #include <iostream>

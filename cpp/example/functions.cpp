@@ -1,3 +1,5 @@
+// Copyright (c) 2026 The dolfinx_contact authors
+// SPDX-License-Identifier: MIT
 // Functions of one node, and a loop over nodes: what docs/cpp.md shows.
 #include <cmath>
 #include <dolfinx_contact/law/batch.h>

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Docstrings in the reference: pages that they name are links, and several attributes may share a line.
 
 Why not napoleon or numpydoc alone: both take the second of two names for a type.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Formulas as MathML, which browsers draw themselves: no script, nothing is fetched.
 
 Why not sphinx.ext.mathjax or sphinxcontrib-katex: both need a script from elsewhere; sphinx.ext.imgmath needs LaTeX.

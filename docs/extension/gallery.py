@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A page for each demo, run at the build, and an index with thumbnails; written to docs/gallery.
 
 Why not sphinx-gallery: it reads text of demos as reStructuredText, not as the Markdown of notebooks, runs all demos in one

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The C++ reference: declarations of a header with the comments above them, as the header has them.
 
 Why not breathe: it needs Doxygen, which pip cannot install, and shows declarations in an order of its own.

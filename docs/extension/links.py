@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Every link and picture of every page leads to a file of the site, and to an anchor that is there; pages are opened, not saved.
 
 Why not Sphinx's linkcheck: it asks addresses of other sites, and takes links within this one for granted.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The Python blocks of a page are one script.  It is run, and what each block prints and draws is shown below it.
 
 Why not myst-nb: on the pages of a repository its cells are no Python, and it keeps what they printed when the package has changed.

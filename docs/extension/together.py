@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A number and its unit stay on one line, and so do the two sides of "n = 4" and of "1 ± 2".
 
 Why not smartquotes or typographic replacements of MyST: they know quotes and dashes, no spaces.

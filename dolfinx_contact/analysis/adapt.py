@@ -130,7 +130,7 @@ def _pair(compute: Callable[[Any], Pair], mesh: Any) -> Pair:
         if (
             not isinstance(pair, (tuple, list))
             or len(pair) != 2
-            or not all(_is_on(mesh, of) for of in pair)
+            or not all(_is_on(mesh, one) for one in pair)
         ):
             raise ValueError(
                 f"compute must return two ContactProblems on the mesh that it is given, of lower and of higher order, got {pair!r}."

@@ -102,7 +102,7 @@ def converge(
 
     halved, of_mesh = 0, 0.0
     for level in range(1, len(meshes)):
-        halved, increments = _halve(lambda k, of=level - 1: at(of, k), halved, halvings, accuracy)
+        halved, increments = _halve(lambda k, n=level - 1: at(n, k), halved, halvings, accuracy)
         last, value = at(level - 1, halved), at(level, halved)
         change = abs(value - last)
         shrunk = SMALLEST_LARGEST_RATIO[0]

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 SHORTEST_JUMP = 2
 
 # Jumps aim at a difference of so many accuracies and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
-ACCURACIES_AIMED_AT, ACCEPTED_EXCESS, LARGEST_GROWTH, SMALLEST_REDUCTION = 1.5, 1.5, 6.0, 0.1
+ACCURACIES_AIMED_AT = 1.5
+ACCEPTED_EXCESS = 1.5
+LARGEST_GROWTH = 6.0
+SMALLEST_REDUCTION = 0.1
 
 # Part of the largest mu, or p, by which friction that evolves is to change in a jump.
 FRICTION_CHANGE = 0.25
@@ -132,7 +135,7 @@ def cycle_jump(
     """
     comm = a_problem(problem).body.comm
     with raised_together(comm):
-        cycles, max_cycles = (int(positive(name, of, whole=True)) for name, of in (("cycles", cycles), ("max_cycles", max_cycles)))  # fmt: skip
+        cycles, max_cycles = (int(positive(name, count, whole=True)) for name, count in (("cycles", cycles), ("max_cycles", max_cycles)))  # fmt: skip
         accuracy, longest = positive("accuracy", accuracy, finite=True), positive("longest", longest)  # fmt: skip
         _check(problem, cycle, monitor)
     agree(comm, cycles=cycles, accuracy=accuracy, longest=longest, max_cycles=max_cycles, path=None if path is None else str(path))  # fmt: skip
@@ -321,8 +324,8 @@ class _Run:
         if last and fine is not coarse and coarse:
             before = (self.end.depth - self.coarse.depth) / (1.0 + _extrapolation(last["jump"], 1, 2))  # fmt: skip
             off = fine.depth - coarse.depth - (length / last["jump"]) ** 2 * before
-        volume, more, new = map(float, body.total([area @ of for of in (end.depth, worn, np.abs(off))]))  # fmt: skip
-        depth, deeper, most = (body.largest(np.abs(of)) for of in (end.depth, worn, off))
+        volume, more, new = map(float, body.total([area @ depths for depths in (end.depth, worn, np.abs(off))]))  # fmt: skip
+        depth, deeper, most = (body.largest(np.abs(depths)) for depths in (end.depth, worn, off))
         local = max(
             _part(new, more + WORN_SHARE * volume), _part(most, deeper + WORN_SHARE * depth)
         )
@@ -345,10 +348,10 @@ class _Run:
         Over what it wears, a jump is off by the square of its length.  Errors of the volume add up, and fall as the rate of wear does, since both
         obey the equation linearised; what is off in the shape beside that wears off in a jump.
         """
-        lengths, volumes = (np.array([row[of] for row in self.table], float) for of in ("jump", "volume"))  # fmt: skip
+        lengths, volumes = (np.array([row[name] for row in self.table], float) for name in ("jump", "volume"))  # fmt: skip
         rates, cubes = np.diff(volumes, prepend=0.0) / lengths, lengths * (lengths - 1.0) * (lengths - 2.0)  # fmt: skip
         row, *made = self.record["measured"]
-        volume, depth, profile = (_part(a, self.table[-1][of]) for a, of in zip(made, ("volume", "depth", "volume")))  # fmt: skip
+        volume, depth, profile = (_part(a, self.table[-1][name]) for a, name in zip(made, ("volume", "depth", "volume")))  # fmt: skip
         fall = min(1.0, _part(float(rates[-1]), float(rates[row])))
         total = _part(float(np.minimum(rates, rates[-1]) @ cubes), float(rates[row] * cubes[row]))
         added = (total - fall) * volume
@@ -359,8 +362,8 @@ class _Run:
         if end is None:
             return 0.0
         largest, parts = self.problem.body.largest, []
-        for of in (slice(0, 2), slice(2, 4)):
-            before, now = (side.friction[:, of].ravel() for side in (self.end, end))
+        for columns in (slice(0, 2), slice(2, 4)):
+            before, now = (side.friction[:, columns].ravel() for side in (self.end, end))
             parts.append(_part(largest(np.abs(now - before)), largest(np.maximum(before, now))))
         return max(parts) / FRICTION_CHANGE
 
@@ -381,16 +384,16 @@ def _extrapolation(length: int, fewer: int, more: int) -> float:
     return two / (one - two) if one > two else 0.0
 
 
-def _part(of: float, whole: float) -> float:
+def _part(amount: float, whole: float) -> float:
     """``of`` over ``whole``, none of nothing."""
-    return of / whole if of > 0.0 and whole > 0.0 else np.inf if of > 0.0 else 0.0
+    return amount / whole if amount > 0.0 and whole > 0.0 else np.inf if amount > 0.0 else 0.0
 
 
 def _is_record(record: Any) -> bool:
     """Whether it is one that ``_Run`` has written; errors say that it is not, too."""
     counts = [record[name] for name in ("done", "simulated", "rejected")]
     at, *errors = record["measured"]
-    rows = [[row[of] for of in ("volume", "depth", "cycle", "jump", "simulated")] for row in record["table"]]  # fmt: skip
+    rows = [[row[name] for name in ("volume", "depth", "cycle", "jump", "simulated")] for row in record["table"]]  # fmt: skip
     whole = [*counts, at, *(number for row in rows for number in row[2:])]
     return (
         all(type(number) is int and number >= 0 for number in whole)
@@ -454,7 +457,7 @@ class _Folder:
 
     def _names(self) -> list[str]:
         """Names of the checkpoints: of the coarse run and of the end of the last jump."""
-        return [f"{self._run.record['done']}{of}.npz" for of in ("_coarse", "")]
+        return [f"{self._run.record['done']}{suffix}.npz" for suffix in ("_coarse", "")]
 
     def write(self) -> None:
         """Write the state after the last jump.  Collective."""
@@ -479,11 +482,11 @@ class _Folder:
 
 def _sums(contact: Contact) -> dict[str, np.ndarray]:
     """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
-    return {name: of for name, of in contact.history.sums.items() if name != SLIP_KEPT}
+    return {name: values for name, values in contact.history.sums.items() if name != SLIP_KEPT}
 
 
 def _take_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
     """Let the next step start from other ``sums``, none of them negative.  Collective where a deformable surface wears."""
-    sums = contact.history.sums | {name: frozen(of) for name, of in sums.items()}
+    sums = contact.history.sums | {name: frozen(values) for name, values in sums.items()}
     worn = contact.geometry.everywhere(sums[OPPOSITE_WEAR]) if OPPOSITE_WEAR in sums else None
     contact.go_back(contact.history.but(sums=sums, worn=worn))

@@ -64,8 +64,10 @@ class Estimate:
         return self.quantities[name]
 
 
-def _sum(problem: ContactProblem, of: Callable) -> float:
-    return sum(problem.body.comm.allreduce(float(of(contact))) for contact in problem.contacts)
+def _sum(problem: ContactProblem, quantity: Callable) -> float:
+    return sum(
+        problem.body.comm.allreduce(float(quantity(contact))) for contact in problem.contacts
+    )
 
 
 def _peak(problem: ContactProblem) -> float:
@@ -74,9 +76,9 @@ def _peak(problem: ContactProblem) -> float:
 
 
 ESTIMATED_QUANTITIES = {
-    "normal_force": lambda problem: _sum(problem, lambda of: of.reaction[:, -1].sum()),
-    "tangential_force": lambda problem: _sum(problem, lambda of: np.linalg.norm(of.reaction[:, :-1], axis=1).sum()),
-    "dissipation": lambda problem: _sum(problem, lambda of: of.dissipation.sum()),
+    "normal_force": lambda problem: _sum(problem, lambda contact: contact.reaction[:, -1].sum()),
+    "tangential_force": lambda problem: _sum(problem, lambda contact: np.linalg.norm(contact.reaction[:, :-1], axis=1).sum()),
+    "dissipation": lambda problem: _sum(problem, lambda contact: contact.dissipation.sum()),
     "peak_pressure": _peak,
 }  # fmt: skip
 
@@ -128,15 +130,15 @@ def estimate(
         _check_pair(problem, reference)
     agree(comm, share=share, quantities=sorted(quantities or ()))
     found = {}
-    for name, of in {**ESTIMATED_QUANTITIES, **(quantities or {})}.items():
+    for name, quantity in {**ESTIMATED_QUANTITIES, **(quantities or {})}.items():
         with raised_together(comm):
-            value, better = _numbers(name, of(problem), of(reference))
+            value, better = _numbers(name, quantity(problem), quantity(reference))
         agree(comm, **{f"quantity {name!r}": (value.tolist(), better.tolist())})
         found[name] = Estimated(largest(value), share * float(np.abs(better - value).max()))
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     if same_mesh or not any(contact.surface.curved for contact in problem.contacts):
-        for name, of in tractions(problem, reference).items():
-            found.setdefault(name, of._replace(error=share * of.error))
+        for name, values in tractions(problem, reference).items():
+            found.setdefault(name, values._replace(error=share * values.error))
     if not same_mesh:
         return Estimate(found, None, None)
     norm, cells = indicators(problem, reference)
@@ -178,11 +180,11 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
     for contact, better in zip(problem.contacts, reference.contacts):
         own, other = interpolated(contact, better), per_area(better.reaction, better.area)
         area += better.area.sum()
-        for row, of in zip(sums, (own, other - own)):
-            row += better.area @ of[:, -1] ** 2, better.area @ (of[:, :-1] ** 2).sum(axis=1)
+        for row, part in zip(sums, (own, other - own)):
+            row += better.area @ part[:, -1] ** 2, better.area @ (part[:, :-1] ** 2).sum(axis=1)
     comm = problem.body.comm
     means = np.sqrt(comm.allreduce(sums) / comm.allreduce(area)).T
-    return {name: Estimated(*map(float, of)) for name, of in zip(("pressure", "shear"), means)}
+    return {name: Estimated(*map(float, pair)) for name, pair in zip(("pressure", "shear"), means)}
 
 
 def interpolated(contact: Contact, better: Any) -> np.ndarray:
@@ -192,17 +194,17 @@ def interpolated(contact: Contact, better: Any) -> np.ndarray:
     """
     tractions, dim = per_area(contact.reaction, contact.area), contact.reaction.shape[1]
     if contact.V.mesh is better.V.mesh:
-        here, there = (fem.Function(of.displacements.V) for of in (contact, better))
+        here, there = (fem.Function(one.displacements.V) for one in (contact, better))
         here.x.array.reshape(-1, dim)[contact.nodes] = tractions
         here.x.scatter_forward()
         there.interpolate(here)
         return there.x.array.reshape(-1, dim)[better.nodes]
     along = contact.surface.frame[:-1, :dim].T
-    x, y = (of.x[:, :dim] @ along for of in (contact, better))
+    x, y = (one.x[:, :dim] @ along for one in (contact, better))
     x, values = map(np.concatenate, zip(*contact.comm.allgather((x, tractions))))
     if dim == 2:
         order = np.argsort(x[:, 0])
-        return np.array([np.interp(y[:, 0], x[order, 0], of[order]) for of in values.T]).T
+        return np.array([np.interp(y[:, 0], x[order, 0], column[order]) for column in values.T]).T
     found = LinearNDInterpolator(x, values)(y)
     outside = np.isnan(found[:, 0])
     found[outside] = values[KDTree(x).query(y[outside])[1]]
@@ -225,16 +227,16 @@ def _check_pair(problem: ContactProblem, reference: ContactProblem) -> None:
                          f"{len(reference.contacts)}.")  # fmt: skip
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     pairs = zip(problem.contacts, reference.contacts)
-    if same_mesh and any(set(of.facets) != set(other.facets) for of, other in pairs):
+    if same_mesh and any(set(one.facets) != set(other.facets) for one, other in pairs):
         raise ValueError(
             "on the same mesh contacts of problem and reference must have the same facets, in the same order of contacts."
         )
-    if same_mesh and any(of.body.displacements.mixed for of in (problem, reference)):
+    if same_mesh and any(one.body.displacements.mixed for one in (problem, reference)):
         raise ValueError(
             "on the same mesh dc.estimate does not know mixed spaces, which have no energy norm of their own: give a "
             "reference on a finer mesh, whose quantities alone are compared."
         )
-    orders = [compat.lagrange_degree(of.body.V) for of in (problem, reference)]
+    orders = [compat.lagrange_degree(one.body.V) for one in (problem, reference)]
     if same_mesh and orders[0] >= orders[1]:
         raise ValueError(
             f"on the same mesh the reference must be of higher order, got degrees {orders[0]} and {orders[1]}: give the "
@@ -242,10 +244,12 @@ def _check_pair(problem: ContactProblem, reference: ContactProblem) -> None:
         )
 
 
-def _numbers(name: str, *of: Any) -> list[np.ndarray]:
-    value, better = found = [np.ravel(finite(f"quantity {name!r}", numbers)) for numbers in of]
+def _numbers(name: str, *values: Any) -> list[np.ndarray]:
+    value, better = found = [np.ravel(finite(f"quantity {name!r}", numbers)) for numbers in values]
     if value.size == 0:
-        raise ValueError(f"quantity {name!r} must be a finite number or several, got {of[0]!r}.")
+        raise ValueError(
+            f"quantity {name!r} must be a finite number or several, got {values[0]!r}."
+        )
     if value.size != better.size:
         raise ValueError(
             f"quantity {name!r} has {value.size} numbers of the problem, {better.size} of the reference."

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The elastic body: what DOLFINx assembles and PETSc solves; vectors are arrays of the degrees of freedom of this rank."""
 
 from __future__ import annotations
@@ -92,7 +94,7 @@ class ElasticBody(OverRanks):
         options: PETSc options of the solver; by default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
         prefix: Their prefix.
-        of: Its ``Displacements``, where they are known.
+        displacements: Its ``Displacements``, where they are known.
         form_options: Of the forms' compilation, see ``compat.compiled``.
     """
 
@@ -111,7 +113,7 @@ class ElasticBody(OverRanks):
         derivative: ufl.Form,
         options: dict[str, Any] | None = None,
         prefix: str | None = None,
-        of: Displacements | None = None,
+        displacements: Displacements | None = None,
         form_options: dict[str, Any] | None = None,
     ):
         self.u, self.V = u, u.function_space
@@ -123,7 +125,10 @@ class ElasticBody(OverRanks):
         coefficients = [c for c in derivative.coefficients() if c is not u]
         self._parameters = [*coefficients, *derivative.constants()]
         self._load_parameters = [c for c in F.coefficients() if c is not u] + list(F.constants())
-        self._work, self.displacements = fem.Function(self.V), of or Displacements(self.V)
+        self._work, self.displacements = (
+            fem.Function(self.V),
+            displacements or Displacements(self.V),
+        )
         self.size = self.displacements.size
         self.support(bcs)
         default = (
@@ -136,7 +141,7 @@ class ElasticBody(OverRanks):
         self.assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
-        self.closed = self._said = False
+        self.closed = self._message = False
         self.last_free_state: FreeState | None = None
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
         self.parts = rigid_motion.connected_parts(self.displacements)
@@ -348,8 +353,8 @@ class ElasticBody(OverRanks):
     def _own_solver(self) -> LinearSolver:
         if self._elastic is None:
             self._elastic = self.anchors.solver if self.loose else self.solver(self.K)
-            if self.options is not None and not self._said:
-                self._said = True
+            if self.options is not None and not self._message:
+                self._message = True
                 warn_of_unread(self._elastic.unread)
         return self._elastic
 

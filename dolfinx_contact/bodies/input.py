@@ -131,10 +131,10 @@ def check_dilation(body: ElasticBody) -> None:
     Args:
         body: ElasticBody, its stiffness assembled, nothing held yet.
     """
-    of = body.displacements
-    if of.mixed:
+    displacements = body.displacements
+    if displacements.mixed:
         return  # pressures do the work
-    growth = of.x[: of.count, : of.dim].ravel() / body.extent
+    growth = displacements.x[: displacements.count, : displacements.dim].ravel() / body.extent
     energy, scale = body.total(
         [growth @ body.multiply(growth), growth @ (body.diagonal() * growth)]
     )

@@ -51,8 +51,8 @@ class LooseMotions:
         """What to say where nothing holds some motions ``Z motions``, ``shape=(m, k)``; None is all."""
         motions = np.eye(self.modes.shape[1]) if motions is None else motions
         rows = self._simplest(motions)
-        said = "; ".join(self._words(row) for row in rows)
-        return f"nothing holds {self._part_of(rows[0])[0].where}: {len(rows)} rigid motion(s) are left free, {said}."
+        message = "; ".join(self._words(row) for row in rows)
+        return f"nothing holds {self._part_of(rows[0])[0].where}: {len(rows)} rigid motion(s) are left free, {message}."
 
     def words(self, c: np.ndarray) -> str:
         """A motion ``Z c`` in words."""
@@ -62,17 +62,17 @@ class LooseMotions:
         part, amounts = self._part_of(amounts)
         gdim = part.middle.size
         along, turning = amounts[:gdim], _rotation(amounts[gdim:]) / part.size
-        of = "" if part.where == "the body" else f" of {part.where}"
+        place = "" if part.where == "the body" else f" of {part.where}"
         if np.linalg.norm(turning) * part.size < NEGLIGIBLE_COMPONENT * np.linalg.norm(along):
-            return f"a translation along {_rounded(along)}{of}"
+            return f"a translation along {_rounded(along)}{place}"
         axis = turning / np.linalg.norm(turning)
         arm = np.cross(axis, np.append(along, np.zeros(3 - gdim))) / np.linalg.norm(turning)
         if np.linalg.norm(arm) > AXIS_DISTANCE * part.size:
             middle = ", ".join(f"{x:.4g}" for x in part.middle)
-            return f"a translation along {_rounded(along)} that turns a little about the middle ({middle}){of}"
+            return f"a translation along {_rounded(along)} that turns a little about the middle ({middle}){place}"
         at = part.middle + arm[:gdim]
         at[np.abs(at) < NEGLIGIBLE_COMPONENT * part.size] = 0.0
-        about = f"({', '.join(f'{x:.4g}' for x in at)}){of}"
+        about = f"({', '.join(f'{x:.4g}' for x in at)}){place}"
         return (
             f"a rotation about {'' if gdim == 2 else f'the axis {_rounded(axis)} through '}{about}"
         )
@@ -117,19 +117,21 @@ def _rounded(vector: np.ndarray) -> str:
     return f"({', '.join(f'{x:.3g}' for x in np.where(np.abs(vector) < NEGLIGIBLE_COMPONENT, 0.0, vector))})"
 
 
-def times_volume(of: Displacements, modes: np.ndarray) -> np.ndarray:
+def times_volume(displacements: Displacements, modes: np.ndarray) -> np.ndarray:
     """Integrals of displacements times each shape function over the body's volume, ``shape=(owned dofs, m)``.  Collective.
 
     Args:
-        of: ``Displacements``.
+        displacements: ``Displacements``.
         modes: Values of owned degrees of freedom, of the same shape.
     """
-    z, integral = fem.Function(of.V), fem.Function(of.V)
-    form = fem.form(ufl.inner(z, ufl.TestFunction(of.V)) * ufl.dx)
-    columns, size = [], of.count * of.dim
+    z, integral = fem.Function(displacements.V), fem.Function(displacements.V)
+    form = fem.form(ufl.inner(z, ufl.TestFunction(displacements.V)) * ufl.dx)
+    columns, size = [], displacements.count * displacements.dim
     for mode in modes.T:
-        z.x.array[:size] = of.rows(mode).ravel()
+        z.x.array[:size] = displacements.rows(mode).ravel()
         z.x.scatter_forward()
         compat.assemble_into(integral.x, form)
-        columns.append(integral.x.array[:size].reshape(of.count, of.dim).copy())
-    return of.vectors(np.stack(columns, axis=-1))
+        columns.append(
+            integral.x.array[:size].reshape(displacements.count, displacements.dim).copy()
+        )
+    return displacements.vectors(np.stack(columns, axis=-1))

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Rigid motions that nothing or only a soft spring holds: a factorisation does not notice them."""
 
 from __future__ import annotations
@@ -38,12 +40,12 @@ def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
         ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.  Of these,
         those that cost nothing, which contact alone can hold; None where all cost something.
     """
-    of = body.displacements
-    x = of.x[: of.count, : of.dim]
+    displacements = body.displacements
+    x = displacements.x[: displacements.count, : displacements.dim]
     part, parts = body.parts
     diagonal, soft, loose = body.diagonal(), [np.zeros((body.size, 0))], []
     for k in range(parts):
-        modes = of.vectors(rigid_modes(x, part == k, body.comm))
+        modes = displacements.vectors(rigid_modes(x, part == k, body.comm))
         held = body.total(modes[body.fixed].T @ modes[body.fixed])
         values, vectors = np.linalg.eigh(held)
         left_free = vectors[:, values <= RELATIVE_ROUNDING * values[-1]]
@@ -97,9 +99,9 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
 
 def free_modes(body: ElasticBody) -> np.ndarray:
     """Orthonormal rigid motions of each part of the body that vanish at fixed degrees of freedom.  Collective."""
-    of, (part, parts) = body.displacements, body.parts
-    x = of.x[: of.count, : of.dim]
-    modes = np.concatenate([of.vectors(rigid_modes(x, part[: of.count] == k, body.comm)) for k in range(parts)], axis=1)  # fmt: skip
+    displacements, (part, parts) = body.displacements, body.parts
+    x = displacements.x[: displacements.count, : displacements.dim]
+    modes = np.concatenate([displacements.vectors(rigid_modes(x, part[: displacements.count] == k, body.comm)) for k in range(parts)], axis=1)  # fmt: skip
     modes[body.fixed] = 0.0
     products = body.total(modes.T @ modes)
     values, vectors = np.linalg.eigh(products)
@@ -125,10 +127,15 @@ def mean_strain(displacements: Displacements, u: np.ndarray) -> float:
         displacements: ``Displacements``.
         u: Their degrees of freedom on this rank, those of ghosts included.
     """
-    of, mesh = displacements, displacements.V.mesh
-    nodes = compat.cell_nodes(of.V)[: mesh.topology.index_map(mesh.topology.dim).size_local]
+    mesh = displacements.V.mesh
+    nodes = compat.cell_nodes(displacements.V)[
+        : mesh.topology.index_map(mesh.topology.dim).size_local
+    ]
     nodes = nodes[:: len(nodes) // SAMPLED_CELLS + 1]
-    x, moved = of.x[nodes][..., : of.dim], u[of.dofs(nodes.ravel())].reshape(*nodes.shape, of.dim)
+    x, moved = (
+        displacements.x[nodes][..., : displacements.dim],
+        u[displacements.dofs(nodes.ravel())].reshape(*nodes.shape, displacements.dim),
+    )
     x, moved = (values - values.mean(axis=1, keepdims=True) for values in (x, moved))
     across = x.transpose(0, 2, 1)
     inertia = across @ x

@@ -67,15 +67,15 @@ def run_checks(
     """Run checks, warn in the name of who called ``solve``; those that are left, and names of those that are over.  Collective."""
     left = []
     for check in checks:
-        said = check.run(step)
-        if said is None:
+        message = check.run(step)
+        if message is None:
             left.append(check)
             continue
         step = step._replace(over=step.over | {type(check).__name__})
-        if said and check.level is None:
-            warnings.warn(said, stacklevel=3)
-        elif said and step.body.comm.rank == 0:
-            logger.log(check.level, said)
+        if message and check.level is None:
+            warnings.warn(message, stacklevel=3)
+        elif message and step.body.comm.rank == 0:
+            logger.log(check.level, message)
     return tuple(left), step.over
 
 

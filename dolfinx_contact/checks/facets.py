@@ -26,13 +26,15 @@ LARGEST_MISS = 1.0
 SAG_RATIO = 4.0
 
 # Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
-LARGEST_SLOPE, DIFFERENCE_LENGTH = 0.1, 1e-5
+LARGEST_SLOPE = 0.1
+DIFFERENCE_LENGTH = 1e-5
 
 # Part of a hollow between nodes that these may be open and still count as touching.
 TOUCHING_PART = 0.1
 
 # How often points of a facet are taken about the deepest one, and by how much nearer to each other.
-CLOSER_LOOKS, CLOSER_FACTOR = 3, 0.25
+CLOSER_LOOKS = 3
+CLOSER_FACTOR = 0.25
 
 # In how many facets of a rank points are moved: the surface may be slow to ask for distances.
 DEEPEST_FACETS = 64
@@ -72,7 +74,7 @@ class _OfFacets(Check):
 
     def __init__(self, facets: dict[Contact, list[Facets]]):
         self._facets = {
-            contact: of for contact, of in facets.items() if self._concerns(contact, of)
+            contact: parts for contact, parts in facets.items() if self._concerns(contact, parts)
         }
 
     def run(self, step: CheckedStep) -> str | None:
@@ -87,7 +89,7 @@ class _OfFacets(Check):
                 missed = self._missed(contact, facets, step.u, pushed, worn)
             missed = max(contact.comm.allgather(missed))
             if missed.length > max(LARGEST_MISS * pushed, NEGLIGIBLE_PART * missed.size):
-                return self._said(contact, missed, pushed)
+                return self._message(contact, missed, pushed)
         return None
 
     @abstractmethod
@@ -95,21 +97,21 @@ class _OfFacets(Check):
         """Whether there is anything to be looked at.  Collective."""
 
     @abstractmethod
-    def _missed(self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+    def _missed(self, contact: Contact, parts: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
         """The largest length that nodes of facets of this rank miss."""
 
     @abstractmethod
-    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+    def _message(self, contact: Contact, missed: Missed, pushed: float) -> str:
         """It in words, where the largest reaction pushes its node in by ``pushed``."""
 
 
 class Straight(_OfFacets):
     """Nodes amid straight edges stand off a round body, where it touches."""
 
-    def _concerns(self, contact: Contact, of: list[Facets]) -> bool:
+    def _concerns(self, contact: Contact, parts: list[Facets]) -> bool:
         """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
         most = 0.0
-        for facets in of:
+        for facets in parts:
             flat = facets.at_nodes @ facets.x[:, facets.vertices]
             off = np.linalg.norm(facets.x - flat, axis=-1) / facets.size[:, None]
             sag = np.abs(facets.sag_at_nodes()) / facets.size[:, None]
@@ -117,10 +119,10 @@ class Straight(_OfFacets):
         return contact.comm.allreduce(most, op=MPI.MAX) > NEGLIGIBLE_PART
 
     def _missed(
-        self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: Any
+        self, contact: Contact, parts: list[Facets], u: np.ndarray, pushed: float, worn: Any
     ) -> Missed:
         missed = Missed()
-        for facets in of:
+        for facets in parts:
             x = _positions(contact, facets, u)
             sag = facets.sag_at_nodes()
             if (
@@ -132,7 +134,7 @@ class Straight(_OfFacets):
             missed = missed.or_more(sag * near, x[:, 0], facets.size)
         return missed
 
-    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+    def _message(self, contact: Contact, missed: Missed, pushed: float) -> str:
         felt = (
             f"more than reactions push nodes in, {pushed:.2g}"
             if pushed
@@ -149,12 +151,12 @@ class Straight(_OfFacets):
 class Between(_OfFacets):
     """The surface goes into facets between nodes, or recedes between nodes that touch."""
 
-    def _concerns(self, contact: Contact, of: list[Facets]) -> bool:
+    def _concerns(self, contact: Contact, parts: list[Facets]) -> bool:
         return contact.surface.varies
 
-    def _missed(self, contact: Contact, of: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+    def _missed(self, contact: Contact, parts: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
         missed = Missed()
-        for facets in of:
+        for facets in parts:
             x = _positions(contact, facets, u)
             gaps = contact.surface.distances(x)
             opened = gaps if worn is None else gaps + worn[facets.nodes]
@@ -164,7 +166,7 @@ class Between(_OfFacets):
                 missed = _within(contact, some, x[near], gaps[near], opened[near], missed)
         return missed
 
-    def _said(self, contact: Contact, missed: Missed, pushed: float) -> str:
+    def _message(self, contact: Contact, missed: Missed, pushed: float) -> str:
         near = f"near {place_of(missed.where)}"
         if missed.hollow:
             does = f"recedes by {missed.length:.2g} between nodes that touch, {near}"

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 SAMPLED_NODES = 2000
 
 # Part of a length that is rounding; part of the growth that has to be hindered: as much is left of it where a body is strained.
-LENGTH_ROUNDING, HINDERED_PART = 1e-13, 1e-2
+LENGTH_ROUNDING = 1e-13
+HINDERED_PART = 1e-2
 
 
 class Turn:
@@ -39,11 +40,11 @@ class Turn:
     """
 
     def __init__(self, body: ElasticBody):
-        self._body, of = body, body.displacements
+        self._body, displacements = body, body.displacements
         self._part, self._count = body.parts
-        nodes = np.arange(of.count)[:: of.count // SAMPLED_NODES + 1]
-        x, here = of.x[nodes, : of.dim], self._part[nodes]
-        sums = np.zeros((self._count, of.dim + 1))
+        nodes = np.arange(displacements.count)[:: displacements.count // SAMPLED_NODES + 1]
+        x, here = displacements.x[nodes, : displacements.dim], self._part[nodes]
+        sums = np.zeros((self._count, displacements.dim + 1))
         np.add.at(sums, here, np.column_stack((x, np.ones(len(x)))))
         sums = body.total(sums)
         self._middle = sums[:, :-1] / np.maximum(sums[:, -1:], 1.0)
@@ -56,9 +57,9 @@ class Turn:
             @ np.linalg.pinv(body.total(squares), rcond=LENGTH_ROUNDING, hermitian=True)[here]
         )
         rows = np.broadcast_to((m * here[:, None] + np.arange(m))[:, None], fit.shape)
-        columns = np.broadcast_to(of.dofs(nodes)[:, :, None], fit.shape)
+        columns = np.broadcast_to(displacements.dofs(nodes)[:, :, None], fit.shape)
         places = rows.ravel(), columns.ravel()
-        self._fit = sparse.csr_matrix((fit.ravel(), places), (m * self._count, of.size))
+        self._fit = sparse.csr_matrix((fit.ravel(), places), (m * self._count, displacements.size))
 
     def angles(self, u: np.ndarray) -> np.ndarray:
         """Rotation vector of each part, ``shape=(parts, 3)``, in 2-D ``(parts, 1)``, by least squares over its nodes.  Collective."""
@@ -75,7 +76,7 @@ class Turn:
             u: Displacement of owned degrees of freedom.
             angles: As ``angles`` returns them.
         """
-        body, of = self._body, self._body.displacements
+        body, displacements = self._body, self._body.displacements
         motions = self._motions(u, angles)
         driven, rows, touching = self._driven(contacts), [], False
         count = 0 if driven is None else driven.count
@@ -87,7 +88,7 @@ class Turn:
             touching = touching or felt.any()
         if not body.total(np.array([float(touching)]))[0]:
             return 0.0
-        fixed = body.fixed[of.are[body.fixed]]
+        fixed = body.fixed[displacements.are[body.fixed]]
         rows.append(np.column_stack((motions[fixed], np.zeros((len(fixed), count)))))
         grown, deformed = _left(body, np.concatenate(rows))
         if grown == 0.0:
@@ -104,8 +105,11 @@ class Turn:
 
     def _motions(self, u: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """By what the body grows, by what else than turning it moves, and rigid motions of its parts, ``shape=(owned dofs, 2 + m)``."""
-        of = self._body.displacements
-        x, moved = of.x[: of.count, : of.dim], of.rows(u)
+        displacements = self._body.displacements
+        x, moved = (
+            displacements.x[: displacements.count, : displacements.dim],
+            displacements.rows(u),
+        )
         arms = x - self._middle[self._part]
         grown, turned = np.zeros_like(arms), np.zeros_like(arms)
         for k, angle in enumerate(angles):
@@ -116,7 +120,7 @@ class Turn:
         ends = x + moved
         modes = [rigid_modes(ends, self._part == k, self._body.comm) for k in range(self._count)]
         columns = np.stack((grown, moved - turned), axis=2)
-        return np.column_stack([of.vectors(columns), *map(of.vectors, modes)])
+        return np.column_stack([displacements.vectors(columns), *map(displacements.vectors, modes)])
 
 
 def _moved(contact: Contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 # Mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth; a displacement of so many times
 # the size of a body is one in other units.
-LARGE_STRAIN, LARGE_DISPLACEMENT = 0.2, 10.0
+LARGE_STRAIN = 0.2
+LARGE_DISPLACEMENT = 10.0
 
 # By what a linear body that turns is too large, over the lengths by which contact and supports deform it.
 GROWTH_SHARE = 0.1
@@ -32,7 +33,8 @@ GROWTH_SHARE = 0.1
 ROTATION_BOUND = 4.0
 
 # Smallest gap over the size of the body, and cosine between facets and a plane, from which on nothing is likely to touch.
-FAR_AWAY, FACING_COSINE = 0.25, 0.1
+FAR_AWAY = 0.25
+FACING_COSINE = 0.1
 
 # Part of the frictional work that a turn of slip may leave unknown.
 DOUBTFUL_WORK = 0.1
@@ -103,7 +105,7 @@ class Grows(Check):
 
     def run(self, step: CheckedStep) -> str | None:
         body, contacts, u = step.body, step.contacts, step.u
-        pushed = [c.reaction[:, -1] / of.normal for c, of in zip(contacts, step.stiffness)]
+        pushed = [c.reaction[:, -1] / nodal.normal for c, nodal in zip(contacts, step.stiffness)]
         felt = GROWTH_SHARE * body.largest(np.concatenate(pushed))
         if self._turn is None:
             most = ROTATION_BOUND * _spread(body, u[: body.size]) / body.thickness  # of rotations
@@ -137,7 +139,7 @@ class Grows(Check):
 def _spread(body: ElasticBody, u: np.ndarray) -> float:
     """Half of the largest difference of displacements, at most.  Collective."""
     rows = body.displacements.rows(u)
-    ends = np.concatenate([of.max(axis=0, initial=-np.inf) for of in (rows, -rows)])
+    ends = np.concatenate([side.max(axis=0, initial=-np.inf) for side in (rows, -rows)])
     body.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
     return float(np.linalg.norm(ends.reshape(2, -1).sum(axis=0))) / 2
 
@@ -180,7 +182,7 @@ def _facing(body: ElasticBody, contact: Contact) -> float:
 
     facets = facets_of(contact.displacements, contact.facets)
     return body.highest(
-        np.concatenate([[-1.0], *(-of.outwards @ contact.frame[-1] for of in facets)])
+        np.concatenate([[-1.0], *(-part.outwards @ contact.frame[-1] for part in facets)])
     )
 
 

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The contact of boundary nodes with a rigid surface: reactions and their history."""
 
 from __future__ import annotations
@@ -184,8 +186,8 @@ class Contact(Guarded):
         Args:
             frames: Rows (t1, t2, n) at each node, ``shape=(n, gdim, gdim)``, global components, orthonormal.
         """
-        of = self.displacements
-        return ContactPoints(of.dofs(self.nodes), frames, of.owned)
+        displacements = self.displacements
+        return ContactPoints(displacements.dofs(self.nodes), frames, displacements.owned)
 
     @property
     def changes(self) -> bool:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 # Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
-LARGEST_TURN, PLACES_ON_WAY = 0.5, 32
+LARGEST_TURN = 0.5
+PLACES_ON_WAY = 32
 
 
 def pressed(

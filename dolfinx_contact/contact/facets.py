@@ -102,13 +102,13 @@ def facets_of(displacements: Displacements, facets: np.ndarray) -> list[Facets]:
     tips = np.array([layout.entity_dofs(0, vertex)[0] for vertex in range(count)])
     for place in sorted(set(places)):
         closure = np.array(layout.entity_closure_dofs(fdim, place))
-        of = cells[np.array(places) == place]
+        same = cells[np.array(places) == place]
         corners = np.flatnonzero(np.isin(closure, tips))
         local = _along(points[closure], points[closure[corners]])
         key = (len(corners), len(closure), corners.tobytes(), np.round(local, 9).tobytes())
         shapes.setdefault(key, (corners, local, [], []))
-        shapes[key][2].append(nodes[of][:, closure])
-        shapes[key][3].append(x[nodes[of]].mean(axis=1))
+        shapes[key][2].append(nodes[same][:, closure])
+        shapes[key][3].append(x[nodes[same]].mean(axis=1))
     groups = [(c, at, np.concatenate(n), np.concatenate(m)) for c, at, n, m in shapes.values()]
     return _with_normals(V, x, groups, fdim)
 

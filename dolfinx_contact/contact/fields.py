@@ -271,8 +271,8 @@ def _warn_of_curved_edges(
     if comm.allreduce(left_out.size) == 0:
         return
     acting = np.abs(areas(V, facets, weight=weight))
-    most = [acting[dim * of].max(initial=0.0) for of in (left_out, kept)]
-    missed, largest = (comm.allreduce(float(of), op=MPI.MAX) for of in most)
+    most = [acting[dim * nodes].max(initial=0.0) for nodes in (left_out, kept)]
+    missed, largest = (comm.allreduce(float(force), op=MPI.MAX) for force in most)
     if missed > LEFT_OUT_FORCE * largest:
         warnings.warn(
             f"edges of contact facets are curved: a uniform pressure would make forces of up to {missed / largest:.1%} of "

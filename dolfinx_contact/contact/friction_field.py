@@ -155,14 +155,14 @@ def axes_at(
         ValueError: values of another shape, or along the normal.  On this rank alone.
     """
     n, gdim = contact.nodes.size, contact.displacements.dim
-    given, of = friction.given()["axes"], friction.of
-    values = _values(contact, "axes", given, {}, at if of == "surface" else None)
+    given, owner = friction.given()["axes"], friction.of
+    values = _values(contact, "axes", given, {}, at if owner == "surface" else None)
     if gdim != 3 or values.shape not in ((2, n), (3, n)):
         raise ValueError(
             f"axes must give directions in space, shape {(3, n)}, or in the frame of the plane, {(2, n)}, for x of shape "
             f"{(3, n)}, in three dimensions; not {values.shape} in {gdim}."
         )
-    values = contact.geometry.directions(values, of, points)
+    values = contact.geometry.directions(values, owner, points)
     if len(values) == 2:
         along = values
     elif contact.surface.curved:
@@ -217,9 +217,9 @@ def _of_function(contact: Contact, name: str, function: fem.Function) -> np.ndar
         )
     size = V.dofmap.index_map_bs
     parts = [function] if size == 1 else [function.sub(k).collapse() for k in range(size)]
-    of = contact.displacements
-    scalars, parent = of.V.sub(0).collapse()
-    at = np.argsort(np.ravel(parent) // of.dim)[contact.nodes]
+    displacements = contact.displacements
+    scalars, parent = displacements.V.sub(0).collapse()
+    at = np.argsort(np.ravel(parent) // displacements.dim)[contact.nodes]
     values = fem.Function(scalars)
     found = []
     for part in parts:

@@ -204,7 +204,7 @@ class NodalGeometry(Geometry):
         """Of points in space from the surface where it stands, ``shape=(n,)``; infinite where they are not known."""
         return np.full(len(x), np.inf)
 
-    def directions(self, given: np.ndarray, of: str, points: ContactPoints) -> np.ndarray:
+    def directions(self, given: np.ndarray, owner: str, points: ContactPoints) -> np.ndarray:
         """Directions, ``shape=(gdim, n)`` or in frames ``(2, n)``, where they are now."""
         return given
 

@@ -236,7 +236,7 @@ def nodal_blocks(K: PETSc.Mat, dofs: np.ndarray) -> np.ndarray:
         dofs: Owned degrees of freedom of each node, ``shape=(n, gdim)``.
     """
     rows = (dofs + K.getOwnershipRange()[0]).astype(PETSc.IntType)
-    blocks = [K.getValues(of, of) for of in rows]
+    blocks = [K.getValues(row, row) for row in rows]
     return np.reshape(blocks, (*dofs.shape, dofs.shape[1]))
 
 
@@ -249,8 +249,8 @@ def responses(K: PETSc.Mat, points: Sequence[ContactPoints], derivatives: Sequen
         derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
     """
     sums = [sparse.csr_matrix((K.getLocalSize()[0], K.getSize()[1]))] * 2
-    for of, (R_r, R_u) in zip(points, derivatives):
-        sums = [sums[0] + of.of_reactions(R_r), sums[1] + of.matrix(R_u)]
+    for point_set, (R_r, R_u) in zip(points, derivatives):
+        sums = [sums[0] + point_set.of_reactions(R_r), sums[1] + point_set.matrix(R_u)]
     return tuple(sums)
 
 
@@ -259,10 +259,10 @@ def response(
 ) -> np.ndarray:
     """``B^T (R_r S f + R_u B x)`` of all contacts, on owned degrees of freedom."""
     change = np.zeros_like(forces)
-    for of, (R_r, R_u) in zip(points, derivatives):
-        reaction = np.einsum("nij,nj->ni", R_r, of.reactions(forces))
-        reaction += np.einsum("nij,nj->ni", R_u, of.motion(x))
-        of.add_forces(reaction, change)
+    for point_set, (R_r, R_u) in zip(points, derivatives):
+        reaction = np.einsum("nij,nj->ni", R_r, point_set.reactions(forces))
+        reaction += np.einsum("nij,nj->ni", R_u, point_set.motion(x))
+        point_set.add_forces(reaction, change)
     return change
 
 
@@ -275,7 +275,7 @@ def like(K: PETSc.Mat, values: sparse.csr_matrix) -> PETSc.Mat:
 def structure(points: Sequence[ContactPoints]) -> PETSc.Mat.Structure:
     """How the entries of what contacts add to a stiffness lie to its own."""
     kinds = PETSc.Mat.Structure
-    local = all(of.local for of in points)
+    local = all(point_set.local for point_set in points)
     return kinds.SUBSET_NONZERO_PATTERN if local else kinds.DIFFERENT_NONZERO_PATTERN
 
 

@@ -28,7 +28,8 @@ from dolfinx_contact.contact.shapes import monomials
 
 # Points of Gauss's rules in each direction of a triangle or interval: as many as integrate products of shape functions exactly, and
 # more where quadrilaterals are no parallelograms, whose inverse maps are no polynomials.
-GAUSS_POINTS, MORE_GAUSS_POINTS = 2, 10
+GAUSS_POINTS = 2
+MORE_GAUSS_POINTS = 10
 
 # Part of a node's area that has to be covered, by the degree: with less, rows sum up to one by terms that are several times larger,
 # up to 3 in first order, 7 in second.
@@ -118,7 +119,7 @@ def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Ro
         masters: Those of the other side.
         own, count: Numbers of all slave nodes, and of all nodes of the other side, are below.
     """
-    sides = ([_for_kernel(side) for side in of] for of in (slaves, masters))
+    sides = ([_for_kernel(side) for side in body] for body in (slaves, masters))
     area, whole, *csr = _kernel.mortar_rows(*sides, own, _rules())
     m = sparse.csr_matrix((own, count))
     m.data, m.indices, m.indptr = csr  # in order: nothing to check

@@ -66,19 +66,19 @@ class MortarGeometry(NodalGeometry):
 
     def __init__(self, *given: Any, contact: Contact, facets: np.ndarray):
         super().__init__(*given)
-        of, nodes, comm = contact.displacements, contact.nodes, contact.comm
-        self._slave = Skin(of, facets, comm, contact.measure.density)
-        self._master = Skin(of, self.surface.facets, comm)
-        numbers = _numbers(of.V.dofmap.index_map, nodes)
+        displacements, nodes, comm = contact.displacements, contact.nodes, contact.comm
+        self._slave = Skin(displacements, facets, comm, contact.measure.density)
+        self._master = Skin(displacements, self.surface.facets, comm)
+        numbers = _numbers(displacements.V.dofmap.index_map, nodes)
         self._mine = np.searchsorted(self._slave.numbers, numbers)
         self._slave.keep(self._mine)
         self._at_nodes = [at_nodes(side, nodes.size) for side in self._slave.sides]
-        self._supported = np.zeros((nodes.size, of.dim), dtype=bool)
+        self._supported = np.zeros((nodes.size, displacements.dim), dtype=bool)
         # A displacement with the nodes that have left, and what was placed for it; one at the start of a step, and how both sides have turned.
         self._projected: tuple = (None, None)
         self._began: tuple = (None, None)
         self._planes: list = []  # directions and places along which supports hold nodes in one plane
-        self._owned = of.owned
+        self._owned = displacements.owned
 
     @property
     def renews_rows(self) -> bool:
@@ -139,7 +139,7 @@ class MortarGeometry(NodalGeometry):
             pairs = [[np.concatenate((x, mirror * x + foot)) for x in pair] for pair in pairs]
         return [nearest_rotation((y - y.mean(axis=0)).T @ (x - x.mean(axis=0))) for x, y in pairs]
 
-    def directions(self, given: np.ndarray, of: str, points: MortarPoints) -> np.ndarray:
+    def directions(self, given: np.ndarray, owner: str, points: MortarPoints) -> np.ndarray:
         """Directions on the undeformed side that has them, ``shape=(gdim, n)`` or in its frames ``(2, n)``, where these rows are: ``(gdim, n)``.
 
         They are lines of the material, of the slave at its nodes, of the other side opposite to these.
@@ -147,7 +147,7 @@ class MortarGeometry(NodalGeometry):
         if len(given) == 2:
             given = np.einsum("nij,in->jn", self._undeformed[:, :2], given)
         moved, there = points.sides
-        if of == "body":
+        if owner == "body":
             lines = self._slave.deformed(moved)[self._mine]
         else:
             lines = self._master.deformed(there)
@@ -250,7 +250,7 @@ class MortarGeometry(NodalGeometry):
         frames, given = contact.frames, contact.given
         start, there = frames.start, self.projected(u, frames.left)
         alone = there.points.alone
-        slip, used = (of.points.motion(u - start) for of in (there, frames))
+        slip, used = (placed.points.motion(u - start) for placed in (there, frames))
         slip[:, :-1] += self._way(there, start)
         used[:, :-1] += 0.0 if frames.way is None else frames.way
         slip[:, -1] = used[:, -1] = 0.0
@@ -416,7 +416,7 @@ class Skin:
     """Facets of one side and their nodes, known to all ranks.
 
     Args:
-        of: ``Displacements``.
+        displacements: ``Displacements``.
         facets: Local indices.
         comm: MPI communicator.  Collective.
         density: Of the surface measure at local nodes, None is one.
@@ -433,12 +433,12 @@ class Skin:
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
     """
 
-    def __init__(self, of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None = None):  # fmt: skip
-        sides, self._comm = _gathered(of, facets, comm, density), comm
+    def __init__(self, displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None = None):  # fmt: skip
+        sides, self._comm = _gathered(displacements, facets, comm, density), comm
         self.numbers = np.unique(
             np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
         )
-        self.x = np.zeros((self.numbers.size, of.dim))
+        self.x = np.zeros((self.numbers.size, displacements.dim))
         for side in sides:
             self.x[np.searchsorted(self.numbers, side.nodes)] = side.x
         self.sides = [s._replace(nodes=np.searchsorted(self.numbers, s.nodes)) for s in sides]
@@ -451,14 +451,14 @@ class Skin:
         for side, edge in zip(self.sides, edges):
             np.add.at(sums, (slice(None), side.nodes), np.stack((edge, np.ones_like(edge)))[:, :, None])  # fmt: skip
         self.size = sums[0] / sums[1]
-        index_map, count = of.V.dofmap.index_map, of.count
+        index_map, count = displacements.V.dofmap.index_map, displacements.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
         self.nodes = np.flatnonzero(own)
-        self.own = of.dofs(self.nodes)
+        self.own = displacements.dofs(self.nodes)
         given = comm.allgather(_numbers(index_map, self.nodes))
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
         self.mine = np.searchsorted(self.numbers, given[comm.rank])
-        self.dofs = self.everywhere(of.owned[1] + self.own)
+        self.dofs = self.everywhere(displacements.owned[1] + self.own)
         self._compliance: tuple = (None, None, None)  # of which matrix in which state
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
@@ -502,7 +502,7 @@ class Skin:
         places = np.full(self.numbers.size, -1)
         places[nodes] = np.arange(nodes.size)
         near = [(places[at] >= 0).any(axis=1) for at in self._nodes]
-        sides = [side.some(of) for side, of in zip(self.sides, near)]
+        sides = [side.some(kept) for side, kept in zip(self.sides, near)]
         self._nodes = [side.nodes for side in sides]
         self._inside_out = [side.inside_out for side in sides]
         self.sides = [side._replace(nodes=places[side.nodes]) for side in sides]
@@ -551,9 +551,11 @@ class MortarPoints(ContactPoints):
         self.share = frozen(np.where(rows.covered, part, 0.0))
         own, starts = np.arange(self.count), self.m.indptr + np.arange(self.count + 1)
         nodes = np.concatenate((own, self.count + self.m.indices))
-        of = np.concatenate((own, np.repeat(own, np.diff(self.m.indptr))))
+        owner = np.concatenate((own, np.repeat(own, np.diff(self.m.indptr))))
         known = np.concatenate((self.first + dofs, opposite.dofs))[nodes]
-        order = np.argsort(of * self._whole + known[:, 0], kind="stable")  # as PETSc wants columns
+        order = np.argsort(
+            owner * self._whole + known[:, 0], kind="stable"
+        )  # as PETSc wants columns
         values = np.concatenate((np.ones(self.count), -self.m.data))[order]
         counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
         ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
@@ -697,11 +699,13 @@ def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndar
     return mean.as_matrix()[:dim, :dim], axis[:dim], angle
 
 
-def _gathered(of: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip
+def _gathered(displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip
     """The facets of all ranks by shape, nodes in global numbers; with a density of the measure at local nodes.  Collective."""
     mine = []
-    for part in facets_of(of, facets):
-        numbers = _numbers(of.V.dofmap.index_map, part.nodes.ravel()).reshape(part.nodes.shape)
+    for part in facets_of(displacements, facets):
+        numbers = _numbers(displacements.V.dofmap.index_map, part.nodes.ravel()).reshape(
+            part.nodes.shape
+        )
         here = None if density is None else density[part.nodes]
         mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree, part.inverse, here))  # fmt: skip
     shapes: dict = {}

@@ -20,13 +20,18 @@ from dolfinx_contact.support.checks import UNIT_ROUNDOFF
 
 # Newton's steps at most, those in which a residual has to halve, the same once it is within the tolerance; those that need not
 # help, and sweeps over the contacts in place of later ones that do not.
-NEWTON_STEPS, HALVING_STEPS, AT_END, FREE_STEPS, SWEEPS_INSTEAD = 30, 8, 2, 3, 4
+NEWTON_STEPS = 30
+HALVING_STEPS = 8
+AT_END = 2
+FREE_STEPS = 3
+SWEEPS_INSTEAD = 4
 
 # Of the tolerance, what is as good as nothing.
 TOLERANCE_PART = 1e-2
 
 # A residual that is rounding, over the size of its terms, and what a step has to leave at most.
-RESIDUAL_ROUNDING, LEAST_REDUCTION = 64 * UNIT_ROUNDOFF, 0.5
+RESIDUAL_ROUNDING = 64 * UNIT_ROUNDOFF
+LEAST_REDUCTION = 0.5
 
 # Directions of reactions that change nothing, over the largest: the shortest step leaves them as they are.
 SINGULAR_DIRECTION = 1e-11

@@ -40,7 +40,7 @@ def saved_of(contact: Contact) -> dict[str, np.ndarray]:
 
 def _of(history: History) -> dict[str, np.ndarray]:
     sums = {
-        name: of for name, of in history.sums.items() if name != OPPOSITE_WEAR
+        name: values for name, values in history.sums.items() if name != OPPOSITE_WEAR
     }  # of other nodes
     return {name: getattr(history.last, name) for name in STATE_FIELDS} | sums
 

@@ -86,16 +86,19 @@ def mean_laws(laws: list[Friction], contacts: Sequence[ContactStep]) -> list[Fri
     mu, p = np.zeros((2, nodes.size, n, 2))
     found = [np.intersect1d(contact.nodes, nodes, return_indices=True)[1:] for contact in contacts]
     for k, (law, contact, (rows, slots)) in enumerate(zip(laws, contacts, found)):
-        for of, given in ((mu, law.mu), (p, law.p)):
-            of[slots, k] = np.broadcast_to(given, (contact.nodes.size, 2))[rows]
+        for coefficients, given in ((mu, law.mu), (p, law.p)):
+            coefficients[slots, k] = np.broadcast_to(given, (contact.nodes.size, 2))[rows]
     among = alike | np.eye(n, dtype=bool)
-    mu, p = ((among * shares[:, None, :]) @ of for of in (mu, p))
+    mu, p = ((among * shares[:, None, :]) @ coefficients for coefficients in (mu, p))
     mixed = []
     for k, (law, contact, (rows, slots)) in enumerate(zip(laws, contacts, found)):
-        own = [np.broadcast_to(of, (contact.nodes.size, 2)).copy() for of in (law.mu, law.p)]
+        own = [
+            np.broadcast_to(coefficients, (contact.nodes.size, 2)).copy()
+            for coefficients in (law.mu, law.p)
+        ]
         these = alike[slots, k].any(axis=1)
-        for of, mean in zip(own, (mu, p)):
-            of[rows[these]] = mean[slots[these], k]
+        for coefficients, mean in zip(own, (mu, p)):
+            coefficients[rows[these]] = mean[slots[these], k]
         mixed.append(Friction(own[0], np.where(own[0] > 0, own[1], 1.0), axes=law.axes))
     return mixed
 
@@ -231,7 +234,7 @@ class SharedNodes:
             gap, slip = state.gap[rows], state.slip_increment[rows]
             parts.append(Part(mine, law, self._spring[nodes[mine]], gap[at], slip[at]))
         given = self._frames, force, self._alike, self._shares
-        return NodalProblems(parts, *(of[nodes] for of in given))
+        return NodalProblems(parts, *(part[nodes] for part in given))
 
     def coupled(self, derivatives: Sequence[tuple], split: Split) -> list[tuple]:
         """Derivatives of new reactions by the forces on the nodes and by the motion, from those by what each is asked for.

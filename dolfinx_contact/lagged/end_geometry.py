@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 MOST_REPETITIONS = 5
 
 # The same with deformable surfaces, and differences of ends that are mixed.
-MOST_RENEWALS, MIXED_ENDS = 24, 5
+MOST_RENEWALS = 24
+MIXED_ENDS = 5
 
 
 class EndGeometry(Lagged):
@@ -156,10 +157,10 @@ def too_long(state: StepState) -> str:
     step, lost = state.step, [(2.0, "")]
     at = state.x, step.last if step.body.nonlinear else None
     lost += [c.given.geometry.too_long(c, nodes, *at) for c, nodes in _changing(state)]
-    part, said = min(step.body.comm.allgather(min(lost)))
+    part, message = min(step.body.comm.allgather(min(lost)))
     if part > 1.0:
         return ""
-    return f"the step is too long: {said}. Divide the step, or let dc.advance do so"
+    return f"the step is too long: {message}. Divide the step, or let dc.advance do so"
 
 
 def undivided(missed: float, tol: float, repeated: int) -> str:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 SLOWEST_RATE = 0.9
 
 # Tolerance of a solution on the way: at most this one, and this part of the last change of the reactions.
-ROUGH_TOL, PART_OF_CHANGE = 1e-3, 0.03
+ROUGH_TOL = 1e-3
+PART_OF_CHANGE = 0.03
 
 
 class LaggedFriction(Lagged):
@@ -76,5 +77,5 @@ class PressureFriction(LaggedFriction):
         pressure = per_area(state.reaction[:, -1], given.area)
         return given.laws.under(given, pressure, contact.friction, contact.frames)
 
-    def said(self, solutions: int) -> str:
+    def message(self, solutions: int) -> str:
         return f"{solutions} times with friction that follows the pressure"

@@ -134,14 +134,14 @@ def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> 
     before = [np.where(at[:, None], reaction, 0.0) for reaction, at in zip(settled, opens)]
     points = [contact.given.history.frames.points for contact in step.contacts]
     forces = np.zeros(step.body.size)
-    for of, reaction in zip(points, before):
-        of.add_forces(reaction, forces)
+    for point_set, reaction in zip(points, before):
+        point_set.add_forces(reaction, forces)
     forces[step.body.fixed] = 0.0
     # Of a loose body each node alone: without reactions it would fall.
     moved, found = step.body.solve(forces) if step.statics is None else None, []
-    for k, (contact, of, one) in enumerate(zip(step.contacts, points, nodes)):
+    for k, (contact, point_set, one) in enumerate(zip(step.contacts, points, nodes)):
         alone = before[k][:, -1] / contact.stiffness.normal
-        pressed = np.maximum(alone if moved is None else of.motion(moved)[:, -1], 0.0)
+        pressed = np.maximum(alone if moved is None else point_set.motion(moved)[:, -1], 0.0)
         beside = (
             contact.given.geometry.covered(contact.frames) == 0.0
         )  # left the other side along the surface: that is no gap

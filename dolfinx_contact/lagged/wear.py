@@ -42,7 +42,8 @@ MIXED_DEPTHS = 20
 
 # What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open, close and stick, and twice
 # as many rounds do without.
-LEAST_FALL, FALL_ROUNDS = 0.7, 10
+LEAST_FALL = 0.7
+FALL_ROUNDS = 10
 
 # In these rounds depths go this part of the way: the whole one may lead to and fro for ever.
 CAUTIOUS_PART = 0.5
@@ -100,7 +101,7 @@ class WearOfStep(Lagged):
     def not_settled(self, change: Change) -> str:
         return f"the depth that the step wears still changes after {self.limit} solutions"
 
-    def said(self, solutions: int) -> str:
+    def message(self, solutions: int) -> str:
         return f"{solutions} times with the depth that the step wears" if solutions > 1 else ""
 
     def _settled(self, state: StepState, scale: float) -> bool:

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The friction law: coefficients, cone, maps, frictional work and wear; arrays alone, without DOLFINx."""
 
 from importlib import import_module

@@ -24,7 +24,8 @@ Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not 
 
 TEXTURE_OWNERS = ("body", "surface")  # of a texture
 
-_SMALLEST_COEFFICIENT, _LARGEST_COEFFICIENT = 1e-50, 1e50
+_SMALLEST_COEFFICIENT = 1e-50
+_LARGEST_COEFFICIENT = 1e50
 
 ARRAY_REMEDY = (
     "a Friction is immutable: assign another one, contact.friction = dc.Friction(mu, p); with a pair for each contact node, mu "

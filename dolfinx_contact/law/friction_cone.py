@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from dolfinx_contact.law.friction import Friction
 
 # Points with larger components are scaled before projection, so that no sum overflows.
-HUGE_COMPONENT, HUGE_UNIT = 1e300, 2.0**20
+HUGE_COMPONENT = 1e300
+HUGE_UNIT = 2.0**20
 
 
 def as_nodes(

@@ -32,11 +32,11 @@ def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
     """
     A, B = (_tensor(mu**2, angle) for mu, _, angle in (first, second))
     a, b = (np.prod(mu, axis=-1) for mu, *_ in (first, second))  # roots of the determinants
-    sums = [np.divide(of, root, np.zeros_like(of), where=root > 0) for of, root in zip((*A, *B), (a, a, a, b, b, b))]  # fmt: skip
+    sums = [np.divide(part, root, np.zeros_like(part), where=root > 0) for part, root in zip((*A, *B), (a, a, a, b, b, b))]  # fmt: skip
     mid = [one + other for one, other in zip(sums[:3], sums[3:])]
     determinant = mid[0] ** 2 - mid[1] ** 2 - mid[2] ** 2
     factor = np.sqrt(np.divide(a * b, determinant, np.zeros_like(a * b), where=determinant > 0))
-    iso, x, y = ((one + other + 2 * factor * of) / 4 for one, other, of in zip(A, B, mid))
+    iso, x, y = ((one + other + 2 * factor * mixed) / 4 for one, other, mixed in zip(A, B, mid))
     soft = [_tensor(np.log(np.where(Q > 0, Q, 1.0)), angle) for _, Q, angle in (first, second)]
     sides = np.maximum((a > 0) * 1.0 + (b > 0), 1.0)
     qx, qy = ((one + other) / sides for one, other in zip(soft[0][1:], soft[1][1:]))

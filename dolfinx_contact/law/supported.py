@@ -35,7 +35,9 @@ RELATIVE_ROUNDING = 32 * np.finfo(float).eps
 # Iteration limit for the slip along a free direction: Newton steps and bisections.
 MOST_STEPS = 100
 
-IS_OPEN, IS_STICKING, IS_SLIPPING = 0, 1, 2
+IS_OPEN = 0
+IS_STICKING = 1
+IS_SLIPPING = 2
 
 
 def across(friction: Friction, along: np.ndarray) -> np.ndarray:
@@ -162,26 +164,30 @@ class SupportedLaw:
 class _Answer:
     """Friction of ``k`` supported nodes, and its derivatives with respect to R and to the predictor along ``f``."""
 
-    def __init__(self, of: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
-        self._law, self._f, self._rho = of.friction, of.along, rho
-        moved, guided, both, d, most, friction = of.kinds
+    def __init__(self, supported: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
+        self._law, self._f, self._rho = supported.friction, supported.along, rho
+        moved, guided, both, d, most, friction = supported.kinds
         turn = np.zeros_like(d)
         if both.size:
             d = d.copy()
-            rows = (self._f[both], rho[both], R[both], tau[both], of.moved[both])
+            rows = (self._f[both], rho[both], R[both], tau[both], supported.moved[both])
             d[both], turn[both] = _slipped(friction, *rows)
         by_predictor = (
-            R[:, None] * turn / (rho + R * np.maximum(_dot(turn, of.along), 0.0))[:, None]
+            R[:, None] * turn / (rho + R * np.maximum(_dot(turn, supported.along), 0.0))[:, None]
         )
-        by_R = by_predictor * _dot(d, of.along)[:, None] - d
+        by_R = by_predictor * _dot(d, supported.along)[:, None] - d
         slips = np.abs(tau) > most * R
         along = np.clip(tau, -most * R, most * R)
-        stuck = along[:, None] * of.ratio
-        stuck += self._room(stuck, np.where(slips[:, None], 0.0, of.kept), R) * of.kept
+        stuck = along[:, None] * supported.ratio
+        stuck += (
+            self._room(stuck, np.where(slips[:, None], 0.0, supported.kept), R) * supported.kept
+        )
         made = moved[:, None]
         self.friction = np.where(made, -R[:, None] * d, stuck)
-        self.by_predictor = np.where(made, by_predictor, (guided & ~slips)[:, None] * of.ratio)
-        self.by_R = np.where(made, by_R, (slips * np.sign(tau) * most)[:, None] * of.ratio)
+        self.by_predictor = np.where(
+            made, by_predictor, (guided & ~slips)[:, None] * supported.ratio
+        )
+        self.by_R = np.where(made, by_R, (slips * np.sign(tau) * most)[:, None] * supported.ratio)
         self.slips = moved | (guided & slips)
 
     def _room(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:

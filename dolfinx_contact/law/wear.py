@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Archard's wear law: worn depth from the frictional work per area."""
 
 from __future__ import annotations
@@ -93,11 +95,11 @@ class Wear(Guarded):
         return np.clip(np.divide(beyond, work, np.ones_like(work), where=work > 0.0), 0.0, 1.0)
 
     def __repr__(self) -> str:
-        said = "field" if self.field else self.coefficient.tolist()
+        message = "field" if self.field else self.coefficient.tolist()
         options = ", explicit=True" * self.explicit
         options += f", threshold={self.threshold:g}" * (self.threshold > 0.0)
         options += f", opposite={self.opposite.tolist()}" * bool(self.opposite.any())
-        return f"Wear({said}{options})"
+        return f"Wear({message}{options})"
 
 
 def _volume(k: np.ndarray, work: np.ndarray) -> np.ndarray:

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """PETSc behind two verbs: solve a linear system, and apply its preconditioner once."""
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ SYMMETRIC_OPTIONS = DIRECT_OPTIONS | {"pc_type": "cholesky", "mat_mumps_icntl_7"
 # Of matrices that are small, or all but full, all orderings are as good, and PORD, which may find no separator in them, ends
 # the process. AMD does not.
 FULL_OPTIONS = SYMMETRIC_OPTIONS | {"mat_mumps_icntl_7": 0}
-SMALL_SIZE, DENSE_PART = 100, 0.5
+SMALL_SIZE = 100
+DENSE_PART = 0.5
 
 # Not PETSc's, of a matrix that is symmetric: sweeps over its lower half smooth the finest level, see ``Multigrid``.
 GAUSS_SEIDEL = "mg_finest_gauss_seidel"
@@ -139,10 +142,10 @@ def _sweeps(options: dict, prefix: str) -> bool:
     """Whether Gauss-Seidel smooths the finest level: the options say so, and the user says nothing of smoothers."""
     database = PETSc.Options(prefix)
     of_levels = {key for key in options if key.startswith("mg_levels_")}
-    said = any(
+    message = any(
         MULTIGRID_OPTIONS.get(key) != options[key] or database.hasName(key) for key in of_levels
     )
-    return bool(options.get(GAUSS_SEIDEL)) and not said
+    return bool(options.get(GAUSS_SEIDEL)) and not message
 
 
 def _heed_signals(*_: object) -> None:

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Symmetric PETSc matrices by their lower half, in blocks of a node's unknowns, and Gauss-Seidel sweeps with them."""
 
 from __future__ import annotations
@@ -78,16 +80,16 @@ def halved(A: PETSc.Mat) -> PETSc.Mat | None:
 
 def plus(A: PETSc.Mat, S: PETSc.Mat) -> PETSc.Mat | None:
     """A ``halved`` matrix plus springs, if they couple unknowns of the same node alone: its blocks are then shared.  Collective."""
-    of = A.getPythonContext()
+    context = A.getPythonContext()
     rows, own = _rows(S)
-    own = own.tobsr((of.size, of.size))
+    own = own.tobsr((context.size, context.size))
     nodes = np.repeat(np.arange(own.indptr.size - 1), np.diff(own.indptr))
     only = rows.nnz == np.count_nonzero(_are_own(S, rows)) and (own.indices == nodes).all()
     if not A.comm.tompi4py().allreduce(only, op=MPI.LAND):
         return None
-    added = np.zeros((own.indptr.size - 1, of.size, of.size))
+    added = np.zeros((own.indptr.size - 1, context.size, context.size))
     added[nodes] = own.data
-    return _with(A, SymmetricMatrix(of.own.plus(added), of.others, of.size))
+    return _with(A, SymmetricMatrix(context.own.plus(added), context.others, context.size))
 
 
 def _with(A: PETSc.Mat, context: SymmetricMatrix) -> PETSc.Mat:

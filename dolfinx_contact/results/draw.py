@@ -14,7 +14,9 @@ import pyvista
 STATUS_COLOURS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a")}
 
 # Size of a node in pixels: this over the root of their number, within limits.
-DOT_PIXELS, SMALLEST_DOT, LARGEST_DOT = 150.0, 4.0, 12.0
+DOT_PIXELS = 150.0
+SMALLEST_DOT = 4.0
+LARGEST_DOT = 12.0
 
 
 # Part of a picture of a plane body that lies between the legend and the colour bar, or between top and bottom.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A table of a run with one row per step: totals of the contacts, and results at tracked nodes."""
 
 from __future__ import annotations

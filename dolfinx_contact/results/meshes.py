@@ -25,7 +25,8 @@ VTK_TYPES = {
     (1, 2, 2): 3, (2, 3, 3): 5, (2, 4, 4): 9, (3, 4, 4): 10, (3, 8, 8): 12, (3, 6, 6): 13,
     (1, 2, 3): 21, (2, 3, 6): 22, (2, 4, 9): 28, (3, 4, 10): 24, (3, 8, 27): 29,
 }  # fmt: skip
-VTK_LINE3, VTK_TRIANGLE6 = 21, 22
+VTK_LINE3 = 21
+VTK_TRIANGLE6 = 22
 
 # VTK's order of vertices, and the vertices (in that order) in whose middle each further node is.
 SQUARE_ORDER = (0, 1, 3, 2)
@@ -69,7 +70,7 @@ def vtk_order(points: np.ndarray, vertices: np.ndarray) -> tuple[int, np.ndarray
     dim, count = points.shape[1], len(vertices)
     corners = points[vertices[list(VERTEX_ORDERS.get((dim, count), range(count)))]]
     middles = MIDDLE_NODES[dim, count] if len(points) > count else []
-    places = np.array([*corners, *(corners[list(of)].mean(axis=0) for of in middles)])
+    places = np.array([*corners, *(corners[list(ends)].mean(axis=0) for ends in middles)])
     apart = np.linalg.norm(places[:, None] - points, axis=2)
     return VTK_TYPES[dim, count, len(points)], apart.argmin(axis=1)
 
@@ -179,12 +180,14 @@ class SurfaceMesh:
             nodes = facets.nodes[:, order]
             numbers = index_map.local_to_global(nodes.ravel().astype(np.int32))
             found.setdefault(kind, []).append(numbers.reshape(nodes.shape))
-        every = self._comm.gather({kind: np.concatenate(of) for kind, of in found.items()}, root=0)
+        every = self._comm.gather(
+            {kind: np.concatenate(parts) for kind, parts in found.items()}, root=0
+        )
         kinds = sorted({kind for one in every or [] for kind in one})
         cells = {k: np.concatenate([one[k] for one in every if k in one]) for k in kinds}
-        numbers = np.concatenate([of.ravel() for of in cells.values()] or [np.empty(0, int)])
+        numbers = np.concatenate([nodes.ravel() for nodes in cells.values()] or [np.empty(0, int)])
         self._numbers = self._comm.bcast(np.unique(numbers), root=0)
-        self._cells = {k: np.searchsorted(self._numbers, of) for k, of in cells.items()}
+        self._cells = {k: np.searchsorted(self._numbers, nodes) for k, nodes in cells.items()}
         first, end = V.dofmap.index_map.local_range
         inside = (self._numbers >= first) & (self._numbers < end)
         self._owned = self._numbers[inside] - first

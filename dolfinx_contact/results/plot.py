@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 # Points per direction of the grid on which a rigid surface is drawn, by dimension, and how far it goes beyond the contact, over its size.
-GRID_POINTS, GRID_MARGIN = {2: 400, 3: 60}, 0.15
+GRID_POINTS = {2: 400, 3: 60}
+GRID_MARGIN = 0.15
 
 
 def plot(

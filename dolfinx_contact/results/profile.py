@@ -75,11 +75,11 @@ def profile(
 
 def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
     """The columns."""
-    of = [
+    pieces = [
         mesh.cells[kind][:, VTK_PIECES[kind]].reshape(-1, len(VTK_PIECES[kind][0]))
         for kind in mesh.cells
     ]
-    pieces = np.concatenate(of)
+    pieces = np.concatenate(pieces)
     found = [_nearest(mesh.x[pieces], point) for point in at]
     nodes = pieces[[piece for piece, _ in found]]
     weights = np.array([weights for _, weights in found])

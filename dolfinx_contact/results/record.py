@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 WORSE_THAN_TOLERANCE = 1e3
 
 # Reasons of steps that have no solution, in words.
-NO_SOLUTION, NOT_HELD = "there is no solution", "a body leaves what held it"
+NO_SOLUTION = "there is no solution"
+NOT_HELD = "a body leaves what held it"
 
 
 class Counts(NamedTuple):
@@ -91,13 +92,13 @@ class Step:
     def __str__(self) -> str:
         """One line: errors, iterations, nodes by status."""
         return (
-            f"error {_said(self.error)}, slip error {_said(self.slip_error)}, forward error {_said(self.forward_error)}, "
+            f"error {_message(self.error)}, slip error {_message(self.slip_error)}, forward error {_message(self.forward_error)}, "
             f"rounding {self.rounding:.1e}, after {self.iterations} iterations ({self.counts.open} open, "
             f"{self.counts.stick} sticking, {self.counts.slip} slipping nodes)"
         )
 
 
-def _said(error: float) -> str:
+def _message(error: float) -> str:
     """A number; of what cannot be measured, as where rounding hides the loads on what has moved far away, that it cannot."""
     return f"{error:.3e}" if np.isfinite(error) else "unknown"
 
@@ -135,7 +136,7 @@ class NotConverged(RuntimeError):
 
 def counts_of(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
     """Contact nodes open, sticking and slipping, of the states of some contacts, or these themselves.  Collective."""
-    here = sum(np.bincount(of.status, minlength=3) for of in nodes)
+    here = sum(np.bincount(state.status, minlength=3) for state in nodes)
     return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
 
 
@@ -212,7 +213,7 @@ def warn_of_contact(step: Step, tol: float) -> None:
 
 def _penetration_between(contact: Contact, u: np.ndarray) -> float:
     """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
-    of = contact.displacements
-    here = of.rows(u)[contact.left_out]
-    gaps = contact.geometry.distances(of.x[contact.left_out, : of.dim] + here)
+    displacements = contact.displacements
+    here = displacements.rows(u)[contact.left_out]
+    gaps = contact.geometry.distances(displacements.x[contact.left_out, : displacements.dim] + here)
     return max(0.0, -contact.comm.allreduce(float(gaps.min(initial=0.0)), op=MPI.MIN))

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
 VTK_KINDS = {"f": "Float64", "i": "Int64", "u": "UInt8"}
-VTK_COLLECTION, VTK_PIECE = "Collection", "UnstructuredGrid"
+VTK_COLLECTION = "Collection"
+VTK_PIECE = "UnstructuredGrid"
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
@@ -49,12 +50,12 @@ def write_vtu(path: Path, mesh: Mesh) -> None:
     """Write a mesh to a file of VTK's XML format."""
     file = _file(VTK_PIECE)
     cells = mesh.cells.values()
-    counts = [np.full(len(of), of.shape[1]) for of in cells]
-    kinds = [np.full(len(of), kind, dtype=np.uint8) for kind, of in mesh.cells.items()]
+    counts = [np.full(len(nodes), nodes.shape[1]) for nodes in cells]
+    kinds = [np.full(len(nodes), kind, dtype=np.uint8) for kind, nodes in mesh.cells.items()]
     numbers = {"NumberOfPoints": len(mesh.x), "NumberOfCells": sum(map(len, kinds))}
     piece = ET.SubElement(file[0], "Piece", {name: str(n) for name, n in numbers.items()})
     topology = {
-        "connectivity": np.concatenate([of.ravel() for of in cells]),
+        "connectivity": np.concatenate([nodes.ravel() for nodes in cells]),
         "offsets": np.cumsum(np.concatenate(counts)),
         "types": np.concatenate(kinds),
     }

@@ -167,6 +167,6 @@ class BoundAutomatic(BoundSolver):
                 break
             if not options and step.slides(found.state):
                 break
-        said = [self._why, best.reason, *(how for other, how in ended if other is not best)]
-        said = "; ".join(filter(None, said))
-        return best._replace(iterations=iterations, reason=said, start=kept)
+        message = [self._why, best.reason, *(how for other, how in ended if other is not best)]
+        message = "; ".join(filter(None, message))
+        return best._replace(iterations=iterations, reason=message, start=kept)

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 r"""The errors of a step, dimensionless numbers; see docs/errors.md.
 
 The kernel computes the defects of a node, ``law.bipotential_map`` and ``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``); the

@@ -421,15 +421,15 @@ class LoadStep:
 
     def refusal(self, state: StepState) -> str:
         """Why it has not converged, in words, as far as anything tells.  Collective."""
-        said = "" if self.statics is None else self.statics.hidden(self)
-        said = said or self._no_state(state) or self._hard()
+        message = "" if self.statics is None else self.statics.hidden(self)
+        message = message or self._no_state(state) or self._hard()
         if any(contact.given.laws.follow_pressure for contact in self.contacts):
-            said += "; friction follows the pressure, and was that of the last iterate"
+            message += "; friction follows the pressure, and was that of the last iterate"
         if any(contact.given.laws.wears_within for contact in self.contacts):
-            said += (
+            message += (
                 "; the depth that the step wears is part of it, and was that of the last iterate"
             )
-        return said
+        return message
 
     def _hard(self) -> str:
         """What may help where a state should exist, in words.  Collective."""
@@ -441,15 +441,17 @@ class LoadStep:
 
     def _no_state(self, state: StepState) -> str:
         """Why there is no static state, in words; empty where nothing tells.  Collective."""
-        said = "" if self.statics is None else self.statics.said
+        message = "" if self.statics is None else self.statics.message
         if self.surfaces is not None:
-            said = said or self.surfaces.beyond(self.contacts, state.nodes, state.c, given=True)
-            said = said or self.surfaces.beyond(self.contacts, state.nodes, state.c)
-            if not said and self.statics is not None:
+            message = message or self.surfaces.beyond(
+                self.contacts, state.nodes, state.c, given=True
+            )
+            message = message or self.surfaces.beyond(self.contacts, state.nodes, state.c)
+            if not message and self.statics is not None:
                 from dolfinx_contact.surfaces.sliding import nothing_holds
 
-                said = nothing_holds(self.contacts)
-        return said
+                message = nothing_holds(self.contacts)
+        return message
 
     def counts(self, state: StepState) -> Counts:
         """Contact nodes open, sticking and slipping.  Collective."""

@@ -62,7 +62,7 @@ class Lagged:
         """What to say where the limit is reached, in words; empty where errors tell."""
         return ""
 
-    def said(self, solutions: int) -> str:
+    def message(self, solutions: int) -> str:
         """What a record says of so many solutions, in words."""
         return ""
 
@@ -153,7 +153,9 @@ class _Loop:
     def at_its_limit(self, k: int) -> bool:
         """Whether a level cannot be renewed any more; ``refused`` says why."""
         self.refused = next((change.refused for change in self._changes if change.refused), "")
-        if not self.refused and self._renewals[k] < max(of.limit for of in self._levels[k]):
+        if not self.refused and self._renewals[k] < max(
+            quantity.limit for quantity in self._levels[k]
+        ):
             return False
         largest = max(self._changes, key=lambda change: change.size)
         words = (quantity.not_settled(largest) for quantity in self._levels[k])
@@ -171,8 +173,8 @@ class _Loop:
     def result(self, found: SolverResult) -> SolverResult:
         """What was found, with all iterations, and the reasons of all levels."""
         both = zip(self._levels, self._solutions)
-        said = [quantity.said(count) for level, count in both for quantity in level]
-        reason = "; ".join(filter(None, (found.reason, *said)))
+        message = [quantity.message(count) for level, count in both for quantity in level]
+        reason = "; ".join(filter(None, (found.reason, *message)))
         return found._replace(
             iterations=self._iterations, forward_error=self._forward, reason=reason
         )

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 # Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
 # where few do, it is not that.
-TALL_RATIO, MANY_CHANGE = 2.0, 0.05
+TALL_RATIO = 2.0
+MANY_CHANGE = 0.05
 
 # The error is where its largest parts make up so much of its square.
 ERROR_PART = 0.9
@@ -52,11 +53,11 @@ def stalled(
     squares = np.sort(np.concatenate([one[0] for one in found]) ** 2)[::-1]
     few = 1 + int(np.searchsorted(np.cumsum(squares), ERROR_PART * squares.sum()))
     where = max(found, key=lambda one: one[1])[2]
-    said = [
+    message = [
         f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
         f"{changed} have changed their status in the last {len(every)} states",
     ]
-    return said + tall(body, contacts) if changed > MANY_CHANGE * nodes else said
+    return message + tall(body, contacts) if changed > MANY_CHANGE * nodes else message
 
 
 def tall(body: ElasticBody, contacts: Sequence[ContactStep]) -> list[str]:

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Part of loads and reactions that is rounding, of their sum that may be left, and rays of friction cones that are tried.
-LOAD_ROUNDING, BALANCED_PART, CONE_RAYS = 1e-12, 1e-7, 400
+LOAD_ROUNDING = 1e-12
+BALANCED_PART = 1e-7
+CONE_RAYS = 400
 
 # What reactions may leave of loads in a state that is no more than rounding away from a solution.
 ROUGH_BALANCE = 1e-3
@@ -36,7 +38,8 @@ JAMMED_RATIO = 1e9
 
 # A motion is undetermined if it changes less than this part of what springs at all nodes would change of reactions; a
 # body slides away along it if it changes less than the second number, and loads are not balanced.
-UNFELT_PART, SLIDING_PART = 1e-9, 1e-3
+UNFELT_PART = 1e-9
+SLIDING_PART = 1e-3
 
 # Where a body is moved to before it is taken back out of the planes, over the largest gap.
 FAR_RATIO = 30.0
@@ -56,7 +59,7 @@ class Statics:
         loads: Their sums along the motions, ``shape=(m,)``; zero where they are rounding.
         last: The last converged displacement.
         start: Displacement near which the solution may lie; ``placed`` if it is not the last one.
-        said: Why there is no static state, in words; empty where there may be one.
+        message: Why there is no static state, in words; empty where there may be one.
         reason: The same as the record of a step has it.
 
     Raises:
@@ -79,7 +82,7 @@ class Statics:
             coefficients.append(np.broadcast_to(mu, (points.count, self._dim - 1)))
         self._motion, self._mu = np.concatenate(parts), np.concatenate(coefficients)
         self._felt = body.total((self._motion**2).sum(axis=(0, 1)))
-        self.start, self.last, self.placed, self.said = last, last, False, ""
+        self.start, self.last, self.placed, self.message = last, last, False, ""
         self.reason = NO_SOLUTION
         if not self._felt.all():
             free = body.loose.refusal(np.eye(m)[:, self._felt == 0.0])
@@ -88,7 +91,7 @@ class Statics:
                     f"{free} No contact node can hold it: fix it by Dirichlet "
                     "conditions, add a soft spring to F, or name the facets that may touch."
                 )
-            self.said = f"where the search has moved it, {free} A smaller step stays nearer to what held it in the last one"
+            self.message = f"where the search has moved it, {free} A smaller step stays nearer to what held it in the last one"
             self.reason = NOT_HELD
         b = step.free(step.b)
         sums, sizes = body.total([self._modes.T @ b, np.abs(self._modes).T @ np.abs(b)])
@@ -96,12 +99,12 @@ class Statics:
         escape, self._balancing = self._escape(self._motion, self.loads)
         if escape is None and step.surfaces is not None:
             escape, _ = self._escape(*self._with_surfaces(step.surfaces))
-            self.said = "" if escape is None else nothing_holds(contacts)
+            self.message = "" if escape is None else nothing_holds(contacts)
         # Planes that move alone are the concern of ``DrivenSurfaces.beyond``.
         if escape is not None and np.linalg.norm(escape[:m]) > NEGLIGIBLE_MOTION * np.linalg.norm(
             escape
         ):
-            self.said = self.said or (
+            self.message = self.message or (
                 f"The loads drive {body.loose.words(escape[:m])}, which no reactions of the contact nodes within their friction can "
                 "hold: no static state exists"
             )
@@ -283,7 +286,7 @@ class Statics:
             driven = overcome[0]
         if self._presses(driven):
             return False
-        self.said = (
+        self.message = (
             f"In the best state found the loads drive {self._body.loose.words(driven)} by more than friction carries with its "
             f"normal forces{', of which there are none' if self._unpressed(state) else ''}"
         )

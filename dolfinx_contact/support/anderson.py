@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Anderson acceleration (type II) of a fixed point x <- x + g(x), one global reduction per iteration."""
 
 from __future__ import annotations

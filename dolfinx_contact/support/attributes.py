@@ -26,10 +26,10 @@ class Whole(np.ndarray):
     ``surface.displacement += way`` assigns a new one.
     """
 
-    said: str = ""  # what to do instead of setting an entry
+    message: str = ""  # what to do instead of setting an entry
 
     def __array_finalize__(self, source: object) -> None:
-        self.said = getattr(source, "said", "")
+        self.message = getattr(source, "message", "")
 
     def __array_wrap__(self, array: np.ndarray, context: Any = None, return_scalar: bool = False):
         return array[()] if array.ndim == 0 else array.view(np.ndarray)
@@ -38,7 +38,7 @@ class Whole(np.ndarray):
         if self.flags.writeable:  # a copy of it
             super().__setitem__(key, value)
             return
-        raise ValueError(self.said)
+        raise ValueError(self.message)
 
     def __iadd__(self, other: Any):
         return super().__iadd__(other) if self.flags.writeable else self + other
@@ -65,7 +65,7 @@ def whole(name: str, array: np.ndarray | None, instead: str = "") -> Any:
     instead = (
         instead or f"it is assigned as a whole: {name} = ..., or {name} += ... for all components."
     )
-    view.said = f"{name} is read-only, {instead}"
+    view.message = f"{name} is read-only, {instead}"
     return view
 
 

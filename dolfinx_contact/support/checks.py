@@ -123,7 +123,7 @@ def free_memory() -> float:
     """Bytes of memory that this machine can give, what its cache of files holds among them; infinite where it does not say."""
     try:
         with open("/proc/meminfo") as file:
-            said = dict(line.split(":") for line in file)
-        return 1024.0 * int(said["MemAvailable"].split()[0])  # in kB [proc(5)]
+            message = dict(line.split(":") for line in file)
+        return 1024.0 * int(message["MemAvailable"].split()[0])  # in kB [proc(5)]
     except (OSError, KeyError, ValueError):
         return np.inf

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What all ranks do together: mistakes are raised on all, so that none waits for another for ever; sums and norms."""
 
 from __future__ import annotations

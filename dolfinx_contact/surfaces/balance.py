@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
 # Steps of Newton's method, and lengths of one that are tried.
-NEWTON_STEPS, LENGTHS_TRIED = 30, 40
+NEWTON_STEPS = 30
+LENGTHS_TRIED = 40
 
 # What may be left of the forces on a plane, over the sum of their magnitudes: rounding.
 BALANCE_ROUNDING = 16 * np.finfo(float).eps

@@ -32,7 +32,8 @@ RESISTING_PART = 1e-8
 STIFFEST_SPRING = 1e10
 
 # Times that a curved surface far from the body comes nearer.
-MOST_APPROACHES, NEAR_PART = 20, 1e-12  # part of the body's extent that is near enough
+MOST_APPROACHES = 20  # part of the body's extent that is near enough
+NEAR_PART = 1e-12
 
 
 def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.ndarray) -> None:

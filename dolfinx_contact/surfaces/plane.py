@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Rigid planes: position, normal and principal friction directions."""
 
 from __future__ import annotations

@@ -43,17 +43,17 @@ def slides_away(
     """
     driving = surfaces.driving(c)
     for surface, part in zip(surfaces.surfaces, surfaces.parts):
-        of = [
+        moved = [
             (contact, state.reaction[:, -1], axes[:, :, part])
             for contact, state, axes in zip(contacts, nodes, surfaces.axes)
             if contact.surface is surface
         ]
-        one = _Driven(surface, surfaces, part, driving[part], of, body)
-        said = "" if surface.curved else one.slides(given) or one.tips()
-        if not said and not given:
-            said = one.spins()
-        if said:
-            return said
+        one = _Driven(surface, surfaces, part, driving[part], moved, body)
+        message = "" if surface.curved else one.slides(given) or one.tips()
+        if not message and not given:
+            message = one.spins()
+        if message:
+            return message
     return ""
 
 

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The study of [dSFMH07, Section 3]: six cycles of cases A, B and C, all figures on one page.
 
 Every step is kept; a study that was stopped continues where it was, and one with other numbers

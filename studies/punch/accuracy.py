@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The punch to an accuracy that is asked for: bricks of 27 nodes on a quarter of it, graded and curved, refined until two
 differences are small.
 

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Pictures of the contact disc on the mesh's own faces: no interpolation that invents zones."""
 
 from typing import NamedTuple

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Stick and slip of the first unloading: the paper's mesh beside a converged one, at the instants of the study's page.
 
 ``python -m studies.punch.converged_maps PICTURE TABLE`` draws them for A, B, C (PNG of 64 colours), and writes the shares of the area that

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """How good the estimate of the discretisation's error is on the punch: first against second order, of cells as in the paper.
 
 ``python -m studies.punch.effectivity FILE`` appends a line of JSON for each case and mesh: true and estimated relative errors and

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Figures of the study, each as SVG and PNG, with the data behind it as CSV."""
 
 import csv

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The six cycles of the study on finer meshes: work of friction of each cycle, and where nodes stick at its ends.
 
 ``python -m studies.punch.fine FILE`` writes a table (CSV): the paper's mesh, and graded ones of second and first order, with the

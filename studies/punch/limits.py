@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Where the error of the punch sits: one cycle on a quarter of it, with one thing changed at a time.
 
 ``python -m studies.punch.limits FILE`` makes the runs of ``PLAN`` that the table FILE (CSV) does not have, and appends a row each.

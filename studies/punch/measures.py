@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Measures of a run: stick zones, reverse slip, plateaus, force-slip curves, work of friction."""
 
 from typing import NamedTuple

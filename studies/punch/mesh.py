@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The paper's cylindrical punch as an O-grid of hexahedra, built by gmsh.
 
 Seen from below, a square core of ``divisions`` x ``divisions`` quadrilaterals and four blocks of

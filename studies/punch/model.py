@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """An elastic cylinder pressed cyclically on a rigid plane with orthotropic friction; units: mm, N, MPa.
 
 A steel punch of radius and height 10 mm stands on a plane; its top face goes 0.1 mm down in five increments and up

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Runs of the punch for the study: kept on disk step by step, continued where they stopped.
 
 A run has a directory with ``run.json`` (what it is), ``history.csv`` (totals, energies and tracked nodes, one row a

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What the paper says of its figures, as questions to the data of a run.
 
 A statement is decided by a number and a bound; both are in the table, for every case and every

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Work of friction in the study: energy balance, cycles, wear, convergence; figures and tables."""
 
 import numpy as np

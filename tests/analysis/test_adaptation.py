@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Cells divided where the error is: as accurate as asked for, at the punch's edges, with fewer cells than divided everywhere."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

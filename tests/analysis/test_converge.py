@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Refining until a number is accurate: sequences of known order, then the force of Hertz's ball against its closed form."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Wear over many cycles: jumps against cycles simulated one by one and closed forms; killed runs, ranks, and what is refused."""
 
 import json

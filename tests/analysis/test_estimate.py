@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The estimate of the discretisation's error against closed forms: even stress, a column under its weight, Hertz, partial slip."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Bodies as users bring them: rings, nearly incompressible rubber, misfit, two bodies in a mesh, hysteresis, forms that are NaN."""
 
 import nonlinear_scenes as scenes

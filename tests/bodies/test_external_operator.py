@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Materials in NumPy as operators of dolfinx-external-operator: what the same materials in UFL give."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Internal variables: plasticity and viscoelasticity against closed forms, and what a failed step leaves."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Mixed spaces: contact on the displacements, pressures beside them."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Nonlinear bodies in contact: closed forms, exact balances, quadratic convergence, refusals."""
 
 import nonlinear_scenes as scenes

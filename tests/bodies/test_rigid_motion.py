@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A body, or a part of it, that nothing holds is refused; one that something holds is not."""
 
 from contextlib import suppress

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Bodies on submeshes, and forms with Functions on submeshes of theirs: entity maps."""
 
 from inspect import signature

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A flat punch on a plastic half-plane (demos/demo_indentation.py) against Newton's method with the punch as boundary values."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

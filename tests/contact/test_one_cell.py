@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Meshes of one cell, whose stiffness is a full matrix."""
 
 import os

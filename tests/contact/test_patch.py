@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Contact patch tests: an even stress is found exactly on every cell, first and second order, by both solvers."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Elements of second order and prisms: nodal areas, refusals, Hertz, supports, checkpoints, output; patch tests are in test_patch.py."""
 
 from types import SimpleNamespace

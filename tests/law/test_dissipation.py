@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Work of friction: never negative, exact for rigid sliding, and how it converges in the increments."""
 
 import warnings

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Perfectly rough contact, mu = inf, and coefficients beside which rounding of slips is large."""
 
 import numpy as np

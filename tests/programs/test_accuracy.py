@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The punch to an accuracy that is asked for: its curved and graded mesh, the disc that is drawn, the estimate, the command."""
 
 import json

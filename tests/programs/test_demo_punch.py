@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The punch: its mesh, the demo's functions, and the paper's programme against reference values."""
 
 import json

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Every demo that is a text notebook runs, on any number of ranks, and what it asserts holds."""
 
 import importlib

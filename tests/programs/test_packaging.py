@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What the package promises before it computes anything, and what tools/probe.py refuses."""
 
 import ast

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Programs of the punch that take long, on tiny meshes: they start, and their numbers are those of other programs."""
 
 import csv

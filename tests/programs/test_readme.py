@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """README and docs: short, their scripts run as pasted, their links lead somewhere."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What programs keep to: short functions, no path of their own making, no import circle, few interfaces."""
 
 import ast
@@ -182,6 +184,17 @@ def test_constants_have_two_words():
             names = [e.id for of in targets for e in ast.walk(of) if isinstance(e, ast.Name)]
             short += [f"{name(file)}.{n}" for n in names if n.isupper() and "_" not in n.strip("_")]
     assert not short
+
+
+def test_sources_name_their_licence():
+    """Every source of kernel, package, tests and benchmarks has its licence on top; demos begin with the text that the site shows."""
+    folders = ("cpp", "dolfinx_contact", "tests", "benchmarks", "mechanics", "studies")
+    found = [
+        f for of in folders for end in ("py", "h", "cpp") for f in (ROOT / of).rglob(f"*.{end}")
+    ]
+    assert len(found) > 300
+    head = "SPDX-License-Identifier: MIT"
+    assert not [str(file) for file in found if head not in file.read_text()[:200]]
 
 
 def test_the_repository_is_light():

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The study of the punch: what it writes, its energy balance, its measures, and that it resumes."""
 
 import csv

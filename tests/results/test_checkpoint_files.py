@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Files of checkpoints: what is broken, cut or made by hand is refused, and the state stays what it was."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What a run leaves behind: dissipation, worn depth, tables, checkpoints."""
 
 import os

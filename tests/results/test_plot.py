@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """``dc.plot`` and ``dc.profile``: what a picture shows, and values along a row of points."""
 
 from ctypes.util import find_library

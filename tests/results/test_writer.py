@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Files of ``dc.Writer``: whoever reads them finds each node once, every value at its node, and sums that are the contact's."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Whole cycles of the paper's punch on fine meshes: every step is solved, not only the first ones."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The fixed point with one multigrid cycle per iteration: the same on any number of ranks, however they share."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Multigrid for the stiffness plus springs: every level is the Galerkin product, smoothers are the body's own."""
 
 import numpy as np

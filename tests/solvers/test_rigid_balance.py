@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A body on soft springs: its rigid motions are balanced apart, and the fixed point solves it."""
 
 import numpy as np

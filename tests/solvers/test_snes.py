@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """PETSc's SNES on body and contact together: the answers of SparseNewton, options, failures."""
 
 import numpy as np

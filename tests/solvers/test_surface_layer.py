@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The linearised contact near the plane: its Jacobian, its block, and what it is for."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """A symmetric matrix by its lower half: the same products and sweeps as PETSc's, whoever owns what; others are told apart."""
 
 import numpy as np

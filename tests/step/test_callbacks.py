@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Functions of the user: what one rank raises all raise, and what makes no sense is refused."""
 
 import os

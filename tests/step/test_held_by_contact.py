@@ -308,7 +308,7 @@ def test_whether_loads_can_be_held_is_what_a_linear_programme_says():
         rays = np.array([[s * 0.4, 1.0, (p - 0.5) + 0.4 * s * 0.4] for p in x[:, 0] for s in (-1, 1)]).T  # fmt: skip
         target = -np.array([0.8 * side, -0.8, arm])
         found = optimize.linprog(np.ones(rays.shape[1]), A_eq=rays, b_eq=target)
-        said = Statics(step, np.zeros(body.size)).said
+        said = Statics(step, np.zeros(body.size)).message
         assert (said == "") == (found.status == 0)
         seen.add(found.status)
     assert seen == {0, 2}
@@ -323,7 +323,7 @@ def test_friction_at_its_limit_is_decided_in_every_direction():
         for part in (1 - 1e-7, 1 - 1e-3, 1 + 1e-3, 1 + 1e-5):
             scene.force.value[:] = 0.3 * part * along - scene.up
             step, body = scene.problem.load_step(), scene.problem.body
-            said = Statics(step, np.zeros(body.size)).said
+            said = Statics(step, np.zeros(body.size)).message
             assert (said == "") == (part < 1)
             assert part < 1 or "a translation along" in said
 

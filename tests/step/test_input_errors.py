@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Every mistake of a user is a ValueError that says what is wrong, raised by all ranks together.
 
 A test that hangs here means that one rank raised and another waits for it.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Load steps before the judge, which shares neither law nor error nor solver with the package; and the error as documented."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What a scene does not need it does not meet: a plain step knows nothing of forces that drive surfaces, shared nodes and the like."""
 
 import subprocess

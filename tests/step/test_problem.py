@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Contact problems against what mechanics says of them: closed forms, symmetries, units, limits."""
 
 from pathlib import Path

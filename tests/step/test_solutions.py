@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Both solvers come to the same answer where there is one, and a step with several solutions has several."""
 
 import numpy as np

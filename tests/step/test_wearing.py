@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Wear as part of a step's equations: whatever the coefficient, by any solver."""
 
 import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs

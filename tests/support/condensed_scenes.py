@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Errors of condensed answers as the documentation defines them, in long double, with a projection of their own.
 
 Everything here is NumPy alone, written from the paper; of the package nothing is imported.

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Blocks in Taylor-Hood's mixed form, displacement and pressure, on planes."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Blocks of rubber on a plane, held by symmetry or at the top, and what theory says of uniform states."""
 
 from __future__ import annotations

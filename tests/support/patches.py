@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Blocks of every cell under an even stress on a plane, whose exact state is known: patch tests."""
 
 from types import SimpleNamespace

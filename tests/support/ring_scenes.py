@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Half a thick ring (x > 0) between two planes that come down from above and up from below."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The block of many tests, and what is read from its contact on all ranks."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Scenes in which node and surface go far within a step: a slab held at its head, and a ring on a shaft."""
 
 from inspect import signature

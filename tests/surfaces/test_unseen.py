@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """What contact at nodes cannot see is told, once, and where it does not matter nothing is said."""
 
 import re

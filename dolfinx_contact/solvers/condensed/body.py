@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 # Iterations for a loose body that seems to slide away, and for any other.
-FEW_ITERATIONS, MANY_ITERATIONS = 3000, 6000
+FEW_ITERATIONS = 3000
+MANY_ITERATIONS = 6000
 
 # Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
 RIGID_COMPLIANCE = 1e-9
@@ -111,7 +112,7 @@ class BoundCondensedNewton(BoundSolver):
         nodes, anchored = self._rows(), self._anchor_rows()
         self._parts = [nodes, anchored]
         self.nodes, self._anchored = nodes.size // self.dim, anchored.size
-        normal = self.gather(np.concatenate([of.normal for of in stiffness]))
+        normal = self.gather(np.concatenate([nodal.normal for nodal in stiffness]))
         self._surfaces = self._condensed_surfaces(normal)
         driven = 0 if self._surfaces is None else self._surfaces.tied
         self._tied = anchored.size + driven

@@ -33,14 +33,21 @@ UNLIMITED_ITERATIONS = 200_000  # iterations; methods have limits of their own
 
 # Default iteration limit for arrays, which need not have a solution: ITERATION_WORK over the unknowns squared, at least FEWEST_ITERATIONS and PER_CONTACT, at most
 # MOST_ITERATIONS.  Random problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; a pile of 156 contacts needs 757.
-ITERATION_WORK, FEWEST_ITERATIONS, PER_CONTACT, MOST_ITERATIONS = 9e6, 600, 10, 7000
+ITERATION_WORK = 9e6
+FEWEST_ITERATIONS = 600
+PER_CONTACT = 10
+MOST_ITERATIONS = 7000
 
 # Iterations after which infeasibility is tested, and the number of contacts up to which that takes less than a second.
-FIRST_ITERATIONS, PROVABLE_CONTACTS = 100, 500
+FIRST_ITERATIONS = 100
+PROVABLE_CONTACTS = 500
 
 # If a smaller error is needed: tolerances relative to tol; the largest part of the next Newton step that may remain; the multiple of rounding
 # below which it is not tried; the unknowns up to which all methods search again.
-NEARER_TOLERANCES, LEAST_GAIN, NEAR_ROUNDING, ROUNDING_MULTIPLE = (1e-2, 1e-4), 0.1, 10, 100
+NEARER_TOLERANCES = (1e-2, 1e-4)
+LEAST_GAIN = 0.1
+NEAR_ROUNDING = 10
+ROUNDING_MULTIPLE = 100
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
 
 # Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
-MOST_STEPS, RESIDUAL_PART = 50, 1e-6
+MOST_STEPS = 50
+RESIDUAL_PART = 1e-6
 
 # Part of the stiffness against a motion that may be no more than what they leave.
 NOISE_PART = 1e-4

@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """Predictor and corrector as a fixed point of the displacement alone."""
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ RHO_FACTORS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 # much each time, since the same one would repeat the same iterations for ever. If a tangent has not reduced the error below USELESS_TANGENT times its
 # value by the time the next one is due, the iterations until then use none.
 # If the start has an error below NEAR_ERROR, as in a repeated step, most nodes have their status at once: a tangent then has to help at once.
-TANGENT_INTERVAL, LARGEST_GROWTH, USELESS_TANGENT, NEAR_ERROR = 20, 30.0, 0.9, 0.1
+TANGENT_INTERVAL = 20
+LARGEST_GROWTH = 30.0
+USELESS_TANGENT = 0.9
+NEAR_ERROR = 0.1
 
 # The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
 HALVING_ITERATIONS = 60
@@ -36,7 +41,8 @@ HALVING_ITERATIONS = 60
 # Further attempts: tangents every so many iterations, and where they begin: as the first one, or where half of the loads lead, or in the best
 # state, of which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no
 # solution nearby.
-FROM_START, HALF_WAY = "from the start", "half the way"
+FROM_START = "from the start"
+HALF_WAY = "half the way"
 FURTHER_ATTEMPTS = (
     (TANGENT_INTERVAL, FROM_START),
     (TANGENT_INTERVAL, HALF_WAY),
@@ -154,15 +160,15 @@ class BoundFixedPoint(BoundSolver):
         found = search.best, search.iterations, search.forward_error, SolverName.FIXED_POINT
         if not search.within and search.strayed is not None:
             found = search.strayed.judged, search.iterations, 0.0, SolverName.FIXED_POINT
-        said = []
+        message = []
         if not search.within and not _slides(search.best, tried=True):
             from dolfinx_contact.solvers.fixed_point.put_back import wrong
             from dolfinx_contact.step.stalled import stalled
 
-            said += stalled(step.body, step.contacts, search.statuses, wrong(search.best))
+            message += stalled(step.body, step.contacts, search.statuses, wrong(search.best))
         if len(attempts) > 1:
-            said.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
-        return SolverResult(*found, reason="; ".join(said))
+            message.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
+        return SolverResult(*found, reason="; ".join(message))
 
     def _attempts(
         self, search: Search, x: np.ndarray, c: np.ndarray

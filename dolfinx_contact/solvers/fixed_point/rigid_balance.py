@@ -28,13 +28,16 @@ STIFFENING_FACTOR = 200.0
 DEPENDENT_PART = 1e-10
 
 # Newton's method ends when the forces along the motions are this small beside those on all nodes.
-SMALL_RESIDUAL, NEWTON_STEPS = 1e-3, 20
+SMALL_RESIDUAL = 1e-3
+NEWTON_STEPS = 20
 
 # The shortest part of a step of it that is tried.
 SHORTEST_STEP = 2.0**-11
 
 # Part of the largest slope that is none; lengths that are tried along such a motion, and part of the forces that may be left.
-FREE_SLOPE, LENGTHS_TRIED, RESIDUAL_LEFT = 1e-9, 60, 0.9
+FREE_SLOPE = 1e-9
+LENGTHS_TRIED = 60
+RESIDUAL_LEFT = 0.9
 
 
 class RigidBalance:

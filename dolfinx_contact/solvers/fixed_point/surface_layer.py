@@ -1,3 +1,5 @@
+# Copyright (c) 2026 The dolfinx_contact authors
+# SPDX-License-Identifier: MIT
 """The contact tangent on the layers of nodes next to the plane: what a fixed preconditioner does not know."""
 
 from __future__ import annotations
@@ -114,12 +116,16 @@ class SurfaceLayer:
 
 def _near(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
     """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
-    of = body.displacements
-    gdim, nodes, near = of.dim, compat.cell_nodes(of.V), fem.Function(of.V)
+    displacements = body.displacements
+    gdim, nodes, near = (
+        displacements.dim,
+        compat.cell_nodes(displacements.V),
+        fem.Function(displacements.V),
+    )
     for one in points:
         touched = np.zeros(body.size)
         one.add_magnitudes(np.ones((one.count, one.dim)), touched)
-        rows = of.rows(touched).any(axis=1)
+        rows = displacements.rows(touched).any(axis=1)
         near.x.array[gdim * np.flatnonzero(rows)[:, None] + np.arange(gdim)] = 1.0
     for _ in range(ELEMENT_LAYERS - 1):
         near.x.scatter_forward()
@@ -127,6 +133,11 @@ def _near(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
         reached = nodes[marked[nodes].any(axis=1)]
         near.x.array[(gdim * reached[:, :, None] + np.arange(gdim)).ravel()] = 1.0
         compat.add_to_owners(near.x)
-    free = of.vectors(near.x.array[: gdim * of.count].reshape(of.count, gdim, 1))[:, 0] > 0.0
+    free = (
+        displacements.vectors(
+            near.x.array[: gdim * displacements.count].reshape(displacements.count, gdim, 1)
+        )[:, 0]
+        > 0.0
+    )
     free[body.fixed] = False
     return np.flatnonzero(free)

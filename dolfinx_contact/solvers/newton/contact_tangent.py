@@ -98,7 +98,9 @@ class ContactTangent:
             any_values = np.random.default_rng(0).uniform(
                 1.0, 2.0, self._points[0].frames.shape[1:]
             )
-            some = [(np.tile(any_values, (of.count, 1, 1)),) * 2 for of in self._points]
+            some = [
+                (np.tile(any_values, (point_set.count, 1, 1)),) * 2 for point_set in self._points
+            ]
             change = change_of(self._body.K, responses(self._body.K, self._points, some))
             change.scale(0.0)
             A.axpy(1.0, change, how)
@@ -135,7 +137,7 @@ def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> P
         both: ``responses``, or such parts of them as belong to ``K``.
         free: PETSc vector, one at free degrees of freedom, zero at others; None where all are free.
     """
-    P, Q = (of if isinstance(of, PETSc.Mat) else like(K, of) for of in both)
+    P, Q = (given if isinstance(given, PETSc.Mat) else like(K, given) for given in both)
     if free is not None:
         P.diagonalScale(free, free)
         Q.diagonalScale(free, free)

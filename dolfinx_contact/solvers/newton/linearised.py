@@ -20,10 +20,13 @@ from dolfinx_contact.support.line_search import halves
 
 # Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
 # largest of the last ERRORS_BEFORE ones.
-MOST_STEPS, SHORTEST_STEP, ERRORS_BEFORE = 30, 2.0**-6, 3
+MOST_STEPS = 30
+SHORTEST_STEP = 2.0**-6
+ERRORS_BEFORE = 3
 
 # Tolerance of a linearised step: at most ROUGH_TOLERANCE, else this part of what is left after it, were errors to fall as squares.
-ROUGH_TOLERANCE, TOLERANCE_PART = 1e-3, 0.1
+ROUGH_TOLERANCE = 1e-3
+TOLERANCE_PART = 0.1
 
 
 class Linearised(Solver):
@@ -88,9 +91,9 @@ class BoundLinearised(BoundSolver):
             if now.within(step.tol) and (forward <= step.tol or now.within(0.0)):
                 break
         solver = used[-1] if used else type(self._solver).__name__
-        said = f"linearised {len(used)} times"
+        message = f"linearised {len(used)} times"
         start = own[-1] if own else None
-        return SolverResult(best, iterations, forward, solver, reason=said, start=start)
+        return SolverResult(best, iterations, forward, solver, reason=message, start=start)
 
     def _linear_step(
         self, step: LoadStep, state: StepState, error: float, starts: Sequence[Any]

@@ -77,8 +77,8 @@ class BoundSNES(OnTangent):
         search = Search(step, state, math.inf)
         search.begin(search.best, MOST_ITERATIONS)
         kappa = [contact.stiffness.normal for contact in step.contacts]
-        maps = [ReturnMap(NORMAL_FACTOR * of, of) for of in kappa]
-        said = "converged at its start"
+        maps = [ReturnMap(NORMAL_FACTOR * rho, rho) for rho in kappa]
+        message = "converged at its start"
         with np.errstate(all="ignore"):  # a trial may turn elements inside out
             state = step.evaluate(state.x, maps, before=state.as_start)
             if step.held(state.x):
@@ -86,11 +86,11 @@ class BoundSNES(OnTangent):
             if not search.over:
                 try:
                     state = self._supports_moved(step, state, maps, search, stands=start is None)
-                    said = self._iterate(_Equations(self._tangent, maps, search, state), state.x)
+                    message = self._iterate(_Equations(self._tangent, maps, search, state), state.x)
                 except LinearSolverError as failure:
-                    said = str(failure)
+                    message = str(failure)
         return SolverResult(
-            search.best, search.iterations, search.forward_error, SolverName.SNES, reason=said
+            search.best, search.iterations, search.forward_error, SolverName.SNES, reason=message
         )
 
     def _supports_moved(

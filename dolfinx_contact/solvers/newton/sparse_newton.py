@@ -27,14 +27,18 @@ if TYPE_CHECKING:
 SOLVER_NAME = "SparseNewton"
 
 # Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT_STEP.
-NORMAL_FACTOR, TANGENTIAL_FACTORS, SHORT_STEP = 10.0, (1.0, 0.3, 0.1), 0.1
+NORMAL_FACTOR = 10.0
+TANGENTIAL_FACTORS = (1.0, 0.3, 0.1)
+SHORT_STEP = 0.1
 
 # Of the parameter along the normal: with so little predictors are the reactions that the body asks for.
 TINY_FACTOR = 1e-12
 
 # Of a step is taken the largest half, quarter, ... after which the residual is smaller than the largest of the last
 # RESIDUALS_BEFORE ones; below SHORTEST_STEP there is none. Iterations in which the smallest error has to halve.
-RESIDUALS_BEFORE, SHORTEST_STEP, HALVING_ITERATIONS = 5, 2.0**-9, 12
+RESIDUALS_BEFORE = 5
+SHORTEST_STEP = 2.0**-9
+HALVING_ITERATIONS = 12
 
 
 @dataclass(frozen=True)
