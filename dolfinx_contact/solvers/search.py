@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 # Iterations from which the convergence rate is estimated.
 RATE_WINDOW = 3
 
-# Iterates whose statuses are kept.
-KEPT_ITERATES = 50
+# Iterates in which it is counted how many nodes change their status.
+COUNTED_ITERATES = 50
 
 
 class Search:
@@ -37,7 +37,6 @@ class Search:
         iterations: Iterations so far.
         left: Iterations left in the present attempt.
         over: Whether the step is solved, or time has run out.
-        statuses: Statuses of each contact in the last states.
         strayed: A state without forces of a loose body that was pressed: another one may be the answer; None if none was met.
     """
 
@@ -49,7 +48,8 @@ class Search:
         self._rank = self._attempt = (True, np.inf)
         self._errors: deque[float] = deque(maxlen=RATE_WINDOW + 1)
         self.iterations = self.left = 0
-        self.statuses: deque[list[np.ndarray]] = deque(maxlen=KEPT_ITERATES)
+        self._states, self._status = 0, np.zeros(0, dtype=np.uint8)
+        self._changed_in = np.zeros(0, dtype=int)  # in which state each node has last changed
         self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
@@ -85,7 +85,7 @@ class Search:
         self.step.tell(state)
         self.error = errors.largest
         self._errors.append(errors.balance)
-        self.statuses.append([nodes.status for nodes in state.nodes])
+        self._count_changes(state)
         change = errors.change * self._contraction()
         within = self.error <= tol  # then the forward error counts, too
         rank = (not within, max(self.error, change) if within else self.error)
@@ -105,6 +105,22 @@ class Search:
             self.strayed, self._lost, rounded = state, True, False
         self.over = bool(solved or rounded or self._late())
         return state
+
+    def _count_changes(self, state: StepState) -> None:
+        """Take note of nodes whose status is another one than in the last state."""
+        status = np.concatenate([np.zeros(0, np.uint8), *(nodes.status for nodes in state.nodes)])
+        if self._states == 0:
+            self._status, self._changed_in = status, np.zeros(status.size, dtype=int)
+        self._states += 1
+        self._changed_in[status != self._status] = self._states
+        self._status = status
+
+    @property
+    def changes(self) -> tuple[int, int]:
+        """How many nodes of this rank have changed their status in the last states, and in how many of these."""
+        counted = min(self._states, COUNTED_ITERATES)
+        first = self._states - counted + 1  # the first one has nothing before it
+        return int(np.count_nonzero(self._changed_in > first)), counted
 
     def _contraction(self) -> float:
         """Ratio of the remaining error to the last change, if convergence continues at its present rate."""

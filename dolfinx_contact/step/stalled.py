@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +32,7 @@ MANY_ITERATIONS = 60
 def stalled(
     body: ElasticBody,
     contacts: Sequence[ContactStep],
-    statuses: Iterable[Sequence[np.ndarray]],
+    changes: tuple[int, int],
     wrong: Sequence[np.ndarray],
 ) -> list[str]:
     """At how many nodes the law is not met, where most, how many have changed status in the last states, and what may help.  Collective.
@@ -40,13 +40,11 @@ def stalled(
     Args:
         body: The body.
         contacts: Its contacts.
-        statuses: Of each contact in each of these states, ``shape=(n,)``.
+        changes: Nodes of this rank that have changed their status, and in how many states, see ``Search``.
         wrong: Forces by which the nodes of each miss the law, ``shape=(n,)``.
     """
-    every = np.array([np.concatenate(one) for one in statuses])
-    changed = np.count_nonzero((every[1:] != every[:-1]).any(axis=0))
-    changed, nodes = body.total(np.array([changed, every.shape[1]])).astype(int)
     x, amount = np.concatenate([contact.x for contact in contacts]), np.concatenate(wrong)
+    changed, nodes = body.total(np.array([changes[0], amount.size])).astype(int)
     largest = int(amount.argmax()) if amount.size else None
     mine = (amount, 0.0, "") if largest is None else (amount, amount[largest], place(x, largest))
     found = body.comm.allgather(mine)
@@ -55,7 +53,7 @@ def stalled(
     where = max(found, key=lambda one: one[1])[2]
     message = [
         f"the law is not met at {few} of {nodes} contact nodes, least at {where}",
-        f"{changed} have changed their status in the last {len(every)} states",
+        f"{changed} have changed their status in the last {changes[1]} states",
     ]
     return message + tall(body, contacts) if changed > MANY_CHANGE * nodes else message
 

@@ -165,7 +165,7 @@ class BoundFixedPoint(BoundSolver):
             from dolfinx_contact.solvers.fixed_point.put_back import wrong
             from dolfinx_contact.step.stalled import stalled
 
-            message += stalled(step.body, step.contacts, search.statuses, wrong(search.best))
+            message += stalled(step.body, step.contacts, search.changes, wrong(search.best))
         if len(attempts) > 1:
             message.append(f"attempts, begun after so many iterations: {', '.join(attempts)}")
         return SolverResult(*found, reason="; ".join(message))
