@@ -70,7 +70,9 @@ def unloaded(problem: ContactProblem) -> Accepted:
     zero = np.zeros(problem.body.size)
     histories = tuple(contact.history for contact in problem.contacts)
     values = problem.internal.values() if problem.internal else ()
-    return Accepted(zero, zero, histories, poses_of(problem.contacts), None, values, (), problem.number)  # fmt: skip
+    return Accepted(
+        zero, zero, histories, poses_of(problem.contacts), None, values, (), problem.number
+    )
 
 
 def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
@@ -84,7 +86,7 @@ def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
     values = problem.internal.values() if problem.internal else ()
     starts = before.starts if found.start is None else (*before.starts, found.start)[-KEPT_STARTS:]
     poses, free_state = poses_of(problem.contacts), problem.body.last_free_state
-    return Accepted(state.x, before.x, histories, poses, free_state, values, starts, problem.number)  # fmt: skip
+    return Accepted(state.x, before.x, histories, poses, free_state, values, starts, problem.number)
 
 
 def show(problem: ContactProblem, accepted: Accepted) -> Accepted:

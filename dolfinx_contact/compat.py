@@ -81,9 +81,13 @@ def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int | None = None) -> 
     with raised_together(comm):
         dim = model.getDimension() if comm.rank == rank else gdim
         if comm.rank == rank and dim < 1:
-            raise ValueError("the gmsh model is empty: gmsh.open does not say that its file is missing; or make bodies, and occ.synchronize().")  # fmt: skip
+            raise ValueError(
+                "the gmsh model is empty: gmsh.open does not say that its file is missing; or make bodies, and occ.synchronize()."
+            )
         if comm.rank == rank and not model.getPhysicalGroups(dim):
-            raise ValueError(f"the gmsh model has no physical group of dimension {dim}, its cells: model.addPhysicalGroup({dim}, bodies).")  # fmt: skip
+            raise ValueError(
+                f"the gmsh model has no physical group of dimension {dim}, its cells: model.addPhysicalGroup({dim}, bodies)."
+            )
     if gdim is None:
         gdim = comm.bcast(dim, root=rank)
     try:
@@ -234,7 +238,12 @@ def set_bc_values(array: np.ndarray, bcs: Iterable[Any]) -> None:
             fem.set_bc(array, [bc])
 
 
-def compiled(form: Any, form_compiler_options: dict | None = None, jit_options: dict | None = None, entity_maps: Any = None) -> Any:  # fmt: skip
+def compiled(
+    form: Any,
+    form_compiler_options: dict | None = None,
+    jit_options: dict | None = None,
+    entity_maps: Any = None,
+) -> Any:
     """A compiled form, ``fem.form``, whose Functions may live on several meshes since DOLFINx 0.9.
 
     Args:
@@ -246,7 +255,10 @@ def compiled(form: Any, form_compiler_options: dict | None = None, jit_options: 
     known = signature(fem.form).parameters
     now = "options" if "jit_options" in known else "params"
     # Copies: 0.5 writes into them, into its own defaults, too.
-    options = {f"form_compiler_{now}": dict(form_compiler_options or {}), f"jit_{now}": dict(jit_options or {})}  # fmt: skip
+    options = {
+        f"form_compiler_{now}": dict(form_compiler_options or {}),
+        f"jit_{now}": dict(jit_options or {}),
+    }
     if entity_maps is None:
         return fem.form(form, **options)
     if "entity_maps" not in known:

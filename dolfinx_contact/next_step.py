@@ -154,7 +154,7 @@ def _predicted(problem: ContactProblem, last: Accepted, b: np.ndarray) -> np.nda
     None where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts.
     """
     body = problem.body
-    sliding = [c for c in problem.contacts if c.geometry.renews_rows and not c.history.empty]  # fmt: skip
+    sliding = [c for c in problem.contacts if c.geometry.renews_rows and not c.history.empty]
     if not sliding or body.nonlinear or body.loose is not None:
         return None
     known = last.free_state

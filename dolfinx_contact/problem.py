@@ -32,6 +32,7 @@ from dolfinx_contact.problem_input import (
     check_weights,
     checked_conditions,
     checked_contacts,
+    checked_form_options,
     checked_internal,
     checked_lagged,
     checked_options,
@@ -140,16 +141,7 @@ class ContactProblem(Guarded):
         lagged=checked_lagged,
         checks=checked_checks,
     )
-    _settable = (
-        "bcs",
-        "monitor",
-        "solver",
-        "tol",
-        "undetermined",
-        "geometry_tol",
-        "lagged",
-        "checks",
-    )
+    _settable = ("bcs", "monitor", *_checked)
     _remedy = "bcs, monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
@@ -180,20 +172,22 @@ class ContactProblem(Guarded):
             self.solver, self.tol = solver, tol
             self.undetermined, self.geometry_tol = undetermined, geometry_tol
             petsc_options = checked_options("petsc_options", petsc_options)
-            form_options = dict(
-                form_compiler_options=checked_options(
-                    "form_compiler_options", form_compiler_options
-                ),
-                jit_options=checked_options("jit_options", jit_options),
-                entity_maps=entity_maps,
-            )
+            options = checked_form_options(form_compiler_options, jit_options, entity_maps)
             self.internal = checked_internal(internal)
-        agree(comm, contacts=len(self.contacts), bcs=len(bcs), petsc_options=petsc_options, petsc_options_prefix=petsc_options_prefix, entity_maps=entity_maps is not None)  # fmt: skip
+        agree(
+            comm,
+            contacts=len(self.contacts),
+            bcs=len(bcs),
+            petsc_options=petsc_options,
+            petsc_options_prefix=petsc_options_prefix,
+            entity_maps=entity_maps is not None,
+        )
         self.u, self.monitor, self.lagged = u, None, ()
         self._agree(comm)
         displacements = self.contacts[0].displacements if self.contacts else None
         before = None if internal is None else internal.before_residual
-        self.body = body_of(F, u, bcs, J, petsc_options, petsc_options_prefix, before, displacements, form_options)  # fmt: skip
+        given = J, petsc_options, petsc_options_prefix, before, displacements, options
+        self.body = body_of(F, u, bcs, *given)
         hold(self.contacts, self.body)
         self.body.crowded = crowded(self.solver, self.body, self.contacts)
         check_surfaces(self.contacts, self.body)
@@ -208,7 +202,8 @@ class ContactProblem(Guarded):
 
     def __repr__(self) -> str:
         nodes = ", ".join(f"{contact.nodes.size}" for contact in self.contacts) or "no"
-        unknowns = self.u.function_space.dofmap.index_map.size_global * self.u.function_space.dofmap.index_map_bs  # fmt: skip
+        dofmap = self.u.function_space.dofmap
+        unknowns = dofmap.index_map.size_global * dofmap.index_map_bs
         return f"<ContactProblem of {unknowns} unknowns, {nodes} contact nodes on this rank, solver={self.solver!r}, tol={self.tol:g}>"
 
     @property
@@ -463,7 +458,15 @@ class ContactProblem(Guarded):
 
     def _agree(self, comm: MPI.Comm) -> None:
         """Raise a ``ValueError`` on all ranks if what may change between steps differs between them.  Collective."""
-        agree(comm, solver=self.solver, tol=self.tol, undetermined=self.undetermined, geometry_tol=self.geometry_tol, lagged=len(self.lagged), monitor=self.monitor is not None)  # fmt: skip
+        agree(
+            comm,
+            solver=self.solver,
+            tol=self.tol,
+            undetermined=self.undetermined,
+            geometry_tol=self.geometry_tol,
+            lagged=len(self.lagged),
+            monitor=self.monitor is not None,
+        )
 
     def _log(self, line: Callable[[], str]) -> None:
         if self.body.comm.rank == 0 and logger.isEnabledFor(logging.INFO):

@@ -249,6 +249,13 @@ def checked_options(name: str, options: Any) -> dict | None:
     return options
 
 
+def checked_form_options(form_compiler_options: Any, jit_options: Any, entity_maps: Any) -> dict:
+    """What forms are compiled with, see ``compat.compiled``."""
+    compiler = checked_options("form_compiler_options", form_compiler_options)
+    jit = checked_options("jit_options", jit_options)
+    return dict(form_compiler_options=compiler, jit_options=jit, entity_maps=entity_maps)
+
+
 def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: float = 0) -> None:
     """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.  Collective.
 
@@ -405,7 +412,10 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
             np.argmax(x)
         )  # moduli may be among the factors of F, but hardly make exactly 2 pi
         turns = [factor * x[far] / weight[far] for _, factor in which]
-        if np.isclose(turns, 2 * np.pi, rtol=1e-9).any() or np.isclose(turns, 0.5 / np.pi, rtol=1e-9).any():  # fmt: skip
+        if (
+            np.isclose(turns, 2 * np.pi, rtol=1e-9).any()
+            or np.isclose(turns, 0.5 / np.pi, rtol=1e-9).any()
+        ):
             warnings.warn(
                 "F and the weight of a contact are multiplied by the radius, but only one of them by 2 pi: pressures and worn depths are "
                 "wrong by this factor. Give dc.Contact(..., weight=...) the factor that F has.",

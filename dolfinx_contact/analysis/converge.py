@@ -159,7 +159,9 @@ def _checked(compute: object, accuracy: Any, meshes: Any, halvings: Any) -> floa
     try:
         sizes = dict.fromkeys(meshes)
     except TypeError:
-        raise ValueError(f"meshes must be numbers, names, tuples or meshes, not lists or arrays, got {meshes!r}.") from None  # fmt: skip
+        raise ValueError(
+            f"meshes must be numbers, names, tuples or meshes, not lists or arrays, got {meshes!r}."
+        ) from None
     if all(isinstance(mesh, Real) for mesh in meshes):
         rises = np.diff(np.array(meshes, dtype=float))
         finer = (rises > 0).all() or (rises < 0).all()
@@ -169,7 +171,9 @@ def _checked(compute: object, accuracy: Any, meshes: Any, halvings: Any) -> floa
     else:
         finer = len(sizes) == len(meshes)
     if not finer:
-        raise ValueError(f"meshes must be from the coarsest to the finest, each finer than the one before, got {meshes!r}.")  # fmt: skip
+        raise ValueError(
+            f"meshes must be from the coarsest to the finest, each finer than the one before, got {meshes!r}."
+        )
     return accuracy
 
 

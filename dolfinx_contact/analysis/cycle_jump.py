@@ -133,21 +133,42 @@ def cycle_jump(
         >>> dc.cycle_jump(problem, cycle, 4).table[-1]["cycle"]
         4
     """
+    given = _begun(problem, cycle, cycles, accuracy, longest, max_cycles, path, monitor)
+    return _jump_on(*given, monitor).found()
+
+
+def _begun(
+    problem: ContactProblem,
+    cycle: Any,
+    cycles: Any,
+    accuracy: Any,
+    longest: Any,
+    max_cycles: Any,
+    path: Any,
+    monitor: Any,
+) -> tuple:
+    """The run as it begins or goes on, the numbers of cycles, and the folder, from checked arguments of ``cycle_jump``.  Collective."""
     comm = a_problem(problem).body.comm
     with raised_together(comm):
-        cycles, max_cycles = (int(positive(name, count, whole=True)) for name, count in (("cycles", cycles), ("max_cycles", max_cycles)))  # fmt: skip
-        accuracy, longest = positive("accuracy", accuracy, finite=True), positive("longest", longest)  # fmt: skip
+        cycles = int(positive("cycles", cycles, whole=True))
+        max_cycles = int(positive("max_cycles", max_cycles, whole=True))
+        accuracy, longest = (
+            positive("accuracy", accuracy, finite=True),
+            positive("longest", longest),
+        )
         _check(problem, cycle, monitor)
-    agree(comm, cycles=cycles, accuracy=accuracy, longest=longest, max_cycles=max_cycles, path=None if path is None else str(path))  # fmt: skip
-    run = _Run(problem, cycle, accuracy, longest)
-    folder = None if path is None else _Folder(path, run)
-    if folder is not None:
+    numbers = dict(cycles=cycles, accuracy=accuracy, longest=longest, max_cycles=max_cycles)
+    agree(comm, **numbers, path=None if path is None else str(path))
+    run, folder = _Run(problem, cycle, accuracy, longest), None
+    if path is not None:
+        folder = _Folder(path, run)
         folder.read(cycles)
-    _jump_on(run, cycles, max_cycles, folder, monitor)
-    return run.found()
+    return run, cycles, max_cycles, folder
 
 
-def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None) -> None:  # fmt: skip
+def _jump_on(
+    run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None
+) -> _Run:
     """Jump until all cycles are done, or ``most`` are simulated; whatever happens the problem is at the end of the last jump.  Collective."""
     comm = run.problem.body.comm
     begun = run.record["simulated"]
@@ -165,6 +186,7 @@ def _jump_on(run: _Run, cycles: int, most: int, folder: _Folder | None, monitor:
                 shown(run.record["done"])
         finally:
             run.show()
+    return run
 
 
 def _check(problem: Any, cycle: object, monitor: object) -> None:
@@ -201,16 +223,27 @@ class _Run:
         self.problem, self._cycle = problem, cycle
         self._accuracy, self._longest = accuracy, longest
         self._worn = [contact for contact in problem.contacts if contact.wear is not None]
-        self._area = np.concatenate([area for c in self._worn for area in (c.whole_area, c.opposite_area)])  # fmt: skip
+        self._area = np.concatenate(
+            [area for c in self._worn for area in (c.whole_area, c.opposite_area)]
+        )
         self.end = self.coarse = self.present()
-        self.record: dict[str, Any] = {"done": 0, "simulated": 0, "rejected": 0, "next": float(SHORTEST_JUMP), "table": [], "measured": [0] + 3 * [np.inf]}  # fmt: skip
+        self.record: dict[str, Any] = {
+            "done": 0,
+            "simulated": 0,
+            "rejected": 0,
+            "next": float(SHORTEST_JUMP),
+            "table": [],
+            "measured": [0] + 3 * [np.inf],
+        }
 
     def present(self) -> _State:
         """The present state."""
         depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
         sums = [_sums(contact) for contact in self.problem.contacts]
         friction = [rows(c.friction, c.nodes.size)[:, :4] for c in self.problem.contacts]
-        return _State(self.problem.snapshot(), np.concatenate(depths), sums, np.concatenate(friction))  # fmt: skip
+        return _State(
+            self.problem.snapshot(), np.concatenate(depths), sums, np.concatenate(friction)
+        )
 
     def show(self) -> None:
         """Put the problem into the state after the last jump."""
@@ -220,12 +253,25 @@ class _Run:
     def found(self) -> CycleJump:
         table, record, errors = self.table, self.record, self._errors()
         worn = table[-1]["volume"], table[-1]["depth"]
-        return CycleJump(record["done"], record["simulated"], len(table), record["rejected"], *worn, *errors, max(errors) <= self._accuracy, table)  # fmt: skip
+        return CycleJump(
+            record["done"],
+            record["simulated"],
+            len(table),
+            record["rejected"],
+            *worn,
+            *errors,
+            max(errors) <= self._accuracy,
+            table,
+        )
 
     def told(self, cycles: int, kept: bool) -> str:
         """Why it ends before so many cycles."""
         done, last = self.record["done"], self.table[-1]
-        on = "the same call goes on from there" if kept else f"another call goes on from there, with cycles={cycles - done}; path= keeps the state in a folder"  # fmt: skip
+        on = (
+            "the same call goes on from there"
+            if kept
+            else f"another call goes on from there, with cycles={cycles - done}; path= keeps the state in a folder"
+        )
         return f"cycle_jump has simulated max_cycles and is at cycle {done} of {cycles}, the last jump was of {last['jump']}. The problem is there, and {on}. A larger accuracy allows longer jumps, more steps in a cycle or a finer mesh often does."
 
     @property
@@ -269,7 +315,15 @@ class _Run:
             self._measure(fine, end, length)
         self.end, self.coarse = end, coarse or end
         self.record["done"] += length
-        self.table.append({"cycle": self.record["done"], "jump": length, "volume": volume, "depth": depth, "simulated": self.record["simulated"]})  # fmt: skip
+        self.table.append(
+            {
+                "cycle": self.record["done"],
+                "jump": length,
+                "volume": volume,
+                "depth": depth,
+                "simulated": self.record["simulated"],
+            }
+        )
         return self.table[-1]
 
     def _through(self, parts: list[int], must: bool = False) -> _State | None:
@@ -299,7 +353,15 @@ class _Run:
         more = _extrapolation(length, 1, 2)
         for contact, *sums in zip(self.problem.contacts, self.end.sums, coarse.sums, fine.sums):
             start, one, two = sums
-            _take_sums(contact, {name: np.maximum(two[name] + more * (two[name] - one[name]), start.get(name, 0.0)) for name in two})  # fmt: skip
+            _take_sums(
+                contact,
+                {
+                    name: np.maximum(
+                        two[name] + more * (two[name] - one[name]), start.get(name, 0.0)
+                    )
+                    for name in two
+                },
+            )
         self._count(0)
         try:
             self.problem.solve()
@@ -322,9 +384,13 @@ class _Run:
         body, area, last = self.problem.body, self._area, self.table[-1] if self.table else None
         worn, off = end.depth - self.end.depth, np.zeros_like(area)
         if last and fine is not coarse and coarse:
-            before = (self.end.depth - self.coarse.depth) / (1.0 + _extrapolation(last["jump"], 1, 2))  # fmt: skip
+            before = (self.end.depth - self.coarse.depth) / (
+                1.0 + _extrapolation(last["jump"], 1, 2)
+            )
             off = fine.depth - coarse.depth - (length / last["jump"]) ** 2 * before
-        volume, more, new = map(float, body.total([area @ depths for depths in (end.depth, worn, np.abs(off))]))  # fmt: skip
+        volume, more, new = map(
+            float, body.total([area @ depths for depths in (end.depth, worn, np.abs(off))])
+        )
         depth, deeper, most = (body.largest(np.abs(depths)) for depths in (end.depth, worn, off))
         local = max(
             _part(new, more + WORN_SHARE * volume), _part(most, deeper + WORN_SHARE * depth)
@@ -338,9 +404,16 @@ class _Run:
             return
         better = third.depth + _extrapolation(length, 2, 3) * (third.depth - fine.depth)
         off = 1.5 * (end.depth - np.maximum(better, self.end.depth))
-        volume, profile = map(float, self.problem.body.total([self._area @ off, self._area @ np.abs(off)]))  # fmt: skip
+        volume, profile = map(
+            float, self.problem.body.total([self._area @ off, self._area @ np.abs(off)])
+        )
         if profile > 0.0:
-            self.record["measured"] = [len(self.table), abs(volume), self.problem.body.largest(np.abs(off)), profile]  # fmt: skip
+            self.record["measured"] = [
+                len(self.table),
+                abs(volume),
+                self.problem.body.largest(np.abs(off)),
+                profile,
+            ]
 
     def _errors(self) -> list[float]:
         """Estimated errors of volume, depth and profile, relative, from those of the measured jump.
@@ -348,14 +421,25 @@ class _Run:
         Over what it wears, a jump is off by the square of its length.  Errors of the volume add up, and fall as the rate of wear does, since both
         obey the equation linearised; what is off in the shape beside that wears off in a jump.
         """
-        lengths, volumes = (np.array([row[name] for row in self.table], float) for name in ("jump", "volume"))  # fmt: skip
-        rates, cubes = np.diff(volumes, prepend=0.0) / lengths, lengths * (lengths - 1.0) * (lengths - 2.0)  # fmt: skip
+        lengths, volumes = (
+            np.array([row[name] for row in self.table], float) for name in ("jump", "volume")
+        )
+        rates, cubes = (
+            np.diff(volumes, prepend=0.0) / lengths,
+            lengths * (lengths - 1.0) * (lengths - 2.0),
+        )
         row, *made = self.record["measured"]
-        volume, depth, profile = (_part(a, self.table[-1][name]) for a, name in zip(made, ("volume", "depth", "volume")))  # fmt: skip
+        volume, depth, profile = (
+            _part(a, self.table[-1][name]) for a, name in zip(made, ("volume", "depth", "volume"))
+        )
         fall = min(1.0, _part(float(rates[-1]), float(rates[row])))
         total = _part(float(np.minimum(rates, rates[-1]) @ cubes), float(rates[row] * cubes[row]))
         added = (total - fall) * volume
-        return [total * volume, added + fall * depth, added + fall * profile] if total > 0.0 else [0.0] * 3  # fmt: skip
+        return (
+            [total * volume, added + fall * depth, added + fall * profile]
+            if total > 0.0
+            else [0.0] * 3
+        )
 
     def _changed(self, end: _State | None) -> float:
         """By how much mu or p have changed in a jump, over CHANGE of the largest."""
@@ -393,7 +477,10 @@ def _is_record(record: Any) -> bool:
     """Whether it is one that ``_Run`` has written; errors say that it is not, too."""
     counts = [record[name] for name in ("done", "simulated", "rejected")]
     at, *errors = record["measured"]
-    rows = [[row[name] for name in ("volume", "depth", "cycle", "jump", "simulated")] for row in record["table"]]  # fmt: skip
+    rows = [
+        [row[name] for name in ("volume", "depth", "cycle", "jump", "simulated")]
+        for row in record["table"]
+    ]
     whole = [*counts, at, *(number for row in rows for number in row[2:])]
     return (
         all(type(number) is int and number >= 0 for number in whole)

@@ -77,10 +77,12 @@ def _peak(problem: ContactProblem) -> float:
 
 ESTIMATED_QUANTITIES = {
     "normal_force": lambda problem: _sum(problem, lambda contact: contact.reaction[:, -1].sum()),
-    "tangential_force": lambda problem: _sum(problem, lambda contact: np.linalg.norm(contact.reaction[:, :-1], axis=1).sum()),
+    "tangential_force": lambda problem: _sum(
+        problem, lambda contact: np.linalg.norm(contact.reaction[:, :-1], axis=1).sum()
+    ),
     "dissipation": lambda problem: _sum(problem, lambda contact: contact.dissipation.sum()),
     "peak_pressure": _peak,
-}  # fmt: skip
+}
 
 
 def estimate(
@@ -223,8 +225,10 @@ def _check_pair(problem: ContactProblem, reference: ContactProblem) -> None:
             "reference must be another ContactProblem: the same body with a space of higher order or a finer mesh."
         )
     if len(reference.contacts) != len(problem.contacts):
-        raise ValueError(f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
-                         f"{len(reference.contacts)}.")  # fmt: skip
+        raise ValueError(
+            f"problem and reference must have the same contacts, got {len(problem.contacts)} and "
+            f"{len(reference.contacts)}."
+        )
     same_mesh = problem.body.V.mesh is reference.body.V.mesh
     pairs = zip(problem.contacts, reference.contacts)
     if same_mesh and any(set(one.facets) != set(other.facets) for one, other in pairs):

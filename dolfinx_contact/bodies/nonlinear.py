@@ -32,7 +32,18 @@ class NonlinearBody(ElasticBody):
 
     nonlinear = True
 
-    def __init__(self, F: ufl.Form, u: fem.Function, bcs: Sequence[Any], derivative: ufl.Form, options: dict[str, Any] | None=None, prefix: str | None=None, before: Callable | None=None, displacements: Displacements | None=None, form_options: dict[str, Any] | None=None):  # fmt: skip
+    def __init__(
+        self,
+        F: ufl.Form,
+        u: fem.Function,
+        bcs: Sequence[Any],
+        derivative: ufl.Form,
+        options: dict[str, Any] | None = None,
+        prefix: str | None = None,
+        before: Callable | None = None,
+        displacements: Displacements | None = None,
+        form_options: dict[str, Any] | None = None,
+    ):
         super().__init__(F, u, bcs, derivative, options, prefix, displacements, form_options)
         self._before = before
         self._given = [*self._parameters, *self._load_parameters]

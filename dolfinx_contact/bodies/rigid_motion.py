@@ -101,7 +101,13 @@ def free_modes(body: ElasticBody) -> np.ndarray:
     """Orthonormal rigid motions of each part of the body that vanish at fixed degrees of freedom.  Collective."""
     displacements, (part, parts) = body.displacements, body.parts
     x = displacements.x[: displacements.count, : displacements.dim]
-    modes = np.concatenate([displacements.vectors(rigid_modes(x, part[: displacements.count] == k, body.comm)) for k in range(parts)], axis=1)  # fmt: skip
+    modes = np.concatenate(
+        [
+            displacements.vectors(rigid_modes(x, part[: displacements.count] == k, body.comm))
+            for k in range(parts)
+        ],
+        axis=1,
+    )
     modes[body.fixed] = 0.0
     products = body.total(modes.T @ modes)
     values, vectors = np.linalg.eigh(products)

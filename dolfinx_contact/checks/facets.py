@@ -97,7 +97,14 @@ class _OfFacets(Check):
         """Whether there is anything to be looked at.  Collective."""
 
     @abstractmethod
-    def _missed(self, contact: Contact, parts: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+    def _missed(
+        self,
+        contact: Contact,
+        parts: list[Facets],
+        u: np.ndarray,
+        pushed: float,
+        worn: np.ndarray | None,
+    ) -> Missed:
         """The largest length that nodes of facets of this rank miss."""
 
     @abstractmethod
@@ -154,7 +161,14 @@ class Between(_OfFacets):
     def _concerns(self, contact: Contact, parts: list[Facets]) -> bool:
         return contact.surface.varies
 
-    def _missed(self, contact: Contact, parts: list[Facets], u: np.ndarray, pushed: float, worn: np.ndarray | None) -> Missed:  # fmt: skip
+    def _missed(
+        self,
+        contact: Contact,
+        parts: list[Facets],
+        u: np.ndarray,
+        pushed: float,
+        worn: np.ndarray | None,
+    ) -> Missed:
         missed = Missed()
         for facets in parts:
             x = _positions(contact, facets, u)

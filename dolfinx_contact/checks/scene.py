@@ -93,7 +93,9 @@ def _worn_in_a_leap(contact: Contact, stiffness: NodalStiffness) -> tuple[float,
     depth, carried = contact.history.unloads
     taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)
     k = int(taken.argmax()) if taken.size else None
-    mine = (0.0, 0.0, []) if k is None else (float(taken[k]), float(depth[k]), contact.x[k].tolist())  # fmt: skip
+    mine = (
+        (0.0, 0.0, []) if k is None else (float(taken[k]), float(depth[k]), contact.x[k].tolist())
+    )
     return max(contact.comm.allgather(mine))
 
 

@@ -88,7 +88,16 @@ class Contact(Guarded):
         "steps, and for another space, plane or other facets make a new Contact."
     )
 
-    def __init__(self, V: fem.FunctionSpace, facets: ArrayLike | tuple[MeshTags, int | Sequence[int]], surface: Surface, friction: Friction | float, *, wear: Wear | None = None, weight: Any = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        V: fem.FunctionSpace,
+        facets: ArrayLike | tuple[MeshTags, int | Sequence[int]],
+        surface: Surface,
+        friction: Friction | float,
+        *,
+        wear: Wear | None = None,
+        weight: Any = None,
+    ) -> None:
         if not compat.is_function_space(V):
             raise ValueError(f"V must be a DOLFINx function space, got {type(V).__name__}.")
         mesh, friction = V.mesh, as_friction(friction)

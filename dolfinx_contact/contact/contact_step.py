@@ -162,7 +162,9 @@ class ContactStep:
         slip[points.alone] = 0.0  # opposite nothing
         gap[points.closed] = np.maximum(gap[points.closed], self.clear)
         n = len(gap)
-        return State(displacement, np.zeros((n, points.dim)), gap, slip, np.zeros(n, np.uint8), known)  # fmt: skip
+        return State(
+            displacement, np.zeros((n, points.dim)), gap, slip, np.zeros(n, np.uint8), known
+        )
 
     def moved_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
         """What moving the surface by one along, or turning it about an axis, moves at the nodes, ``shape=(n, gdim)``."""
@@ -326,7 +328,9 @@ class ContactStep:
         if geometry.renews_rows and u is not None:
             bare = geometry.gap_at(u, frames)[1].alone
         ended = geometry.ended(frames)
-        return History(state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads)  # fmt: skip
+        return History(
+            state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads
+        )
 
     def _summed(self, state: State) -> tuple:
         """Sums, depths of the other side, doubtful work, and what unloads nodes, of ``History``.  Collective where the other side wears."""

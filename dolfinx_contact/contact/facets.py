@@ -139,15 +139,21 @@ def _with_normals(V: fem.FunctionSpace, x: np.ndarray, groups: list, fdim: int) 
         flat = monomials(_corners(fdim, len(corners)), len(corners), 1)
         found.append(
             Facets(
-                nodes, x[nodes], local, corners, fdim, degree,
+                nodes,
+                x[nodes],
+                local,
+                corners,
+                fdim,
+                degree,
                 np.linalg.inv(monomials(local, len(corners), degree)),
                 monomials(local, len(corners), 1) @ np.linalg.inv(flat),
-                ends + other, 2.0 * np.sign(ends) * both,
+                ends + other,
+                2.0 * np.sign(ends) * both,
                 (np.einsum("mi,mvi->mv", own, n) < SHARP_EDGE).any(axis=1),
                 _diameters(at),
                 own,
             )
-        )  # fmt: skip
+        )
     return found
 
 

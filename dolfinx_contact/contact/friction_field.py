@@ -202,7 +202,11 @@ def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> Non
     try:
         signature(given, follow_wrapped=False).bind(None, **state)
     except TypeError as wrong:
-        also = f", and {', '.join(STATE_NAMES)} if it has arguments of these names" if name in ("mu", "p") else " alone"  # fmt: skip
+        also = (
+            f", and {', '.join(STATE_NAMES)} if it has arguments of these names"
+            if name in ("mu", "p")
+            else " alone"
+        )
         raise ValueError(f"{name} is called with x{also}: {wrong} in {given!r}.") from None
     except ValueError:  # arguments that Python does not know
         pass

@@ -132,7 +132,9 @@ class Geometry(ABC):
         """Of gaps, normals with axes, and ways at the end of a step beside those used, as forces on each node.  Collective."""
 
     @abstractmethod
-    def too_long(self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None) -> tuple[float, str]:  # fmt: skip
+    def too_long(
+        self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None
+    ) -> tuple[float, str]:
         """After which part of a step its way cannot be followed, above one if it can, and why in words.  Collective between bodies.
 
         Args:
@@ -161,7 +163,9 @@ class NodalGeometry(Geometry):
     renews_rows = False
     shares_nodes = True
 
-    def __init__(self, surface: Surface, x: np.ndarray, dofs: np.ndarray, extent: float, comm: MPI.Comm):  # fmt: skip
+    def __init__(
+        self, surface: Surface, x: np.ndarray, dofs: np.ndarray, extent: float, comm: MPI.Comm
+    ):
         self.surface, self.x, self._comm = surface, x, comm
         self._dofs, self._extent, self._apart = dofs, extent, CLEAR_GAP * extent
 

@@ -171,4 +171,6 @@ def check_wear(wear: object, surface: Surface) -> None:
             f"wear must be a Wear or None, got {type(wear).__name__}: {wear!r}; of a coefficient k, volume per frictional work, make dc.Wear(k)."
         )
     if wear.opposite.any() and not surface.deformable:
-        raise ValueError(f"{wear!r}: {surface!r} does not wear, only a DeformableSurface does: give the sum of both as coefficient.")  # fmt: skip
+        raise ValueError(
+            f"{wear!r}: {surface!r} does not wear, only a DeformableSurface does: give the sum of both as coefficient."
+        )

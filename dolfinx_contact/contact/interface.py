@@ -63,7 +63,9 @@ class ContactPoints:
         (size, self.first, self._whole), (self.count, self.dim) = owned, dofs.shape
         self.size, self.dofs, self.frames = size, dofs, frames
         self.local, self.alone = m is None, np.zeros(self.count, dtype=bool)
-        self._sums = sparse.csr_matrix((np.ones(dofs.size), dofs.ravel(), np.arange(dofs.size + 1)), (dofs.size, size))  # fmt: skip
+        self._sums = sparse.csr_matrix(
+            (np.ones(dofs.size), dofs.ravel(), np.arange(dofs.size + 1)), (dofs.size, size)
+        )
         columns = np.repeat(dofs, self.dim, axis=0).ravel()
         starts = np.arange(0, frames.size + 1, self.dim)
         self.B = self.S = sparse.csr_matrix((frames.ravel(), columns, starts), (dofs.size, size))
@@ -171,7 +173,9 @@ class ContactPoints:
         columns = product.indices + self.first
         return sparse.csr_matrix((product.data, columns, product.indptr), (self.size, self._whole))
 
-    def rows(self, turns: np.ndarray, free: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
+    def rows(
+        self, turns: np.ndarray, free: np.ndarray
+    ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Rows of ``B`` along other directions of each point: the product of these and of sums of displacements of nodes.
 
         Args:

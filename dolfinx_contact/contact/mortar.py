@@ -134,13 +134,24 @@ def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Ro
 def at_nodes(side: Side, count: int) -> sparse.csr_matrix:
     """Sums at numbered nodes of what the facets that have them carry, ``shape=(count, m)``."""
     facet, corner = np.nonzero(side.nodes >= 0)
-    return sparse.csr_matrix((np.ones(facet.size), (side.nodes[facet, corner], facet)), (count, len(side.nodes)))  # fmt: skip
+    return sparse.csr_matrix(
+        (np.ones(facet.size), (side.nodes[facet, corner], facet)), (count, len(side.nodes))
+    )
 
 
 def _for_kernel(side: Side) -> tuple:
     """Facets as the kernel takes them."""
     density = np.zeros(0) if side.density is None else side.density
-    return side.x, side.outwards, side.local, side.inverse, density, side.nodes, _cuts(side), side.degree  # fmt: skip
+    return (
+        side.x,
+        side.outwards,
+        side.local,
+        side.inverse,
+        density,
+        side.nodes,
+        _cuts(side),
+        side.degree,
+    )
 
 
 @lru_cache
@@ -185,8 +196,10 @@ def _quarters(local: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
     h = 0.5
     if len(corners) == 3:
         return [
-            at((0, 0), (h, 0), (0, h)), at((h, 0), (1, 0), (h, h)),
-            at((0, h), (h, h), (0, 1)), at((h, h), (0, h), (h, 0)),
-        ]  # fmt: skip
+            at((0, 0), (h, 0), (0, h)),
+            at((h, 0), (1, 0), (h, h)),
+            at((0, h), (h, h), (0, 1)),
+            at((h, h), (0, h), (h, 0)),
+        ]
     square = [(0, 0), (h, 0), (h, h), (0, h)]
     return [at(*[(x + i, y + j) for x, y in square]) for i in (0, h) for j in (0, h)]

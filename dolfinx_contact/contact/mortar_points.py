@@ -155,14 +155,19 @@ class MortarGeometry(NodalGeometry):
             lines[points.alone] = points.turns[1]
         return np.einsum("nij,jn->in", lines, given)
 
-    def too_long(self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None) -> tuple[float, str]:  # fmt: skip
+    def too_long(
+        self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None
+    ) -> tuple[float, str]:
         """See ``Geometry``.  Collective."""
         turned = 0.0
         if last is not None:
             turned = _between(*self._since(last, self._turns_at(u)))[2]
         if turned <= LONGEST_TURN:
             return 2.0, ""
-        return 0.0, f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST_TURN:g} is the most"  # fmt: skip
+        return (
+            0.0,
+            f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST_TURN:g} is the most",
+        )
 
     def _turns_at(self, u: np.ndarray) -> list[np.ndarray]:
         """Rotations of both sides as a whole at a displacement.  Collective."""
@@ -306,7 +311,9 @@ class MortarGeometry(NodalGeometry):
         for side in self._master.sides:
             some = bears[side.nodes]
             mean = (depth[side.nodes] * some).sum(axis=1) / np.maximum(some.sum(axis=1), 1)
-            np.add.at(sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None])  # fmt: skip
+            np.add.at(
+                sums, (slice(None), side.nodes), np.stack((mean, np.ones_like(mean)))[:, :, None]
+            )
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
     def gap_at(self, u: np.ndarray, frames: Frames) -> tuple[np.ndarray, MortarPoints]:
@@ -433,7 +440,13 @@ class Skin:
         dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
     """
 
-    def __init__(self, displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None = None):  # fmt: skip
+    def __init__(
+        self,
+        displacements: Displacements,
+        facets: np.ndarray,
+        comm: MPI.Comm,
+        density: np.ndarray | None = None,
+    ):
         sides, self._comm = _gathered(displacements, facets, comm, density), comm
         self.numbers = np.unique(
             np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
@@ -449,7 +462,9 @@ class Skin:
         self.smallest = min([edge.min(initial=np.inf) for edge in edges], default=np.inf)
         sums = np.zeros((2, self.numbers.size))
         for side, edge in zip(self.sides, edges):
-            np.add.at(sums, (slice(None), side.nodes), np.stack((edge, np.ones_like(edge)))[:, :, None])  # fmt: skip
+            np.add.at(
+                sums, (slice(None), side.nodes), np.stack((edge, np.ones_like(edge)))[:, :, None]
+            )
         self.size = sums[0] / sums[1]
         index_map, count = displacements.V.dofmap.index_map, displacements.count
         own = np.isin(_numbers(index_map, np.arange(count)), self.numbers)
@@ -559,7 +574,9 @@ class MortarPoints(ContactPoints):
         values = np.concatenate((np.ones(self.count), -self.m.data))[order]
         counts = np.repeat(np.diff(starts), self.dim)  # of nodes in each row
         ends, rows = np.cumsum(counts), np.repeat(np.arange(dofs.size), counts)
-        at = np.arange(rows.size) - np.repeat(ends - counts - np.repeat(starts[:-1], self.dim), counts)  # fmt: skip
+        at = np.arange(rows.size) - np.repeat(
+            ends - counts - np.repeat(starts[:-1], self.dim), counts
+        )
         values, columns = values[at], known[order[at]]
         B = values[:, None] * frames.reshape(-1, self.dim)[rows]
         starts = np.append(0, ends)
@@ -567,7 +584,9 @@ class MortarPoints(ContactPoints):
         own = columns[np.arange(rows.size), rows % self.dim]
         self._sums = values, own, starts
         self._points, self._body = self._B.createVecLeft(), self._B.createVecRight()
-        self.hold(np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool))  # fmt: skip
+        self.hold(
+            np.zeros((self.count, self.dim - 1), dtype=bool), np.zeros(self.count, dtype=bool)
+        )
 
     def _petsc(self, starts: np.ndarray, columns: np.ndarray, values: np.ndarray) -> PETSc.Mat:
         csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ravel(values))
@@ -647,7 +666,9 @@ class MortarPoints(ContactPoints):
             matrix.destroy()
         return sparse.csr_matrix((values, columns, starts), (self.size, self._whole))
 
-    def rows(self, turns: np.ndarray, free: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
+    def rows(
+        self, turns: np.ndarray, free: np.ndarray
+    ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """See ``ContactPoints``.  Collective."""
         directions = turns @ self.frames
         own = np.linalg.norm(directions * free[self.dofs][:, None, :], axis=2)
@@ -699,7 +720,9 @@ def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndar
     return mean.as_matrix()[:dim, :dim], axis[:dim], angle
 
 
-def _gathered(displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None) -> list[Side]:  # fmt: skip
+def _gathered(
+    displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None
+) -> list[Side]:
     """The facets of all ranks by shape, nodes in global numbers; with a density of the measure at local nodes.  Collective."""
     mine = []
     for part in facets_of(displacements, facets):
@@ -707,7 +730,18 @@ def _gathered(displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, 
             part.nodes.shape
         )
         here = None if density is None else density[part.nodes]
-        mine.append(Side(numbers, part.x, part.outwards, part.local, part.vertices, part.degree, part.inverse, here))  # fmt: skip
+        mine.append(
+            Side(
+                numbers,
+                part.x,
+                part.outwards,
+                part.local,
+                part.vertices,
+                part.degree,
+                part.inverse,
+                here,
+            )
+        )
     shapes: dict = {}
     for side in [side for sides in comm.allgather(mine) for side in sides]:
         key = (side.corners.tobytes(), np.round(side.local, 9).tobytes())

@@ -43,7 +43,9 @@ class OwnLoop:
         if map not in ("bipotential", "return"):
             raise ValueError(f'map must be "bipotential" or "return", got {map!r}.')
         self.contact, self.rho = contact, nodal_stiffness(contact, K).normal
-        self._map = BipotentialMap(self.rho) if map == "bipotential" else ReturnMap(self.rho, self.rho)  # fmt: skip
+        self._map = (
+            BipotentialMap(self.rho) if map == "bipotential" else ReturnMap(self.rho, self.rho)
+        )
 
     @property
     def springs(self) -> np.ndarray:

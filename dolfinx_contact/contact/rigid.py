@@ -113,7 +113,9 @@ class RigidGeometry(NodalGeometry):
             last = last._replace(reaction=frozen(turned))
         return last
 
-    def arms(self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None = None) -> np.ndarray:  # fmt: skip
+    def arms(
+        self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None = None
+    ) -> np.ndarray:
         """See ``Geometry``: about the surface's point, as the step has them."""
         surface = self.surface
         if frames.arms is not None:
@@ -134,9 +136,9 @@ class RigidGeometry(NodalGeometry):
         highest, deepest = (body.highest(values) for values in (height, -height))
         inside = body.largest(-contact.present.gap)
         if highest < DEEP_START * deepest:
-            return f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"  # fmt: skip
+            return f"the body lies on the other side of {surface} than its normal shows, down to {deepest:.3g}: turn the normal, so that it shows towards the body"
         if inside > DEEP_START * body.extent:
-            return f"the body starts {inside:.3g} deep inside {surface}, more than a tenth of its size: check point and normal, or move the plane by surface.displacement step by step"  # fmt: skip
+            return f"the body starts {inside:.3g} deep inside {surface}, more than a tenth of its size: check point and normal, or move the plane by surface.displacement step by step"
         return ""
 
     # -- the way of a step ---------------------------------------------------------------------
@@ -196,7 +198,9 @@ class RigidGeometry(NodalGeometry):
 
         return missed_on_rigid(self, contact, state, u)
 
-    def too_long(self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None) -> tuple[float, str]:  # fmt: skip
+    def too_long(
+        self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None
+    ) -> tuple[float, str]:
         """See ``Geometry``."""
         from dolfinx_contact.contact.end import too_long_on_rigid
 

@@ -40,8 +40,14 @@ class SlipBeforeLanding(Lagged):
 
     def change(self, found: SolverResult, goal: float) -> Change:
         state, step, self._more = found.state, found.state.step, None
-        lands = [_opened(k, state.x) & (s.reaction[:, -1] > 0.0) for k, s in zip(step.contacts, state.nodes)]  # fmt: skip
-        new = [at if k.before is None else at & ~k.before.any(axis=1) for k, at in zip(step.contacts, lands)]  # fmt: skip
+        lands = [
+            _opened(k, state.x) & (s.reaction[:, -1] > 0.0)
+            for k, s in zip(step.contacts, state.nodes)
+        ]
+        new = [
+            at if k.before is None else at & ~k.before.any(axis=1)
+            for k, at in zip(step.contacts, lands)
+        ]
         slips = [nodes.slip_increment for nodes in state.nodes]
         if _felt(state, slips, new, self._tol) <= self._tol:
             return Change(True, state)

@@ -173,7 +173,9 @@ def _wearing(step: LoadStep) -> list[ContactStep]:
 
 def _shares(contacts: Sequence[Contact]) -> np.ndarray:
     """Part of its node that each node of each contact has, by area, ``shape=(n,)``: contacts of one face share their common edge.  Collective."""
-    nodes, area = (np.concatenate([getattr(c, name) for c in contacts]) for name in ("nodes", "area"))  # fmt: skip
+    nodes, area = (
+        np.concatenate([getattr(c, name) for c in contacts]) for name in ("nodes", "area")
+    )
     _, at = np.unique(nodes, return_inverse=True)
     whole = np.bincount(at, area)[at] if nodes.size else area
     return np.divide(area, whole, np.ones_like(area), where=whole > 0.0)

@@ -143,7 +143,15 @@ class Friction(Guarded):
     exponent: float | None
     _remedy = "it is immutable, make a new Friction."
 
-    def __init__(self, mu: ArrayLike | Field, p: ArrayLike | Field | None = None, *, k: float | None = None, axes: ArrayLike | Field | None = None, of: str = "body") -> None:  # fmt: skip
+    def __init__(
+        self,
+        mu: ArrayLike | Field,
+        p: ArrayLike | Field | None = None,
+        *,
+        k: float | None = None,
+        axes: ArrayLike | Field | None = None,
+        of: str = "body",
+    ) -> None:
         if p is not None and k is not None:
             raise ValueError(f"give p or k, not both (mu={mu!r}, p={p!r}, k={k!r})")
         if of not in TEXTURE_OWNERS or (
@@ -197,11 +205,17 @@ class Friction(Guarded):
                     "has the values at its nodes, and pair that."
                 )
         turned = float(number("angle", angle))
-        sides = [(law.mu, law.Q, by + _angle(law.axes)) for law, by in ((first, 0.0), (second, turned))]  # fmt: skip
+        sides = [
+            (law.mu, law.Q, by + _angle(law.axes)) for law, by in ((first, 0.0), (second, turned))
+        ]
         mu, p, axes = mean(*sides)
         straight = bool((axes[..., 0] == 1.0).all())
         if axes.ndim == 2:
-            return Friction(np.broadcast_to(mu, axes.shape), np.broadcast_to(p, axes.shape), axes=None if straight else axes)  # fmt: skip
+            return Friction(
+                np.broadcast_to(mu, axes.shape),
+                np.broadcast_to(p, axes.shape),
+                axes=None if straight else axes,
+            )
         return Friction(mu, p, axes=None if straight else _Direction(axes))
 
     def _take(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
@@ -239,7 +253,9 @@ class Friction(Guarded):
 
     def __getattr__(self, name: str) -> Any:
         if name in Friction.__annotations__:
-            raise AttributeError(f"{self!r} has no {name} yet: contact.friction has the values at the contact's nodes.")  # fmt: skip
+            raise AttributeError(
+                f"{self!r} has no {name} yet: contact.friction has the values at the contact's nodes."
+            )
         raise AttributeError(f"Friction has no attribute {name!r}")
 
     def given(self) -> dict[str, Any]:
@@ -313,7 +329,9 @@ class Friction(Guarded):
         """``drag(slip)``, and the derivative of ``drag(slip + w along)`` with respect to w at 0, the same shape, in the inverse unit of ``slip``."""
         (unit, length), along = self._resisted(slip), self.along_axes(along)
         mu, T = self.mu[..., : slip.shape[1]], slip.shape[1]
-        rate = np.divide(self._softness(T) * along, length, out=np.zeros_like(along), where=length > 0)  # fmt: skip
+        rate = np.divide(
+            self._softness(T) * along, length, out=np.zeros_like(along), where=length > 0
+        )
         turning = rate - (rate * unit).sum(axis=1, keepdims=True) * unit
         return self._from_axes(mu * unit), self._from_axes(mu * turning)
 

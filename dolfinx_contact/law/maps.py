@@ -22,10 +22,30 @@ if TYPE_CHECKING:
 class NodalLaw(Protocol):
     """The law at ``n`` nodes as maps call it: new reactions and statuses, and with a Jacobian their derivatives by ``r`` and (slip, gap)."""
 
-    def return_map(self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho_n: np.ndarray, rho_t: np.ndarray, /) -> tuple: ...  # fmt: skip
-    def return_jacobian(self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho_n: np.ndarray, rho_t: np.ndarray, /) -> tuple: ...  # fmt: skip
-    def bipotential_map(self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray, /) -> tuple: ...  # fmt: skip
-    def bipotential_jacobian(self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray, /) -> tuple: ...  # fmt: skip
+    def return_map(
+        self,
+        r: np.ndarray,
+        gap: np.ndarray,
+        slip: np.ndarray,
+        rho_n: np.ndarray,
+        rho_t: np.ndarray,
+        /,
+    ) -> tuple: ...
+    def return_jacobian(
+        self,
+        r: np.ndarray,
+        gap: np.ndarray,
+        slip: np.ndarray,
+        rho_n: np.ndarray,
+        rho_t: np.ndarray,
+        /,
+    ) -> tuple: ...
+    def bipotential_map(
+        self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray, /
+    ) -> tuple: ...
+    def bipotential_jacobian(
+        self, r: np.ndarray, gap: np.ndarray, slip: np.ndarray, rho: np.ndarray, /
+    ) -> tuple: ...
 
 
 class ContactLaw(NodalLaw, Protocol):
@@ -45,8 +65,12 @@ class NodalMap(Protocol):
     def normal(self) -> np.ndarray:
         """Augmentation parameter along the normal, ``shape=(n,)``, force per length."""
 
-    def __call__(self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray) -> tuple: ...  # fmt: skip
-    def linearised(self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray) -> tuple: ...  # fmt: skip
+    def __call__(
+        self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray
+    ) -> tuple: ...
+    def linearised(
+        self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray
+    ) -> tuple: ...
     def springs(self, friction: Friction, dim: int) -> np.ndarray: ...
 
 

@@ -32,7 +32,10 @@ def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
     """
     A, B = (_tensor(mu**2, angle) for mu, _, angle in (first, second))
     a, b = (np.prod(mu, axis=-1) for mu, *_ in (first, second))  # roots of the determinants
-    sums = [np.divide(part, root, np.zeros_like(part), where=root > 0) for part, root in zip((*A, *B), (a, a, a, b, b, b))]  # fmt: skip
+    sums = [
+        np.divide(part, root, np.zeros_like(part), where=root > 0)
+        for part, root in zip((*A, *B), (a, a, a, b, b, b))
+    ]
     mid = [one + other for one, other in zip(sums[:3], sums[3:])]
     determinant = mid[0] ** 2 - mid[1] ** 2 - mid[2] ** 2
     factor = np.sqrt(np.divide(a * b, determinant, np.zeros_like(a * b), where=determinant > 0))

@@ -51,7 +51,14 @@ class Wear(Guarded):
 
     _remedy = "make a new Wear, contact.wear = dc.Wear(...)."
 
-    def __init__(self, coefficient: ArrayLike | Field, *, explicit: bool = False, threshold: float = 0.0, opposite: ArrayLike = 0.0) -> None:  # fmt: skip
+    def __init__(
+        self,
+        coefficient: ArrayLike | Field,
+        *,
+        explicit: bool = False,
+        threshold: float = 0.0,
+        opposite: ArrayLike = 0.0,
+    ) -> None:
         self.explicit, self.threshold = bool(explicit), number("wear threshold", threshold)
         if self.threshold < 0.0:
             raise ValueError(f"wear threshold must be a number >= 0, got {threshold!r}.")

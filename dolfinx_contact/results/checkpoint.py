@@ -304,7 +304,13 @@ def _starts(
     saved, nodes = file["starts"], file.get("starts_nodes", np.zeros(0))
     tied = int(_number(path, file, "starts_tied"))
     size = int(np.prod(saved.shape[2:])) - tied
-    if nodes.shape != order.shape or saved.ndim < 3 or saved.shape[1] != 2 or size < 0 or size % max(len(nodes), 1):  # fmt: skip
+    if (
+        nodes.shape != order.shape
+        or saved.ndim < 3
+        or saved.shape[1] != 2
+        or size < 0
+        or size % max(len(nodes), 1)
+    ):
         raise ValueError(
             f"checkpoint {path}: starts and starts_nodes do not belong to each other. {WRITE_ANEW}"
         )

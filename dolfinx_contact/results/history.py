@@ -65,7 +65,9 @@ class History:
         with raised_together(self.comm):
             self.path = None if path is None else Path(path)
             if path is not None and self.comm.rank == 0 and not self.path.parent.is_dir():
-                raise ValueError(f"there is no folder {self.path.parent} for {self.path.name}: make it, or give another path.")  # fmt: skip
+                raise ValueError(
+                    f"there is no folder {self.path.parent} for {self.path.name}: make it, or give another path."
+                )
             if path is not None and self.comm.rank == 0 and self.path.is_dir():
                 raise ValueError(f"{self.path} is a folder: give the path of a file.")
             if contact not in range(len(problem.contacts)):

@@ -22,9 +22,18 @@ if TYPE_CHECKING:
 
 # VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
 VTK_TYPES = {
-    (1, 2, 2): 3, (2, 3, 3): 5, (2, 4, 4): 9, (3, 4, 4): 10, (3, 8, 8): 12, (3, 6, 6): 13,
-    (1, 2, 3): 21, (2, 3, 6): 22, (2, 4, 9): 28, (3, 4, 10): 24, (3, 8, 27): 29,
-}  # fmt: skip
+    (1, 2, 2): 3,
+    (2, 3, 3): 5,
+    (2, 4, 4): 9,
+    (3, 4, 4): 10,
+    (3, 8, 8): 12,
+    (3, 6, 6): 13,
+    (1, 2, 3): 21,
+    (2, 3, 6): 22,
+    (2, 4, 9): 28,
+    (3, 4, 10): 24,
+    (3, 8, 27): 29,
+}
 VTK_LINE3 = 21
 VTK_TRIANGLE6 = 22
 
@@ -38,10 +47,21 @@ MIDDLE_NODES = {
     (2, 4): [*RING_EDGES, (0, 1, 2, 3)],
     (3, 4): [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
     (3, 8): [
-        *RING_EDGES, *((a + 4, b + 4) for a, b in RING_EDGES), (0, 4), (1, 5), (2, 6), (3, 7),
-        (0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7), tuple(range(8)),
+        *RING_EDGES,
+        *((a + 4, b + 4) for a, b in RING_EDGES),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+        (0, 3, 7, 4),
+        (1, 2, 6, 5),
+        (0, 1, 5, 4),
+        (3, 2, 6, 7),
+        (0, 1, 2, 3),
+        (4, 5, 6, 7),
+        tuple(range(8)),
     ],
-}  # fmt: skip
+}
 
 
 class Mesh(NamedTuple):

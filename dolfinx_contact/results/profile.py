@@ -87,7 +87,11 @@ def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
     table = {"s": np.concatenate(([0.0], np.cumsum(steps)))} | dict(zip("xyz", at.T))
     for name in PROFILE_NAMES:
         values = np.einsum("kj,kj...->k...", weights, mesh.at_nodes[name][nodes])
-        table |= {name: values} if values.ndim == 1 else {f"{name}_{axis}": column for axis, column in zip("xyz", values.T)}  # fmt: skip
+        table |= (
+            {name: values}
+            if values.ndim == 1
+            else {f"{name}_{axis}": column for axis, column in zip("xyz", values.T)}
+        )
     nearest = np.take_along_axis(nodes, weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     return table | {"status": mesh.at_nodes["status"][nearest]}
 

@@ -60,8 +60,11 @@ def write_vtu(path: Path, mesh: Mesh) -> None:
         "types": np.concatenate(kinds),
     }
     parts = {
-        "Points": {"points": mesh.x}, "Cells": topology, "PointData": mesh.at_nodes, "CellData": mesh.at_cells,
-    }  # fmt: skip
+        "Points": {"points": mesh.x},
+        "Cells": topology,
+        "PointData": mesh.at_nodes,
+        "CellData": mesh.at_cells,
+    }
     for part, arrays in parts.items():
         element = ET.SubElement(piece, part)
         for name, array in arrays.items():

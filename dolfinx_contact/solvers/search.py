@@ -85,7 +85,7 @@ class Search:
         self.step.tell(state)
         self.error = errors.largest
         self._errors.append(errors.balance)
-        self._count_changes(state)
+        self.count_changes(state)
         change = errors.change * self._contraction()
         within = self.error <= tol  # then the forward error counts, too
         rank = (not within, max(self.error, change) if within else self.error)
@@ -106,7 +106,7 @@ class Search:
         self.over = bool(solved or rounded or self._late())
         return state
 
-    def _count_changes(self, state: StepState) -> None:
+    def count_changes(self, state: StepState) -> None:
         """Take note of nodes whose status is another one than in the last state."""
         status = np.concatenate([np.zeros(0, np.uint8), *(nodes.status for nodes in state.nodes)])
         if self._states == 0:

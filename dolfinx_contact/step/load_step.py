@@ -116,15 +116,6 @@ class LoadStep:
         """The step with contacts of other laws, on all ranks."""
         return self.with_contacts(contacts, stamps=self.stamps._replace(law=new_stamp()))
 
-    def half_way(self) -> LoadStep:
-        """The step with half of what its loads and boundary values change, for a start; of tolerance zero, since F itself has all of them."""
-        last, fixed, reactions = self.last, self.body.fixed, np.zeros_like(self.b)
-        for contact in self.contacts:
-            contact.points.add_forces(contact.last.reaction, reactions)
-        b = 0.5 * (self.b + self.body.multiply(last) - reactions)
-        b[fixed] = 0.5 * (self.b + last)[fixed]
-        return self.but(b=b, tol=0.0, starts=(last,))
-
     @property
     def may_slide(self) -> bool:
         """Whether a plane, or the body, is held by contact along some direction."""
@@ -252,7 +243,11 @@ class LoadStep:
         alone = tuple(contact.required(free) for contact in self.contacts)
         split = None if before is None else before.split
         if near is None and self.shared is not None:
-            near = [k.last.reaction for k in self.contacts] if before is None else [s.reaction for s in before.nodes]  # fmt: skip
+            near = (
+                [k.last.reaction for k in self.contacts]
+                if before is None
+                else [s.reaction for s in before.nodes]
+            )
 
         def required(c: np.ndarray) -> tuple:
             """Where nodes are shared it depends on where surfaces are."""

@@ -252,7 +252,10 @@ class Statics:
         changed = [np.zeros((0, self._felt.size))]
         least = LOAD_ROUNDING * self._body.largest(_pressures(state))
         for contact, nodes in zip(state.step.contacts, state.nodes):
-            kappa, given = contact.stiffness.normal, (nodes.reaction, nodes.gap, nodes.slip_increment)  # fmt: skip
+            kappa, given = (
+                contact.stiffness.normal,
+                (nodes.reaction, nodes.gap, nodes.slip_increment),
+            )
             by_motion = contact.measuring_map().linearised(contact.law, *given)[-1]
             by_motion = by_motion / kappa[:, None, None]
             rounding = contact_rounding(contact, nodes, x)[:, -1]

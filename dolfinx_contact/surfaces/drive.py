@@ -231,8 +231,11 @@ class Drive:
         back = less(np.zeros_like(turned), turned)
         terms = [(moment, back) if m.turns else (force, stretched) for m in motions]
         return np.array(
-            [size(m.axis) @ size(f) + m.spring * (size(m.axis) @ way) for m, (f, way) in zip(motions, terms)]
-        )  # fmt: skip
+            [
+                size(m.axis) @ size(f) + m.spring * (size(m.axis) @ way)
+                for m, (f, way) in zip(motions, terms)
+            ]
+        )
 
     def driven(self) -> str:
         """A description of what drives the surface."""

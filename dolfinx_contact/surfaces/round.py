@@ -89,7 +89,14 @@ class RigidSphere(_Round):
         >>> ball.displacement = (0, 0, 0.01)  # before the next step
     """
 
-    def __init__(self, centre: ArrayLike, radius: float, axis: ArrayLike | None = None, *, inside: bool = False) -> None:  # fmt: skip
+    def __init__(
+        self,
+        centre: ArrayLike,
+        radius: float,
+        axis: ArrayLike | None = None,
+        *,
+        inside: bool = False,
+    ) -> None:
         super().__init__(vector("centre", centre), radius, inside)
         if axis is not None:
             self.axis = frozen(unit("axis", axis, self.point.size))

@@ -67,8 +67,15 @@ class Surface(Guarded):
     """
 
     _settable: tuple[str, ...] = (
-        "displacement", "rotation", "free", "force", "moment", "stiffness", "drive", "guides",
-    )  # fmt: skip
+        "displacement",
+        "rotation",
+        "free",
+        "force",
+        "moment",
+        "stiffness",
+        "drive",
+        "guides",
+    )
     _remedy = "make a new surface and a new Contact; displacement and rotation move it."
     varies = curved = deformable = False
     axis: np.ndarray | None = None

@@ -36,7 +36,12 @@ def by_ufl(expression: Any, gdim: int) -> tuple[_Evaluated, _Evaluated]:
     Raises:
         ValueError: an expression that is not scalar, or of anything else.
     """
-    allowed = ufl.classes.SpatialCoordinate, ufl.classes.Constant, ufl.classes.ConstantValue, ufl.classes.MultiIndex  # fmt: skip
+    allowed = (
+        ufl.classes.SpatialCoordinate,
+        ufl.classes.Constant,
+        ufl.classes.ConstantValue,
+        ufl.classes.MultiIndex,
+    )
     others = [
         t for t in extract_type(expression, ufl.classes.Terminal) if not isinstance(t, allowed)
     ]

@@ -20,7 +20,7 @@ def test_changes_are_those_of_all_statuses(states, rate):
     for _ in range(states):
         row = np.where(random.random(40) < rate, random.integers(3, size=40), row)
         parts = np.split(row.astype(np.uint8), [states % 40])
-        search._count_changes(SimpleNamespace(nodes=[SimpleNamespace(status=s) for s in parts]))
+        search.count_changes(SimpleNamespace(nodes=[SimpleNamespace(status=s) for s in parts]))
         rows.append(row)
     last = np.array(rows[-COUNTED_ITERATES:])
     changed = (last[1:] != last[:-1]).any(axis=0).sum()

@@ -36,7 +36,14 @@ class Rows:
         owned: Number of its degrees of freedom.
     """
 
-    def __init__(self, comm: MPI.Comm, directions: sparse.csr_matrix, sums: sparse.csr_matrix, first: int, owned: int):  # fmt: skip
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        directions: sparse.csr_matrix,
+        sums: sparse.csr_matrix,
+        first: int,
+        owned: int,
+    ):
         if directions.shape[0] < directions.shape[1]:  # fewer products
             directions, sums = (
                 sparse.eye(len(directions.indptr) - 1, format="csr"),

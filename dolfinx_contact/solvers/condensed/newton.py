@@ -151,10 +151,20 @@ class CondensedNewton(Solver):
             for a in found.tried
         )
         result = CondensedResult(
-            found.reaction, found.displacement, found.status, found.error, found.slip_error,
-            found.rounding, found.change, found.iterations, found.seconds, found.branch, tried,
-            found.tied, found.local_error,
-        )  # fmt: skip
+            found.reaction,
+            found.displacement,
+            found.status,
+            found.error,
+            found.slip_error,
+            found.rounding,
+            found.change,
+            found.iterations,
+            found.seconds,
+            found.branch,
+            tried,
+            found.tied,
+            found.local_error,
+        )
         return result, bool(found.converged)
 
     def bind(self, step: LoadStep) -> BoundSolver:

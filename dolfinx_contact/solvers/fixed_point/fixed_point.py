@@ -115,6 +115,16 @@ def _slides(state: StepState, tried: bool = False) -> bool:
     return step.slides(state) if tried else step.pushed_off(state)
 
 
+def half_way(step: LoadStep) -> LoadStep:
+    """The step with half of what its loads and boundary values change, for a start; of tolerance zero, since F itself has all of them."""
+    last, fixed, reactions = step.last, step.body.fixed, np.zeros_like(step.b)
+    for contact in step.contacts:
+        contact.points.add_forces(contact.last.reaction, reactions)
+    b = 0.5 * (step.b + step.body.multiply(last) - reactions)
+    b[fixed] = 0.5 * (step.b + last)[fixed]
+    return step.but(b=b, tol=0.0, starts=(last,))
+
+
 class BoundFixedPoint(BoundSolver):
     """The fixed point for the steps of a problem; keeps the preconditioner of the rho used last."""
 
@@ -140,7 +150,9 @@ class BoundFixedPoint(BoundSolver):
         if stale or (new.law != old.law and not self.preconditioner.same_springs(step.contacts)):
             self.close()
 
-    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
+    def solve(
+        self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
+    ) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or every rho has been tried.
 
         Args:
@@ -201,7 +213,7 @@ class BoundFixedPoint(BoundSolver):
 
     def _half_way(self, search: Search, factor: float) -> StepState:
         """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
-        step, half = search.step, search.step.half_way()
+        step, half = search.step, half_way(search.step)
         other = Search(half, half.start(), self._options.max_seconds)
         other.begin(
             other.best, min(2 * TANGENT_INTERVAL, self._options.max_iterations), HALVING_ITERATIONS

@@ -65,7 +65,9 @@ class SNES(Solver):
 class BoundSNES(OnTangent):
     """SNES for one body."""
 
-    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
+    def solve(
+        self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
+    ) -> SolverResult:
         """Let SNES iterate until the errors are at most the tolerance, or it gives up.
 
         Args:

@@ -75,7 +75,9 @@ class SparseNewton(Solver):
 class BoundSparseNewton(OnTangent):
     """The method for one body."""
 
-    def solve(self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None) -> SolverResult:  # fmt: skip
+    def solve(
+        self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
+    ) -> SolverResult:
         """Iterate until the errors are at most the tolerance, or nothing helps any more.
 
         Args:
