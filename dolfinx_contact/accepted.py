@@ -1,6 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The last converged state of a problem, as a value: where the next step begins; checkpoints write its fields."""
+"""Immutable last converged state of a problem, from which the next step starts.
+
+Checkpoints contain its fields.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +26,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """All that a step ends with and the next one starts from: references, nothing is copied.
+    """Converged state at the end of a step, from which the next step starts; data are not copied.
 
     Attributes:
-        x: The displacement, owned degrees of freedom.
-        x_before: That of the step before.
-        histories: Of the contacts.
-        poses: Of the contacts' surfaces: displacement, rotation, rotation of the guides.
-        free_state: The body's last one without reactions, if it is known.
+        x: Displacement, owned degrees of freedom.
+        x_before: Displacement at the end of the previous step.
+        histories: ``History`` of each contact.
+        poses: Displacement, rotation, and rotation of the guides, of each contact's surface.
+        free_state: The last contact-free solution of the body; None if unknown.
         variables: Values of the internal variables.
-        starts: What solvers want to begin with in later steps, see ``BoundSolver.solve``.
-        problem: Number of the problem whose state it is.
+        starts: Start data that solvers have stored for later steps, see ``BoundSolver.solve``.
+        problem: Number of the problem to which the state belongs.
     """
 
     x: np.ndarray
@@ -46,25 +49,25 @@ class Accepted:
     problem: int
 
     def but(self, **parts: Any) -> Accepted:
-        """The same with other parts."""
+        """Return a copy of the state with some attributes replaced."""
         return replace(self, **parts)
 
 
 def poses_of(contacts: Sequence[Contact]) -> tuple[tuple, ...]:
-    """Displacement and rotation of each contact's surface, and the rotation of its guides."""
+    """Return displacement, rotation and rotation of the guides of each contact's surface."""
     surfaces = [contact.surface for contact in contacts]
     return tuple((*surface.stands[:2], surface.placed) for surface in surfaces)
 
 
 def put_surfaces(contacts: Sequence[Contact], poses: Sequence[tuple]) -> None:
-    """Move each contact's surface to where ``poses_of`` found it."""
+    """Move each contact's surface to a pose returned by ``poses_of``."""
     for contact, (displacement, rotation, placed) in zip(contacts, poses):
         contact.surface.displacement = displacement
         contact.surface.place(rotation, placed)
 
 
 def unloaded(problem: ContactProblem) -> Accepted:
-    """The state before the first step; contacts forget theirs.  Collective."""
+    """Return the state before the first step, and reset the contacts' histories.  Collective."""
     for contact in problem.contacts:
         contact.reset()
     zero = np.zeros(problem.body.size)
@@ -76,7 +79,10 @@ def unloaded(problem: ContactProblem) -> Accepted:
 
 
 def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
-    """The state after a step in which this was found; surfaces that force drives move to where it has them.  Collective."""
+    """Return the state after a converged step.  Collective.
+
+    Surfaces driven by force are moved to their final poses.
+    """
     state, before = found.state, problem.accepted
     state.step.place_surfaces(state)
     both = zip(state.step.contacts, state.nodes)
@@ -90,7 +96,11 @@ def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
 
 
 def show(problem: ContactProblem, accepted: Accepted) -> Accepted:
-    """Let body, contacts, surfaces and internal variables be in a state; returns it as supports are now.  Collective."""
+    """Restore body, contacts, surfaces and internal variables to a state.  Collective.
+
+    Returns:
+        The state with the contacts' histories in frames that agree with the present supports.
+    """
     body, contacts = problem.body, problem.contacts
     body.last_free_state = accepted.free_state
     put_surfaces(contacts, accepted.poses)

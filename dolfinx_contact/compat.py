@@ -1,9 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Today's DOLFINx names on yesterday's releases: ``docs/index.md`` lists those that are supported.
+"""Compatibility layer for all supported DOLFINx releases, which ``docs/index.md`` lists.
 
-The only file of this project that knows which release is installed.  Package, demos and tests
-import from here what moved between releases, and read as present-day DOLFINx everywhere else.
+It provides the names of the current DOLFINx release.  Only this file depends on the installed
+release. Package, demos and tests import from here all functions that differ between releases.
 """
 
 from __future__ import annotations
@@ -43,7 +43,12 @@ _INSERT_ADD = (la.InsertMode if hasattr(la, "InsertMode") else la.ScatterMode).a
 
 
 def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
-    """Function space from ``(family, degree)`` or ``(family, degree, shape)``, as in DOLFINx >= 0.7."""
+    """Return a function space, ``fem.functionspace`` of DOLFINx >= 0.7.
+
+    Args:
+        mesh: The mesh.
+        element: ``(family, degree)`` or ``(family, degree, shape)``.
+    """
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, element)
     family, degree, *shape = element
@@ -55,7 +60,12 @@ def functionspace(mesh: Any, element: Any) -> fem.FunctionSpace:
 
 
 def mixed_functionspace(mesh: Any, elements: Any) -> fem.FunctionSpace:
-    """Mixed space from elements, each as ``functionspace`` takes it; ``basix.ufl.mixed_element`` in DOLFINx >= 0.7."""
+    """Return a mixed function space, ``basix.ufl.mixed_element`` in DOLFINx >= 0.7.
+
+    Args:
+        mesh: The mesh.
+        elements: One element for each sub-space, as for ``functionspace``.
+    """
     parts = [functionspace(mesh, element).ufl_element() for element in elements]
     if hasattr(ufl, "MixedElement"):  # legacy UFL elements
         return fem.FunctionSpace(mesh, ufl.MixedElement(*parts))
@@ -65,18 +75,29 @@ def mixed_functionspace(mesh: Any, elements: Any) -> fem.FunctionSpace:
 
 
 def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
-    """Interpolation points of the element of ``V``: a method before DOLFINx 0.10, a property since."""
+    """Return the interpolation points of the element of ``V``.
+
+    They are a method before DOLFINx 0.10, a property since.
+    """
     points = V.element.interpolation_points
     return points() if callable(points) else points
 
 
 def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int | None = None) -> Any:
-    """A gmsh model as a record with ``mesh``, ``cell_tags`` and ``facet_tags`` (DOLFINx >= 0.10).
+    """Return a gmsh model as an object with ``mesh``, ``cell_tags`` and ``facet_tags``.
 
-    Without ``gdim`` vectors have as many components as the model has dimensions; DOLFINx's own function makes it three then.
+    The result is as in DOLFINx >= 0.10.
+
+    Args:
+        model: The gmsh model.
+        comm: MPI communicator.
+        rank: Rank that holds the model.
+        gdim: Geometric dimension of the mesh; None is the dimension of the model.  (DOLFINx itself
+            uses three by default.)
 
     Raises:
-        ValueError: on all ranks, if the model is empty, as after ``gmsh.open`` of a missing file, or has no physical group of cells.
+        ValueError: on all ranks, if the model is empty, as after ``gmsh.open`` of a missing file,
+            or has no physical group of cells.
     """
     with raised_together(comm):
         dim = model.getDimension() if comm.rank == rank else gdim
@@ -101,7 +122,7 @@ def model_to_mesh(model: Any, comm: Any, rank: int, gdim: int | None = None) -> 
 
 
 def second_order(domain: Any) -> Any:
-    """A mesh with the cells of another one, each with the nodes of second order, which may then be moved.  Collective."""
+    """Return a copy of a mesh with second-order geometry, whose nodes may be moved.  Collective."""
     gdim, cell = domain.geometry.dim, domain.topology.cell_name()
     V = functionspace(domain, ("Lagrange", 2, (gdim,)))
     count, index_map = domain.topology.index_map(domain.topology.dim).size_local, V.dofmap.index_map
@@ -119,7 +140,13 @@ def second_order(domain: Any) -> Any:
 
 
 def refined(domain: Any, cells: np.ndarray) -> Any:
-    """The mesh of simplices with these cells (local, owned) divided, and others as far as that takes.  Collective."""
+    """Return a refined mesh of simplices.  Collective.
+
+    Args:
+        domain: The mesh.
+        cells: Cells to refine, local indices of owned cells.  Further cells are divided as needed
+            for a conforming mesh.
+    """
     tdim = domain.topology.dim
     domain.topology.create_entities(1)
     domain.topology.create_connectivity(tdim, 1)
@@ -127,17 +154,21 @@ def refined(domain: Any, cells: np.ndarray) -> Any:
     found = dolfinx.mesh.refine(domain, np.unique(edges[cells]).astype(np.int32))
     return (
         found[0] if isinstance(found, tuple) else found
-    )  # with cells and facets of the old mesh since 0.9
+    )  # a tuple with parent cells and facets since 0.9
 
 
 def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
-    """A ``partitioner`` for ``create_box`` and others, from a function of this rank's number of cells.
+    """Return a ``partitioner`` for mesh generators such as ``create_box``.
 
-    ``ranks(cells, size)`` gives the rank of each of the ``cells`` that this rank hands in.
+    Args:
+        ranks: Function of the number of cells on this rank and the number of ranks; it returns the
+            destination rank of each of these cells.
+        nodes_per_cell: Number of nodes of a cell.
     """
 
     def partition(comm: MPI.Comm, size: int, *cells: Any):
-        # an adjacency list before 0.10 (0.5 gives a ghost mode after it), a list of flat arrays since
+        # an adjacency list before 0.10 (0.5 gives a ghost mode after it), a list of flat arrays
+        # since
         cells = next(c for c in reversed(cells) if isinstance(c, list) or hasattr(c, "num_nodes"))
         count = cells[0].size // nodes_per_cell if isinstance(cells, list) else cells.num_nodes
         destinations = np.asarray(ranks(count, size), dtype=np.int32)
@@ -149,7 +180,7 @@ def partitioner(ranks: Callable[[int, int], Any], nodes_per_cell: int) -> Any:
 
 
 def _cpp(wrapped: Any) -> Any:
-    """The C++ object of a Python one, which some releases wrap."""
+    """Return the C++ object behind a Python object, which some releases wrap."""
     return getattr(wrapped, "_cpp_object", wrapped)
 
 
@@ -158,7 +189,7 @@ def is_function_space(V: object) -> bool:
 
 
 def lagrange_degree(V: fem.FunctionSpace) -> int | None:
-    """Degree of a continuous Lagrange space, blocked or not; None for any other element."""
+    """Return the degree of a continuous Lagrange space; None for any other element."""
     element = V.ufl_element()
     if callable(getattr(element, "family", None)):  # legacy UFL elements, DOLFINx < 0.7
         return element.degree() if element.family() in ("Lagrange", "Q") else None
@@ -167,7 +198,7 @@ def lagrange_degree(V: fem.FunctionSpace) -> int | None:
 
 
 def value_size(V: fem.FunctionSpace) -> int:
-    """Number of components of a function of the space."""
+    """Return the number of components of a function of the space."""
     element = V.ufl_element()
     if hasattr(element, "value_size"):  # legacy UFL elements
         return element.value_size()
@@ -175,17 +206,20 @@ def value_size(V: fem.FunctionSpace) -> int:
 
 
 def is_part(V: fem.FunctionSpace) -> bool:
-    """Whether it is a sub-space, ``V.sub(i)``."""
+    """Return whether a space is a sub-space, ``W.sub(i)``."""
     return len(_cpp(V).component()) > 0
 
 
 def is_within(part: fem.FunctionSpace, V: fem.FunctionSpace) -> bool:
-    """Whether a space is another one or a part of it."""
+    """Return whether a space is equal to ``V`` or a sub-space of it."""
     return _cpp(V).contains(_cpp(part))
 
 
 def cell_nodes(V: fem.FunctionSpace):
-    """Local node indices of each cell, ``shape=(cells, nodes)``: an adjacency list before 0.8."""
+    """Return local node indices of each cell, ``shape=(cells, nodes)``.
+
+    DOLFINx stores them in an adjacency list before 0.8.
+    """
     nodes = V.dofmap.list
     if hasattr(nodes, "array"):
         nodes = nodes.array.reshape(nodes.num_nodes, V.dofmap.dof_layout.num_dofs)
@@ -193,22 +227,28 @@ def cell_nodes(V: fem.FunctionSpace):
 
 
 def cell_dofs(V: fem.FunctionSpace):
-    """Local degrees of freedom of each cell, components unrolled, ``shape=(cells, dofs)``."""
+    """Return local degrees of freedom of each cell, blocks unrolled, ``shape=(cells, dofs)``."""
     bs = V.dofmap.index_map_bs
     cells = cell_nodes(V)
     return (bs * cells[:, :, None] + np.arange(bs)).reshape(len(cells), bs * cells.shape[1])
 
 
 def read_cells(mesh: dolfinx.mesh.Mesh):
-    """Index of each cell in the mesh that was read or made; empty where DOLFINx does not know it, as of submeshes."""
+    """Return the original index of each cell in the input of the mesh.
+
+    The result is empty if DOLFINx does not provide it, as for submeshes.
+    """
     try:
         return mesh.topology.original_cell_index
-    except RuntimeError:  # of submeshes since 0.10
+    except RuntimeError:  # for submeshes since 0.10
         return []
 
 
 def cell_points(mesh: dolfinx.mesh.Mesh):
-    """Points of the geometry of each cell, ``shape=(cells, points)``: one array for each type of cells since 0.8."""
+    """Return the geometry nodes of each cell, ``shape=(cells, points)``.
+
+    DOLFINx stores one array for each cell type since 0.8.
+    """
     points = getattr(mesh.geometry, "dofmaps", None)
     points = (
         mesh.geometry.dofmap if points is None else points(0) if callable(points) else points[0]
@@ -219,18 +259,26 @@ def cell_points(mesh: dolfinx.mesh.Mesh):
 
 
 def bc_dofs(bc: Any, size: int):
-    """Degrees of freedom (local, unrolled) below ``size``, the owned ones, that a condition fixes."""
+    """Return the degrees of freedom that a boundary condition fixes, local, unrolled.
+
+    Args:
+        bc: The boundary condition.
+        size: Number of owned degrees of freedom; only owned ones are returned.
+    """
     dofs = np.asarray(_cpp(bc).dof_indices()[0])
     return dofs[dofs < size]
 
 
 def bc_constants(bcs: Iterable[Any]) -> list:
-    """The values of conditions that are constants, each with a ``value``; those that are Functions have none."""
+    """Return the values of boundary conditions that are ``Constant`` objects, not Functions."""
     return [bc.g for bc in bcs if hasattr(bc.g, "value") and not hasattr(bc.g, "x")]
 
 
 def set_bc_values(array: np.ndarray, bcs: Iterable[Any]) -> None:
-    """Write boundary values into a local array, ghosts included: ``bc.set`` in DOLFINx >= 0.9."""
+    """Write boundary values into a local array, ghosts included.
+
+    The method is ``bc.set`` in DOLFINx >= 0.9.
+    """
     for bc in bcs:
         if hasattr(bc, "set"):
             bc.set(array)
@@ -244,17 +292,23 @@ def compiled(
     jit_options: dict | None = None,
     entity_maps: Any = None,
 ) -> Any:
-    """A compiled form, ``fem.form``, whose Functions may live on several meshes since DOLFINx 0.9.
+    """Return a compiled form, see ``fem.form``.
+
+    Since DOLFINx 0.9, its Functions may be defined on several meshes.
 
     Args:
         form: UFL form.
-        form_compiler_options: Of FFCx; ``form_compiler_params`` before 0.6.
-        jit_options: Of the compilation of its code; ``jit_params`` before 0.6.
-        entity_maps: As ``fem.form`` takes it: a dictionary of arrays by mesh before 0.10, a list of ``EntityMap`` since.
+        form_compiler_options: Options of FFCx; ``form_compiler_params`` before 0.6.
+        jit_options: Options for compiling the generated code; ``jit_params`` before 0.6.
+        entity_maps: Relation between meshes as in ``fem.form``: a dictionary of arrays by mesh
+            before 0.10, a list of ``EntityMap`` since.
+
+    Raises:
+        ValueError: ``entity_maps`` are given, but DOLFINx is older than 0.9.
     """
     known = signature(fem.form).parameters
     now = "options" if "jit_options" in known else "params"
-    # Copies: 0.5 writes into them, into its own defaults, too.
+    # Copies, since 0.5 modifies the dictionaries, even its own defaults.
     options = {
         f"form_compiler_{now}": dict(form_compiler_options or {}),
         f"jit_{now}": dict(jit_options or {}),
@@ -269,60 +323,70 @@ def compiled(
 
 
 def assemble_into(x: Any, form: Any) -> None:
-    """Assemble a linear form into the distributed vector ``x`` and add what ghosts hold to owners."""
+    """Assemble a linear form into a distributed vector, ghost entries added to their owners."""
     x.array[:] = 0.0
     fem.assemble_vector(x.array, form)
     add_to_owners(x)
 
 
 def add_to_owners(x: Any) -> None:
-    """Add what this rank's ghosts hold in the distributed vector ``x`` to their owners."""
+    """Add the ghost entries of a distributed vector to the entries of their owners."""
     x.scatter_reverse(_INSERT_ADD)
 
 
 def petsc_vec(u: fem.Function) -> PETSc.Vec:
-    """The PETSc vector of a Function: ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before."""
+    """Return the PETSc vector of a Function.
+
+    It is ``u.x.petsc_vec`` in DOLFINx >= 0.9, ``u.vector`` before.
+    """
     return u.x.petsc_vec if hasattr(u.x, "petsc_vec") else u.vector
 
 
 def tagged(tags: Any, mesh: Any) -> bool:
-    """Whether tags, a ``MeshTags``, are of this mesh: they know the mesh before 0.7, its topology since."""
+    """Return whether ``MeshTags`` belong to a mesh.
+
+    They refer to the mesh before DOLFINx 0.7, to its topology since.
+    """
     tags = _cpp(tags)
     topology = tags.topology if hasattr(tags, "topology") else tags.mesh.topology
     return topology is _cpp(mesh).topology
 
 
 def same_mesh(V: fem.FunctionSpace, W: fem.FunctionSpace) -> bool:
-    """Whether two spaces are of one mesh."""
+    """Return whether two function spaces are on the same mesh."""
     return _cpp(V.mesh).topology is _cpp(W.mesh).topology
 
 
 def is_condition(bc: object) -> bool:
-    """Whether it is what ``dirichletbc`` returns."""
+    """Return whether an object is a boundary condition returned by ``dirichletbc``."""
     return hasattr(_cpp(bc), "dof_indices")
 
 
 def condition_lives_on(bc: Any, V: fem.FunctionSpace) -> bool:
-    """Whether a boundary condition is one on ``V`` or a part of it."""
+    """Return whether a boundary condition is on ``V`` or a sub-space of it."""
     return is_within(bc.function_space, V)
 
 
 def free_garbage(comm: MPI.Comm) -> None:
-    """Free what Python's collector left to PETSc since 3.18: it can free parallel objects on all ranks at once only.
+    """Free PETSc objects that Python's garbage collector has released.  Collective.
 
-    Collective.
+    Since 3.18, PETSc keeps such objects, since it can free parallel objects only on all ranks at
+    once.
     """
     if hasattr(PETSc, "garbage_cleanup"):
         PETSc.garbage_cleanup(comm)
 
 
 def may_free_alone(comm: MPI.Comm) -> bool:
-    """Whether this rank may free PETSc objects without the others: it has none, and PETSc still runs."""
+    """Return whether PETSc objects may be freed here: one rank, and PETSc not finalised."""
     return not PETSc.Sys.isFinalized() and comm.size == 1
 
 
 def option_was_read(name: str) -> bool:
-    """Whether PETSc has read an option of its database, which petsc4py does not report; True if it cannot be determined."""
+    """Return whether PETSc has read an option of its database; True if it cannot be determined.
+
+    petsc4py has no function for this, so PETSc's library is called directly.
+    """
     try:
         used = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     except (OSError, AttributeError, TypeError):
@@ -333,12 +397,12 @@ def option_was_read(name: str) -> bool:
 
 
 def intervals(n: int) -> Any:
-    """A mesh of ``n`` intervals on this rank alone."""
+    """Return a mesh of ``n`` equal intervals on [0, 1], on this rank alone."""
     return create_interval(MPI.COMM_SELF, n, [0.0, 1.0])
 
 
 def cell_values(expression: fem.Expression, mesh: Any, cells: np.ndarray) -> np.ndarray:
-    """Values of an ``Expression`` with one point, a row for each cell."""
+    """Return the values of an ``Expression`` with one point, one row for each cell."""
     if "mesh" in signature(expression.eval).parameters:
         return expression.eval(mesh, cells).reshape(cells.size, -1)
     return expression.eval(cells).reshape(cells.size, -1)

@@ -1,6 +1,10 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The condensed contact problem: ``w = q + W r`` and the friction law between ``w`` and ``r``; arrays alone, without DOLFINx."""
+"""Solver of the condensed contact problem for given arrays, without DOLFINx.
+
+The unknowns are relative motions ``w`` and reactions ``r`` of the contact nodes, with ``w = q + W
+r`` and the contact and friction law between ``w`` and ``r``.
+"""
 
 from dolfinx_contact.solvers.condensed.newton import CondensedNewton, solve_condensed
 from dolfinx_contact.solvers.condensed.result import CondensedNotConverged, CondensedResult

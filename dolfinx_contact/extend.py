@@ -1,8 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Base classes, interfaces and building blocks for surfaces, laws, contact points, lagged quantities, checks and solvers of your own.
+"""Base classes and interfaces for your own extensions.
 
-See docs/extending.md and docs/own_solver.md.  Nothing in the package imports this module.
+Extensions are surfaces, laws, contact points, lagged quantities, checks and solvers.  See
+docs/extending.md and docs/own_solver.md.  No other module of the package imports this module.
 """
 
 from dolfinx_contact.checks.check import Check, CheckedStep

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""How a load step is made of the accepted state, the present loads, boundary values, surfaces and laws."""
+"""Assembly of a load step from the accepted state, loads, boundary values, surfaces and laws."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
-# How many times as far as supports move bodies may be expected to move in a step; and the part of that within which they are expected
-# to go on as in the step before.
+# Largest predicted motion of a body in a step, relative to the largest motion of supports.
 FARTHEST_RATIO = 2.0
+
+# The body moves as in the last step if the two predictions differ by at most this fraction of the
+# largest motion of supports.
 STEADY_PART = 0.05
 
 
 class StepMaker:
-    """Makes the steps of a problem, and keeps what stays the same from one to the next.
+    """Builder of the load steps of a problem, which keeps data that do not change between steps.
 
     Args:
         problem: The problem, with its body.
@@ -65,12 +67,12 @@ class StepMaker:
             u = start if at is None else at
             approach(body, lambda: [step_of(c, frames=frames_of(c, u)) for c in curved], u)
         b, external = body.load()
-        likely = _predicted(problem, last, b) if at is None else at
+        likely = _predicted_displacement(problem, last, b) if at is None else at
         old = (
             [None] * len(self._contacts) if before is None else [c.frames for c in before.contacts]
         )
         frames, turned = frames_of_step(self._contacts, body, start, likely, old, self._points)
-        contacts = self._in_step(body, assembled, frames, turned, begins=before is None)
+        contacts = self._contact_steps(body, assembled, frames, turned, begins=before is None)
         guess = body.taken(problem.u.x.array), 2 * start - last.x_before
         if before is not None:
             holding = holding or before.holding
@@ -78,8 +80,10 @@ class StepMaker:
             from dolfinx_contact.surfaces.held import held_surfaces
 
             holding = held_surfaces(body, contacts, start, b)
-            contacts = [c.where_it_stands() for c in contacts]  # planes go with what holds them
-        parts = self._parts(body, contacts, holding)
+            contacts = [
+                c.where_it_stands() for c in contacts
+            ]  # surfaces move with the nodes that hold them
+        parts = self._contacts_and_options(body, contacts, holding)
         kind = LoadStep
         if body.nonlinear:
             from dolfinx_contact.step.nonlinear import NonlinearStep as kind
@@ -97,10 +101,18 @@ class StepMaker:
             **parts,
         )
 
-    def _in_step(
+    def _contact_steps(
         self, body: Any, assembled: int, frames: Sequence[Frames], turned: bool, begins: bool
     ) -> list[ContactStep]:
-        """The contacts as the step has them, and notes of what is another one than in the last: stiffness, rows, laws.  Collective."""
+        """Return ``ContactStep`` of each contact, and update the version numbers.  Collective.
+
+        Args:
+            body: The body.
+            assembled: Number of times that its stiffness has been assembled.
+            frames: Frames of each contact.
+            turned: Whether the rows of any contact have changed.
+            begins: Whether the step is new, not a repetition.
+        """
         old = self._stamps
         if turned or assembled != old.stiffness:
             both = zip(self._contacts, frames)
@@ -119,10 +131,10 @@ class StepMaker:
         self._stamps = Stamps(assembled, rows, law, old.parts, begun)
         return contacts
 
-    def _parts(
+    def _contacts_and_options(
         self, body: Any, contacts: Sequence[ContactStep], holding: HeldSurfaces | None
     ) -> dict:
-        """Contacts and optional parts of a step, by their names there.  Collective."""
+        """Return contacts and optional attributes of a ``LoadStep``, by name.  Collective."""
         parts: dict[str, Any] = {"holding": holding}
         if holding is not None and holding.dragged:
             dragged = holding.dragged
@@ -143,32 +155,38 @@ class StepMaker:
         return parts | {"contacts": tuple(contacts)}
 
     def _present_freedom(self) -> list:
-        """Free motions and springs of each contact's surface."""
+        """Return the free motions and springs of each contact's surface."""
         drivers = [contact.surface.driver for contact in self._contacts]
         return [() if driver is None else driver.freedom for driver in drivers]
 
 
-def _predicted(problem: ContactProblem, last: Accepted, b: np.ndarray) -> np.ndarray | None:
-    """Where a step is likely to end, for rows between bodies that slide: under the new loads, with the last reactions.  Collective.
+def _predicted_displacement(
+    problem: ContactProblem, last: Accepted, b: np.ndarray
+) -> np.ndarray | None:
+    """Return a predicted displacement for the end of a step, or None.  Collective.
 
-    None where it is farther off than the supports move, as on soft springs, where nothing slides, and for all other contacts.
+    The mortar rows between bodies that slide on each other are evaluated at this displacement.  The
+    prediction is the displacement under the new loads ``b`` with the last reactions, or a linear
+    extrapolation of the last two steps if both nearly agree.  The result is None if bodies do not
+    slide, or if the predicted motion is large compared with the motion of supports, as on soft
+    springs.
     """
     body = problem.body
     sliding = [c for c in problem.contacts if c.geometry.renews_rows and not c.history.empty]
     if not sliding or body.nonlinear or body.loose is not None:
         return None
     known = last.free_state
-    if known is None or body.displacements.mixed:  # of which checkpoints do not have it
+    if known is None or body.displacements.mixed:  # checkpoints do not contain it for mixed spaces
         return None
     given = np.zeros_like(last.x)
     given[body.fixed] = (b - last.x)[body.fixed]
-    x = 2 * last.x - last.x_before  # friction and what deforms go on, too
+    x = 2 * last.x - last.x_before  # extrapolation, with friction and deformation
     x[body.fixed] = b[body.fixed]
     load, exact = b - known.load, body.exact
     more = body.free_state(b) - known.displacement if exact else body.solve(load, rough=True)
     if body.farthest(last.x + more - x) > STEADY_PART * body.farthest(given):
         x = last.x + more
-        if not exact:  # six digits
+        if not exact:  # refine to six digits
             x += body.solve(load - body.multiply(more), rough=True)
     slid = body.largest(np.array([c.geometry.slid(x - last.x, c.history) for c in sliding]))
     if slid < problem.geometry_tol or body.farthest(x - last.x) > FARTHEST_RATIO * body.farthest(

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""An elastic body in contact: one call, one load step."""
+"""The contact problem of an elastic body; each call of ``solve`` is one load step."""
 
 from __future__ import annotations
 
@@ -76,51 +76,65 @@ class ContactProblem(Guarded):
     """A body in contact with surfaces, solved load step by load step.
 
     Args:
-        F: Residual form, internal minus external virtual work.  If it is not linear in ``u``, the body is nonlinear, see
-            docs/nonlinear.md.
-        u: Displacement, a Function, or one of a mixed space with displacements.  Holds the solution after a step.  At the start
-            of any step, it is only an initial guess; the problem keeps the last converged state itself.
+        F: Residual form, internal minus external virtual work.  If it is not linear in ``u``, the
+            body is nonlinear, see docs/nonlinear.md.
+        u: Displacement Function, or a Function of a mixed space that contains the displacement.
+            After a step, it holds the solution.  At the start of a step, it is only an initial
+            guess; the problem stores the last converged state itself.
         contacts: One ``Contact`` or several; a node on an edge may belong to several.
-        bcs: Dirichlet conditions; their values may change between steps, and ``problem.bcs = [...]`` releases or adds supports.
-        J: Derivative of ``F`` with respect to ``u``; by UFL if None.
-        solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``; None takes the first for small contacts,
-            the second for large ones, the third for nonlinear bodies; ``step.solver`` names the choice, ``step.reason`` its reason.
+        bcs: Dirichlet conditions.  Their values may change between steps;
+            ``problem.bcs = [...]`` releases or adds supports.
+        J: Derivative of ``F`` with respect to ``u``; if None, UFL computes it.
+        solver: ``CondensedNewton(...)``, ``FixedPoint(...)`` or ``SparseNewton(...)``.  None
+            chooses the first for small contacts, the second for large contacts and the third for
+            nonlinear bodies.  ``step.solver`` names the choice, ``step.reason`` explains it.
         tol: Largest error, slip error and forward error of a converged step, see docs/errors.md.
-        petsc_options: Options of the linear solver, as in DOLFINx; by default a factorisation, for large bodies multigrid.
-        petsc_options_prefix: Their prefix.
+        petsc_options: Options of the linear solver, as in DOLFINx.  The default is a direct
+            factorisation, and multigrid for large bodies.
+        petsc_options_prefix: Prefix of the options of the linear solver.
         internal: ``InternalVariables`` of the material, None if it has none.
         form_compiler_options: Options of FFCx, as in ``fem.form``.
-        jit_options: Options of the compilation of generated code, as in ``fem.form``.
-        entity_maps: Relation between meshes, if ``F`` has Functions on another mesh than that of ``u``, as in ``fem.form``: a
-            dictionary in DOLFINx 0.9, a list of ``EntityMap`` since 0.10.  Not available in older releases.
-        undetermined: What to do if a body held by contact alone can move without changing the reactions: "refused" raises a
-            ``ValueError`` that names the motion; "nearest" takes the state nearest to the last one, that with the smallest
+        jit_options: Options for compiling the generated code, as in ``fem.form``.
+        entity_maps: Relation between meshes, as in ``fem.form``, needed if ``F`` contains
+            Functions on a mesh other than the mesh of ``u``: a dictionary in DOLFINx 0.9, a list
+            of ``EntityMap`` since 0.10.  Not available in older releases.
+        undetermined: How to treat a body that is held by contact alone and can move without
+            changing the reactions.  "refused" raises a ``ValueError`` that names the motion;
+            "nearest" selects the state nearest to the last converged one, with the smallest
             integral of ``|du|^2`` over the volume.
-        geometry_tol: Largest ``step.geometry_error`` of a converged step, on curved, rotating, wavy, textured or deformable
-            surfaces, see docs/surfaces.md.
+        geometry_tol: Largest ``step.geometry_error`` of a converged step, on curved, rotating,
+            wavy, textured or deformable surfaces, see docs/surfaces.md.
 
     Attributes:
-        solver: The solver's options; like ``tol``, ``geometry_tol``, ``undetermined`` and ``lagged`` it may be changed between steps, on all ranks.
-        lagged: What a step takes for known beside this package's quantities, of classes of your own, see docs/extending.md; none at first.
-        checks: What is looked at after each step until the user was told of it, ``Check`` objects; add your own, see docs/extending.md.
-        monitor: None, or a function ``f(iteration, error, counts)``, called on all ranks with every iterate: its number in the
-            step, largest error and ``Counts``; far from ``tol`` the error of equilibrium alone.  For iterates of the condensed
-            problem, the error is the residual over the largest reaction; the errors of the body follow.
+        solver: The solver's options.  ``solver``, ``tol``, ``geometry_tol``, ``undetermined`` and
+            ``lagged`` may be changed between steps, on all ranks.
+        lagged: Lagged quantities of your own classes, in addition to those of this package, see
+            docs/extending.md; initially empty.
+        checks: ``Check`` objects that are evaluated after each step until each has issued its
+            warning; you may add your own, see docs/extending.md.
+        monitor: None, or a function ``f(iteration, error, counts)`` that is called on all ranks
+            for every iterate, with its number in the step, its largest error and ``Counts``.  Far
+            from ``tol``, the error is the error of equilibrium alone.  For iterates of the
+            condensed problem, the error is the residual over the largest reaction; the errors of
+            the body follow.
 
-    ``logging.getLogger("dolfinx_contact")`` gets a line per step, of level INFO, on rank 0; ``logging.basicConfig(level=20, force=True)``
-    prints them.
+    On rank 0, ``logging.getLogger("dolfinx_contact")`` receives one line of level INFO for each
+    step; ``logging.basicConfig(level=20, force=True)`` prints these lines.
 
-    On several ranks, constants in ``F`` and ``bcs`` must be the same on all; for Functions, the values on the owning ranks count.
+    On several ranks, constants in ``F`` and ``bcs`` must have the same values on all ranks.  For
+    Functions, the values on the owning ranks are used.
 
-    ``close``, or ``with dc.ContactProblem(...) as problem``, frees PETSc objects.  On one rank, a problem that is no longer used
-    is freed automatically.  On several ranks, PETSc frees objects only on all ranks at once: the next problem on the same mesh
-    does this, and a run that makes many meshes must close its problems.
+    ``close``, or ``with dc.ContactProblem(...) as problem``, frees PETSc objects.  On one rank, a
+    problem that is no longer used is freed automatically.  On several ranks, PETSc frees objects
+    only on all ranks at once: the next problem on the same mesh does this, and a program that
+    creates many meshes must close its problems.
 
     Raises:
-        ValueError: on all ranks, for invalid input; the message names the argument and its value, and says what to do.
+        ValueError: on all ranks, for invalid input; the message names the argument and its value,
+            and says what to do.
 
     Example:
-        >>> other = dc.Contact(V, foot, plane, friction)  # of this problem alone
+        >>> other = dc.Contact(V, foot, plane, friction)  # belongs to this problem only
         >>> problem = dc.ContactProblem(F, u, [other], bcs=[bc])
         >>> problem.solve().error <= 1e-8
         True
@@ -208,13 +222,14 @@ class ContactProblem(Guarded):
 
     @property
     def bcs(self) -> tuple[Any, ...]:
-        """The Dirichlet conditions.  Others may be assigned between steps, on all ranks, see docs/howto/stages.md.  Collective.
+        """The Dirichlet conditions, which may be replaced between steps on all ranks.  Collective.
 
-        Displacement, reactions, history variables and surfaces stay; the next step starts from them with the new supports.  A new
-        support moves from its present displacement to the prescribed value; the force of a released one vanishes.
+        Displacement, reactions, history variables and surfaces are kept; the next step starts from
+        them with the new supports.  A new support moves from its present displacement to the
+        prescribed value; the force of a released support vanishes.  See docs/howto/stages.md.
 
         Raises:
-            ValueError: on all ranks, for invalid conditions; the previous ones stay.
+            ValueError: on all ranks, for invalid conditions; the previous conditions are kept.
         """
         return tuple(self.body.bcs)
 
@@ -225,12 +240,16 @@ class ContactProblem(Guarded):
         support(self.body, self.contacts, bcs)
 
     def close(self) -> None:
-        """Free PETSc's matrices, factors and multigrid levels; results stay, but no step can follow.  Collective."""
+        """Free PETSc's matrices, factors and multigrid levels.  Collective.
+
+        Results remain available, but no further step can be solved.
+        """
         self._unbind()
         self.body.close()
 
     def __del__(self) -> None:
-        # On several ranks only the next problem on the mesh can, see ``free_garbage``: Python collects when it likes.
+        # On several ranks, Python's garbage collection is not simultaneous, so the next problem on
+        # the mesh frees the PETSc objects, see ``free_garbage``.
         if "_made" in self.__dict__ and compat.may_free_alone(self.body.comm):
             self._unbind()
 
@@ -241,27 +260,28 @@ class ContactProblem(Guarded):
         self.close()
 
     def solve(self) -> Step:
-        """Solve one load step; if it converges, the history advances.  Collective.
+        """Solve one load step and, if it converges, update the history variables.  Collective.
 
         Returns:
             The record of the step.
 
         Raises:
-            NotConverged: the error stayed above ``tol``; carries the record and the best state.
-            ValueError: loads, boundary values, surfaces or ``u`` are not finite, or nothing holds the body.
+            NotConverged: the error stayed above ``tol``; contains the record and the best state.
+            ValueError: loads, boundary values, surfaces or ``u`` are not finite, or the body is
+                not held by supports or contact.
 
         After any exception, the problem is in its last converged state.
         """
         start = perf_counter()
         check_alive(self, self.body, self.contacts)
-        began, checks = self._began(), (self.checks, self._over)
+        began, checks = self._state_before(), (self.checks, self._over)
         try:
-            with raised_together(self.body.comm):  # whatever happens on one rank alone
+            with raised_together(self.body.comm):  # an error on one rank is raised on all ranks
                 check_step(self.u, self.body.comm, self.contacts)
                 self._agree(self.body.comm)
                 found, changes, refused = solution(self)
                 state = found.state.step.with_small_slip_as_stick(found.state)
-                missed = changes.get("EndGeometry", 0.0)  # over the reactions
+                missed = changes.get("EndGeometry", 0.0)  # relative to the reactions
                 done = record(state, found, perf_counter() - start, missed)
                 self._check_converged(state, done, refused)
                 found = found._replace(state=ended(state, self.geometry_tol))
@@ -283,42 +303,52 @@ class ContactProblem(Guarded):
             raise
         return done
 
-    def _began(self) -> tuple:
-        """The accepted state, with what the user has made of it since, the one before, and surfaces where the user has put them."""
+    def _state_before(self) -> tuple:
+        """Return the accepted state, the state one step earlier, and the poses of the surfaces.
+
+        Histories and internal variables that the user has changed since the last step are first
+        stored in the accepted state.
+        """
         values = () if self.internal is None else self.internal.values()
         histories = tuple(contact.history for contact in self.contacts)
         self._accepted = self._accepted.but(histories=histories, variables=values)
         return self._accepted, self._before, poses_of(self.contacts)
 
     def _check_converged(self, state: StepState, done: Step, refused: str) -> None:
-        """Raise ``NotConverged`` unless a state is a solution.  Collective."""
+        """Raise ``NotConverged`` if a state is not a solution.  Collective."""
         if not refused and converged(state.errors, done, self.tol):
             return
         if not refused:
             tried = f"{done}, tol {self.tol:.1e}, by {named(done)}"
-            if done.reason in (NO_SOLUTION, NOT_HELD):  # untried: errors are of the last state
+            if done.reason in (
+                NO_SOLUTION,
+                NOT_HELD,
+            ):  # no solver ran: errors belong to the last state
                 tried = done.reason
             refused = f"not converged: {tried}. {state.step.refusal(state)}"
         reactions = [nodes.reaction for nodes in state.nodes]
         raise NotConverged(f"{refused}.", done, self.body.values(state.x), reactions)
 
     def _accept(self, accepted: Accepted) -> None:
-        """Let this be the last converged state.  Collective."""
+        """Store a state, and its histories in the contacts, as the last one.  Collective."""
         self._before, self._accepted = self._accepted, accepted
         for contact, history in zip(self.contacts, accepted.histories):
             contact.accept(history)
 
     def _undo(self, failure: BaseException, began: tuple, checks: tuple) -> None:
-        """Nothing has happened, whatever did: also while a step that has converged was booked.  Collective."""
+        """Restore the state before a failed call of ``solve``.  Collective.
+
+        This includes failures while the results of a converged step are being stored.
+        """
         message = f"step failed: {type(failure).__name__}: {failure}"
         self._log(lambda: message)
         stopped = not isinstance(failure, Exception) or isinstance(failure, PETSc.Error)
         known = isinstance(failure, NotConverged)
         doubt = self.body.comm.allreduce(2 if stopped else 0 if known else 1, op=MPI.MAX)
         if doubt > 0:
-            self._unbind()  # a solver may have been told of a part of the step
+            self._unbind()  # the bound solver may have been partly updated
         if doubt > 1:
-            self.body.forget()  # in the midst of PETSc, which keeps vectors locked
+            self.body.forget()  # interrupted within PETSc, which leaves vectors locked
         accepted, before, poses = began
         self._go_to(accepted)
         self._before = before
@@ -331,14 +361,19 @@ class ContactProblem(Guarded):
         before: LoadStep | None = None,
         holding: HeldSurfaces | None = None,
     ) -> LoadStep:
-        """The next step as solvers see it, with the present loads, boundary values and surfaces.  Collective.
+        """Return the next load step.  Collective.
 
-        For your own solvers and for measurements; ``solve`` makes its own.
+        It has the present loads, boundary values and surfaces.
+
+        Use it for your own solvers and for measurements; ``solve`` builds its own load step.
 
         Args:
-            at: Displacement at which tangent planes and lever arms are taken, owned degrees of freedom; None takes the last one.
-            before: The same step, solved before with other frames; None where it begins.
-            holding: Planes that held nodes cannot hold, if that has turned out.
+            at: Displacement at which tangent planes and lever arms are evaluated, owned degrees of
+                freedom; None is the last converged displacement.
+            before: The previous version of the same step, if it is solved again with other frames;
+                None for a new step.
+            holding: ``HeldSurfaces`` with the present status of each held surface, if the step is
+                repeated because nodes held by supports cannot hold a surface; else None.
 
         Returns:
             A ``LoadStep``, for a nonlinear body a ``NonlinearStep``.
@@ -346,7 +381,11 @@ class ContactProblem(Guarded):
         return self._maker.step(self, at, before, holding)
 
     def bound(self, step: LoadStep | None = None) -> BoundSolver:
-        """The solver, bound to steps like this one, see ``solvers/base.py``; None is the next step.  Collective."""
+        """Return the solver, set up for a load step, see ``solvers/base.py``.  Collective.
+
+        Args:
+            step: The load step; None is the next one.
+        """
         step = self.load_step() if step is None else step
         if self._bound_to != self.solver:
             self._unbind()
@@ -365,7 +404,7 @@ class ContactProblem(Guarded):
         return self._bound
 
     def _unbind(self) -> None:
-        """Forget what was set up for a stiffness that has changed.  Collective."""
+        """Close and discard the bound solver, with its factors and preconditioners.  Collective."""
         if self._bound is not None:
             self._bound.close()
         self._bound = self._bound_to = None
@@ -374,21 +413,23 @@ class ContactProblem(Guarded):
 
     @property
     def accepted(self) -> Accepted:
-        """The last converged state, see ``Accepted``; the same as ``snapshot()``."""
+        """The last converged state, see ``Accepted``; ``snapshot()`` returns the same object."""
         return self._accepted
 
     def _go_to(self, accepted: Accepted) -> None:
-        """Go on from a state; there is none before it to go back to.  Collective."""
+        """Make a state the last converged one; ``rewind`` has no earlier one.  Collective."""
         self._before, self._accepted = None, show(self, accepted)
 
     def rewind(self) -> None:
         """Undo the last accepted step.  Collective.
 
-        Displacement, history variables of contacts, and planes return to the end of the step before; loads, boundary values and
-        laws stay as they are.  Only one step can be undone, until another one is accepted.
+        Displacement, history variables of contacts, and surfaces return to the end of the previous
+        step.  Loads, boundary values and laws are not changed.  Only one step can be undone, until
+        another one is accepted.
 
         Raises:
-            ValueError: no step has been accepted since the beginning or the last ``reset``, ``load`` or ``rewind``.
+            ValueError: no step has been accepted since the start or the last ``reset``,
+                ``restore``, ``load`` or ``rewind``.
         """
         check_alive(self, self.body, self.contacts)
         if self._before is None:
@@ -398,18 +439,19 @@ class ContactProblem(Guarded):
         self._go_to(self._before)
 
     def snapshot(self) -> Accepted:
-        """The last converged state, kept in memory for ``restore``, which may be called any number of times.
+        """Return the last converged state, for any number of calls of ``restore``.
 
-        It contains displacement, history variables of contacts, and positions of surfaces.  ``save`` writes the same to a file.
+        It contains the displacement, history variables of contacts, and poses of surfaces, in
+        memory.  ``save`` writes the same data to a file.
         """
         check_alive(self, self.body, self.contacts)
         return self._accepted
 
     def restore(self, snapshot: Accepted) -> None:
-        """Continue from a snapshot; loads, boundary values and laws stay as they are.  Collective.
+        """Return to a snapshot; loads, boundary values and laws are not changed.  Collective.
 
         Args:
-            snapshot: A result of this problem's ``snapshot``.
+            snapshot: A state returned by this problem's ``snapshot``.
 
         Raises:
             ValueError: it belongs to another problem.
@@ -423,14 +465,18 @@ class ContactProblem(Guarded):
         self._go_to(snapshot)
 
     def reset(self) -> None:
-        """Return to the undeformed body without reactions or history, and surfaces to their positions when the problem was made."""
+        """Return to the initial state: undeformed body, no reactions, no history.
+
+        Surfaces return to the poses which they had when the problem was created.
+        """
         check_alive(self, self.body, self.contacts)
         self._go_to(self._first)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a checkpoint: everything that the next step starts from, of all ranks, in one file.
+        """Write a checkpoint: one file with all data that the next step starts from.
 
-        The file is replaced only when the new one is complete, so a killed run leaves the last one intact.  Collective.
+        The file is replaced only when the new one is complete, so a run that is killed leaves the
+        previous checkpoint intact.  Collective.
 
         Args:
             path: File name, usually ending in ``.npz``.
@@ -443,8 +489,8 @@ class ContactProblem(Guarded):
     def load(self, path: str | PathLike[str]) -> None:
         """Continue from a checkpoint of the same problem, on any number of ranks.  Collective.
 
-        On one rank, the following steps agree bit for bit with an uninterrupted run.  On several ranks, MUMPS adds in the order
-        in which messages arrive, and they agree to rounding.
+        On one rank, the following steps agree bit for bit with an uninterrupted run.  On several
+        ranks, they agree to rounding, because MUMPS adds in the order in which messages arrive.
 
         Raises:
             ValueError: the file is not a checkpoint of this problem.
@@ -457,7 +503,7 @@ class ContactProblem(Guarded):
     # -- helpers -------------------------------------------------------------------------------
 
     def _agree(self, comm: MPI.Comm) -> None:
-        """Raise a ``ValueError`` on all ranks if what may change between steps differs between them.  Collective."""
+        """Raise a ``ValueError`` on all ranks if the options differ between ranks.  Collective."""
         agree(
             comm,
             solver=self.solver,
@@ -473,5 +519,8 @@ class ContactProblem(Guarded):
             logger.info(line())
 
     def counts(self) -> Counts:
-        """Contact nodes open, sticking and slipping in the last converged state.  Collective."""
+        """Return the numbers of open, sticking and slipping contact nodes.  Collective.
+
+        They refer to the last converged state.
+        """
         return counts_of(self.body, self.contacts)

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What users give to a problem, checked: unknown, contacts, boundary conditions, solver, tolerance."""
+"""Validation of the input of a problem: unknown, contacts, boundary conditions, options."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import Solver
 
 
-# What to do where a motion of a body that contact alone holds is undetermined.
+# Treatments of a body held by contact alone if a motion of it is undetermined.
 UNDETERMINED_CHOICES = ("refused", "nearest")
 
 OPTION_EXAMPLES = {
@@ -45,13 +45,17 @@ OPTION_EXAMPLES = {
     "jit_options": '{"cffi_extra_compile_args": ["-O3"]}',
 }
 
-PROBLEM_NUMBERS = count(
-    1
-)  # of problems as they are made, and of times at which surfaces are driven: each larger than the last
+# Increasing numbers, for problems in the order of their creation, and for uses of driven surfaces.
+PROBLEM_NUMBERS = count(1)
 
 
 def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
-    """The contacts, each on the space of ``u``, all with the same displacements."""
+    """Return the contacts as a tuple.
+
+    Raises:
+        ValueError: a contact is not on the space of ``u``, or contacts differ in the sub-space of
+            displacements, or are inconsistent.
+    """
     if isinstance(contacts, Contact):
         contacts = [contacts]
     if not isinstance(contacts, (list, tuple)):
@@ -84,7 +88,10 @@ def checked_contacts(contacts: Any, u: fem.Function) -> tuple[Contact, ...]:
 
 
 def check_sides(contacts: Sequence[Contact]) -> None:
-    """Raise a ``ValueError`` if a node that carries unknowns of one contact is opposite to another one's.  On this rank alone."""
+    """Raise a ``ValueError`` if a node of this rank is slave and master, or slave of two contacts.
+
+    Only contacts with deformable surfaces are concerned.
+    """
     for contact in contacts:
         for other in contacts:
             if np.isin(contact.opposite, other.nodes).any():
@@ -100,7 +107,7 @@ def check_sides(contacts: Sequence[Contact]) -> None:
 
 
 def check_mesh(contact: Contact) -> None:
-    """Raise a ``ValueError`` if the mesh is no longer where it was when the contact was made."""
+    """Raise a ``ValueError`` if the mesh was moved after the contact was created."""
     if contact.measure.mesh_has_moved:
         raise ValueError(
             "the mesh was moved or scaled after the contact was made, whose gaps and areas no longer fit: move it "
@@ -109,7 +116,11 @@ def check_mesh(contact: Contact) -> None:
 
 
 def checked_conditions(bcs: Any, V: fem.FunctionSpace) -> list:
-    """The boundary conditions, each on ``V`` or a part of it."""
+    """Return the boundary conditions as a list.
+
+    Raises:
+        ValueError: one of them is no boundary condition on ``V`` or a sub-space of ``V``.
+    """
     if compat.is_condition(bcs):
         raise ValueError(f"bcs must be a list of boundary conditions: write bcs=[bc], not {bcs!r}.")
     if not isinstance(bcs, (list, tuple)):
@@ -126,7 +137,11 @@ def checked_conditions(bcs: Any, V: fem.FunctionSpace) -> list:
 
 
 def checked_solver(solver: Any):
-    """A solver, or the automatic choice for None."""
+    """Return the solver; None becomes ``Automatic()``.
+
+    Raises:
+        ValueError: it is no ``Solver``.
+    """
     if isinstance(solver, type):
         raise ValueError(f"solver {solver.__name__} is a class: write solver={solver.__name__}().")
     if solver is not None and not isinstance(solver, Solver):
@@ -152,21 +167,24 @@ def body_of(
     displacements: Displacements | None = None,
     form_options: dict[str, Any] | None = None,
 ) -> ElasticBody:
-    """The body of a residual form: an ``ElasticBody`` where that is linear in ``u``.  Collective.
+    """Return the body of a residual form.  Collective.
+
+    It is an ``ElasticBody`` if the form is linear in ``u``, else a ``NonlinearBody``.
 
     Args:
         F: Residual form.
         u: Displacement.
         bcs: Dirichlet conditions.
-        J: Derivative of ``F``; found by UFL if None.
-        options: PETSc options of linear solves.
-        prefix: Their prefix.
-        before_residual: None, or a function of ``u`` that sets coefficients of ``F`` and ``J``.
-        displacements: Its ``Displacements``, where they are known.
-        form_options: Of the forms' compilation, see ``compat.compiled``.
+        J: Derivative of ``F``; if None, UFL computes it.
+        options: PETSc options of the linear solver.
+        prefix: Prefix of these options.
+        before_residual: Function of ``u`` that sets coefficients of ``F`` and ``J`` before each
+            assembly, or None.
+        displacements: ``Displacements`` of ``u``, if already computed.
+        form_options: Options for compiling the forms, see ``compat.compiled``.
 
     Raises:
-        ValueError: ``F`` is no residual form in ``u``.
+        ValueError: on all ranks, if ``F`` is no residual form in ``u``.
     """
     with raised_together(u.function_space.mesh.comm):
         moving = before_residual is not None
@@ -182,7 +200,11 @@ def body_of(
 
 
 def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
-    """Whether a solid body, small enough for factors, has so many contact nodes that multigrid is faster.  Collective."""
+    """Return whether multigrid is faster because of many contact nodes.  Collective.
+
+    This applies to three-dimensional linear bodies with default PETSc options that are small enough
+    for a factorisation, and to ``Automatic`` and ``FixedPoint`` solvers.
+    """
     unknowns = body.comm.allreduce(body.size)
     solid = body.V.mesh.geometry.dim == 3 and CROWDED_SIZE <= unknowns <= LARGE_SIZES[3]
     if not (contacts and solid and body.options is None) or body.nonlinear:
@@ -196,7 +218,11 @@ def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> b
 
 
 def checked_lagged(quantities: Any) -> tuple:
-    """Lagged quantities, each with the methods of ``Lagged``."""
+    """Return the user's lagged quantities as a tuple.
+
+    Raises:
+        ValueError: one of them has no method ``change`` or ``renewed``, see ``Lagged``.
+    """
     quantities = (quantities,) if hasattr(quantities, "renewed") else tuple(quantities)
     for one in quantities:
         if not (hasattr(one, "change") and hasattr(one, "renewed")):
@@ -207,7 +233,7 @@ def checked_lagged(quantities: Any) -> tuple:
 
 
 def checked_tolerance(tol: Any) -> float:
-    """A tolerance that rounding allows to reach."""
+    """Return a tolerance.  Raise a ``ValueError`` if it is not finite or below 1e-13."""
     try:
         value = positive("tol", tol, finite=True)
     except ValueError:
@@ -220,7 +246,7 @@ def checked_tolerance(tol: Any) -> float:
 
 
 def checked_undetermined(choice: Any) -> str:
-    """One of ``UNDETERMINED_CHOICES``."""
+    """Return the choice.  Raise a ``ValueError`` if it is not in ``UNDETERMINED_CHOICES``."""
     if choice not in UNDETERMINED_CHOICES:
         raise ValueError(
             f"undetermined must be one of {', '.join(UNDETERMINED_CHOICES)}, got {choice!r}."
@@ -229,7 +255,7 @@ def checked_undetermined(choice: Any) -> str:
 
 
 def checked_internal(internal: Any):
-    """``InternalVariables``, None where there are none."""
+    """Return ``InternalVariables`` or None.  Raise a ``ValueError`` for other objects."""
     if internal is None:
         return None
     from dolfinx_contact.bodies.internal_variables import InternalVariables
@@ -242,7 +268,7 @@ def checked_internal(internal: Any):
 
 
 def checked_options(name: str, options: Any) -> dict | None:
-    """Options of PETSc or of compilation, a dictionary."""
+    """Return a dictionary of options, or None.  Raise a ``ValueError`` for other objects."""
     if options is not None and not isinstance(options, dict):
         example = OPTION_EXAMPLES[name]
         raise ValueError(f"{name} must be a dictionary such as {example}, got {options!r}.")
@@ -250,20 +276,26 @@ def checked_options(name: str, options: Any) -> dict | None:
 
 
 def checked_form_options(form_compiler_options: Any, jit_options: Any, entity_maps: Any) -> dict:
-    """What forms are compiled with, see ``compat.compiled``."""
+    """Return the options for compiling forms, see ``compat.compiled``."""
     compiler = checked_options("form_compiler_options", form_compiler_options)
     jit = checked_options("jit_options", jit_options)
     return dict(form_compiler_options=compiler, jit_options=jit, entity_maps=entity_maps)
 
 
 def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: float = 0) -> None:
-    """Take from boundary conditions which directions of the contact nodes are held, and which nodes cannot touch.  Collective.
+    """Store in the contacts which directions of their nodes supports hold.  Collective.
+
+    Nodes with prescribed normal displacement are excluded from contact, with a warning.
 
     Args:
         contacts: The contacts.
         body: The body.
-        level: Of the caller in whose name is warned.
-        told: Number of nodes left out of which a warning has told before.
+        level: ``stacklevel`` of the warning.
+        told: Number of excluded nodes in earlier warnings; a warning is issued only for more nodes.
+
+    Raises:
+        ValueError: on all ranks, if all nodes are excluded, or a node is held in a direction
+            oblique to its surface.
     """
     for contact in contacts:
         meet_supports(contact, body.fixed)
@@ -277,9 +309,9 @@ def hold_points(
     level: int = 3,
     told: float = 0,
 ) -> None:
-    """The same of contact points of these contacts.
+    """Store in the contact points which of their directions supports hold.  Collective.
 
-    Nodes whose normal displacement is given are left out with a warning, unless no other is left.  Collective.
+    See ``hold``; ``points`` are the contact points of each contact.
     """
     left_out = [np.zeros((0, 3))]
     with raised_together(body.comm):
@@ -309,10 +341,10 @@ def hold_points(
 
 
 def support(body: ElasticBody, contacts: Sequence[Contact], bcs: Any) -> None:
-    """Give a body other Dirichlet conditions, and let contacts know.  Collective.
+    """Replace the Dirichlet conditions of a body and of its contacts.  Collective.
 
     Raises:
-        ValueError: on all ranks, for conditions that make no sense; those of before stay.
+        ValueError: on all ranks, for invalid conditions; the previous conditions are kept.
     """
     with raised_together(body.comm):
         bcs = checked_conditions(bcs, body.V)
@@ -320,7 +352,7 @@ def support(body: ElasticBody, contacts: Sequence[Contact], bcs: Any) -> None:
     before = body.bcs
     body.support(bcs)
     try:
-        hold(contacts, body, level=5)  # who assigned them
+        hold(contacts, body, level=5)  # warn at the assignment to ``problem.bcs``
     except Exception:
         body.support(before)
         hold(contacts, body, told=np.inf)
@@ -328,10 +360,11 @@ def support(body: ElasticBody, contacts: Sequence[Contact], bcs: Any) -> None:
 
 
 def _held_directions(contact: Contact, points: ContactPoints, fixed: np.ndarray) -> tuple:
-    """What boundary conditions fix, as ``ContactPoints.hold`` takes it."""
+    """Return the held directions of contact points, as arguments of ``ContactPoints.hold``."""
     left = points.free_of(fixed)
     closed = left[:, -1] < 1e-12
-    # What is left of each local direction without its fixed components: all, nothing, or a part.
+    # Fraction of each local direction without fixed components: one if free, zero if held, else
+    # partly.
     partly = (left > 1e-12) & (left < 1 - 1e-12) & ~closed[:, None]
     held, guided = (left[:, :-1] < 0.5) | closed[:, None], None
     if partly[:, -1].any():
@@ -357,15 +390,15 @@ def frames_of_step(
     before: Sequence[Frames | None],
     known: list,
 ) -> tuple[list[Frames], bool]:
-    """Frames and gaps of contacts for a step, and whether rows are others.  Collective.
+    """Return the frames of each contact for a step, and whether rows have changed.  Collective.
 
     Args:
         contacts: The contacts.
         body: The body.
         start: The last converged displacement, owned degrees of freedom.
-        at: The one for which they are taken; None is the last.
-        before: Frames with which the same step was solved before.
-        known: ``ContactPoints`` for which everything is set up, renewed here.
+        at: Displacement at which the frames are evaluated; None is ``start``.
+        before: Frames of each contact in the previous solution of the same step, or None.
+        known: ``ContactPoints`` of each contact whose held directions are set; updated here.
     """
     frames = [frames_of(c, start, at, placed) for c, placed in zip(contacts, before)]
     changed = [k for k, (placed, old) in enumerate(zip(frames, known)) if placed.points is not old]
@@ -378,7 +411,7 @@ def frames_of_step(
 
 
 def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
-    """Warn of surfaces that make no sense where the undeformed body stands.  Collective."""
+    """Warn about surfaces whose position does not fit the undeformed body.  Collective."""
     for contact in contacts:
         message = contact.geometry.check_start(contact, body)
         if message:
@@ -386,16 +419,21 @@ def check_surfaces(contacts: Sequence[Contact], body: ElasticBody) -> None:
 
 
 def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
-    """Warn of a volume form that is multiplied by the radius while contacts have no weight, or one without its 2 pi.  Collective."""
+    """Warn if an axisymmetric form does not match the weights of the contacts.  Collective.
+
+    This is the case if F is multiplied by the radius and a contact has no weight, or if only one of
+    both contains the factor 2 pi.
+    """
     if not contacts or contacts[0].points.dim == 3:
         return
     cells = [part.integrand() for part in F.integrals() if part.integral_type() == "cell"]
-    found = [_radius(term) for integrand in cells for term in _terms(integrand)]
+    found = [_coordinate_factor(term) for integrand in cells for term in _summands(integrand)]
     which = sorted((k, factor) for k, factor in found if k is not None)
     if not which:
         return
     if not all(
-        contact.measure.weight is not None and not _turns_alone(contact) for contact in contacts
+        contact.measure.weight is not None and not _weight_is_two_pi(contact)
+        for contact in contacts
     ):
         name = ("first", "second", "third")[which[0][0]]
         warnings.warn(
@@ -408,9 +446,7 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
         if not contact.measure.axial:
             continue
         x, weight = contact.displacements.x[:, 0], contact.measure.density
-        far = int(
-            np.argmax(x)
-        )  # moduli may be among the factors of F, but hardly make exactly 2 pi
+        far = int(np.argmax(x))  # other factors of F are unlikely to be exactly 2 pi
         turns = [factor * x[far] / weight[far] for _, factor in which]
         if (
             np.isclose(turns, 2 * np.pi, rtol=1e-9).any()
@@ -423,15 +459,15 @@ def check_weights(F: ufl.Form, contacts: Sequence[Contact]) -> None:
             )
 
 
-def _turns_alone(contact: Contact) -> bool:
-    """Whether the weight of a contact is 2 pi, without the radius.  Collective."""
+def _weight_is_two_pi(contact: Contact) -> bool:
+    """Return whether the weight of a contact is 2 pi, without the radius.  Collective."""
     measure = contact.measure
     alone = not measure.axial and np.allclose(measure.density, 2 * np.pi, rtol=1e-9)
     return all(contact.comm.allgather(bool(alone)))
 
 
-def _terms(integrand: Any) -> list[Any]:
-    """The terms of a sum."""
+def _summands(integrand: Any) -> list[Any]:
+    """Return the terms of a UFL sum."""
     terms = [integrand]
     for term in terms:
         if isinstance(term, Sum):
@@ -439,8 +475,13 @@ def _terms(integrand: Any) -> list[Any]:
     return terms
 
 
-def _radius(term: Any) -> tuple[int | None, float]:
-    """Which coordinate itself is a factor of a term, None if none is; the size of its numbers."""
+def _coordinate_factor(term: Any) -> tuple[int | None, float]:
+    """Return the coordinate and the constant among the factors of a UFL term.
+
+    Returns:
+        Index of the coordinate, or None if no coordinate is a factor; magnitude of the product of
+        all numbers.
+    """
     factors = [term]
     for factor in factors:
         if isinstance(factor, Product):
@@ -452,7 +493,10 @@ def _radius(term: Any) -> tuple[int | None, float]:
 
 
 def check_axial(contacts: Sequence[Contact]) -> None:
-    """Raise a ``ValueError`` on all ranks if a surface moves as none can that is a body of revolution.  Collective."""
+    """Raise a ``ValueError`` on all ranks if a surface violates axial symmetry.  Collective.
+
+    In axially symmetric problems, surfaces must not rotate or be driven by force along the radius.
+    """
     for contact in contacts:
         if not contact.measure.axial:
             continue
@@ -469,7 +513,7 @@ def check_axial(contacts: Sequence[Contact]) -> None:
 
 
 def take_contacts(problem: ContactProblem, contacts: Sequence[Contact]) -> None:
-    """From now on a problem makes the history of its contacts; warns where another one has begun it."""
+    """Make a problem the owner of contacts; warn if they have a history of another problem."""
     begun = [contact for contact in contacts if not contact.history.empty]
     if begun:
         warnings.warn(
@@ -482,7 +526,7 @@ def take_contacts(problem: ContactProblem, contacts: Sequence[Contact]) -> None:
 
 
 def check_alive(problem: ContactProblem, body: ElasticBody, contacts: Sequence[Contact]) -> None:
-    """Raise a ``ValueError`` if a problem can no longer go on."""
+    """Raise a ``ValueError`` if a problem was closed or another problem owns its contacts."""
     if body.closed:
         raise ValueError("this ContactProblem has been closed: make a new one.")
     if not all(contact.owner is not None and contact.owner() is problem for contact in contacts):
@@ -496,12 +540,15 @@ def check_alive(problem: ContactProblem, body: ElasticBody, contacts: Sequence[C
 
 
 def check_step(u: fem.Function, comm: MPI.Comm, contacts: Sequence[Contact]) -> None:
-    """Raise a ``ValueError`` on all ranks if guess, planes, laws or mesh do not allow another step.  Collective."""
+    """Raise a ``ValueError`` on all ranks if a step cannot be solved.  Collective.
+
+    Initial guess, surfaces, laws and mesh are checked.
+    """
     check_axial(contacts)
     for contact in contacts:
         contact.laws.check(contact)
     with raised_together(comm):
-        for contact in contacts[:1]:  # of one mesh, all of them
+        for contact in contacts[:1]:  # all contacts are on the same mesh
             check_mesh(contact)
         if not np.isfinite(u.x.array).all():
             raise ValueError(

@@ -1,6 +1,10 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""How the solution of a load step is searched for: levels of lagged quantities around what holds the body and a solver; and without reactions, whether that is one."""
+"""Solution of a load step: nested loops over lagged quantities around a solver.
+
+Before the solver runs, it is checked whether the contact-free solution already is the solution, and
+whether supports and contact can hold the body.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +21,26 @@ if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# Penetration over the largest displacement that three digits of it leave no doubt about.
+# Penetration relative to the largest displacement above which a contact-free solution with three
+# correct digits is certain to penetrate.
 CERTAIN_PENETRATION = 0.1
 
 NOTHING_TOUCHES = "nothing touches"
 
-# Tolerance of a solution on the way to the geometry of the end, over that of the geometry.
+# Tolerance of the solutions that update the geometry of the step, relative to ``geometry_tol``.
 ROUGH_TOLERANCE = 0.03
 
 
 def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
-    """What is found with all that the step takes for known, which is that of the state found: see ``Staggered``.  Collective."""
+    """Return the solution of the next load step, with all lagged quantities converged.  Collective.
+
+    Returns:
+        The solver's result; the final changes of the lagged quantities by class name; and why the
+        state is no solution, in words, empty otherwise.
+    """
     step, own = problem.load_step(), ()
     goal, levels = step.tol, _levels(problem, step)
-    if _digits_later(problem):
+    if _starts_with_rough_solutions(problem):
         step = step.but(tol=max(goal, ROUGH_TOLERANCE * problem.geometry_tol))
     starts = problem.accepted.starts
     if not levels:
@@ -38,7 +48,7 @@ def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
     from dolfinx_contact.step.staggered import solve_staggered
 
     def search(step: LoadStep) -> SolverResult:
-        nonlocal own  # of the starts found within a step the last one alone
+        nonlocal own  # keep only the last start found within the step
         found = find(problem, step, (*starts, *own))
         own = own if found.start is None else (found.start,)
         return found._replace(start=own[0] if own else None)
@@ -47,7 +57,7 @@ def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
 
 
 def _levels(problem: ContactProblem, step: LoadStep) -> list:
-    """What the step takes for known, level by level, the fastest first; imported where there is any.  Collective."""
+    """Return the lagged quantities of the step by levels, the innermost loop first.  Collective."""
     contacts, levels = problem.contacts, []
     if any(contact.laws.follow_pressure for contact in contacts):
         from dolfinx_contact.lagged.friction import PressureFriction
@@ -72,17 +82,24 @@ def _levels(problem: ContactProblem, step: LoadStep) -> list:
     return levels
 
 
-def _digits_later(problem: ContactProblem) -> bool:
-    """Whether the step is solved to as many digits as its geometry needs first: all digits take cycles of multigrid."""
+def _starts_with_rough_solutions(problem: ContactProblem) -> bool:
+    """Return whether the geometry is first updated with solutions of reduced accuracy.
+
+    This saves multigrid cycles on deformable surfaces, where the step is solved repeatedly.
+    """
     renewed = any(c.geometry.renews_rows for c in problem.contacts)
     return renewed and not (problem.body.exact or problem.body.nonlinear)
 
 
 def find(problem: ContactProblem, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
-    """What is found with the laws as they are, whatever holds the body, judged by F itself.  Collective.
+    """Return the solution of a load step with fixed lagged quantities.  Collective.
+
+    Errors are measured with the residual form F.  If no static state exists, the result is the last
+    displacement, marked as no solution.
 
     Raises:
-        ValueError: on all ranks, if nothing can hold the body, or nothing determines a motion that is to be refused.
+        ValueError: on all ranks, if neither supports nor contact can hold the body, or if a motion
+            is undetermined and ``undetermined`` is "refused".
     """
     if step.holding is not None and step.holding.beyond:
         return unmoved(step)
@@ -120,7 +137,11 @@ def find(problem: ContactProblem, step: LoadStep, starts: Sequence[Any]) -> Solv
 
 
 def ended(state: StepState, geometry_tol: float) -> StepState:
-    """A converged state with what only its end tells: gaps of open nodes, slip of those that have left or opened.  Collective."""
+    """Return a converged state with final values at nodes that are open or have left.  Collective.
+
+    Gaps of open nodes on deformable surfaces are evaluated at the final displacement.  Slip of
+    nodes that have left the opposite surface, or have opened, ends where they left or opened.
+    """
     contacts, nodes = state.step.contacts, []
     for contact, one in zip(contacts, state.nodes):
         one = contact.with_slip_past_edges(one, state.x)
@@ -134,7 +155,7 @@ def ended(state: StepState, geometry_tol: float) -> StepState:
 
 
 def without_reactions(step: LoadStep) -> SolverResult | None:
-    """The displacement without reactions, if it is the solution of a step.  Collective."""
+    """Return the contact-free solution if it is the solution of a step, else None.  Collective."""
     body, c = step.body, step.no_motions
     if step.surfaces is not None:
         if not step.surfaces.can_rest:
@@ -143,7 +164,7 @@ def without_reactions(step: LoadStep) -> SolverResult | None:
     with stage("contact: elastic solve"):
         trial = body.free_state(step.b, rough=True)
         if not (body.last_free_state.exact or presses(step, trial, c)):
-            trial = body.free_state(step.b)  # whether anything touches takes all digits
+            trial = body.free_state(step.b)  # full accuracy decides whether a node touches
     if may_touch(step, trial, c):
         return None
     state = refined(step.open(trial, c))
@@ -155,16 +176,23 @@ def without_reactions(step: LoadStep) -> SolverResult | None:
 
 
 def unmoved(step: LoadStep, reason: str = NO_SOLUTION) -> SolverResult:
-    """The last displacement with the present boundary values, judged as what it is: no solution.  Collective."""
+    """Return the last displacement with the present boundary values, as no solution.  Collective.
+
+    Args:
+        step: The step.
+        reason: Why there is no solution, for the record of the step.
+    """
     x, fixed = step.last.copy(), step.body.fixed
     x[fixed] = step.b[fixed]
     return SolverResult(step.measure(x), 0, np.inf, SolverName.NONE, reason=reason)
 
 
 def floating(step: LoadStep) -> SolverResult | None:
-    """Of a loose body whose loads balance the displacement without reactions nearest to the last one.  Collective.
+    """Return the contact-free solution of a loose body under balanced loads.  Collective.
 
-    None where it touches.
+    A loose body is held by contact alone.  Of its contact-free solutions, which differ by rigid
+    motions, the one nearest to the last displacement is chosen.  The result is None if it
+    penetrates or is no solution within the tolerance.
     """
     x, fixed = step.last.copy(), step.body.fixed
     x[fixed] = step.b[fixed]
@@ -180,28 +208,39 @@ def floating(step: LoadStep) -> SolverResult | None:
 
 
 def presses(step: LoadStep, trial: np.ndarray, c: np.ndarray | None = None) -> bool:
-    """Whether a displacement without reactions known to three digits penetrates a plane for certain.  Collective."""
-    return _deepest(step, trial, c) > CERTAIN_PENETRATION * step.body.farthest(trial)
+    """Return whether a displacement with three correct digits certainly penetrates.  Collective."""
+    return _deepest_penetration(step, trial, c) > CERTAIN_PENETRATION * step.body.farthest(trial)
 
 
 def may_touch(step: LoadStep, trial: np.ndarray, c: np.ndarray | None = None) -> bool:
-    """Whether a displacement without reactions penetrates a plane by more than rounding.  Collective."""
-    return _deepest(step, trial, c, lambda contact: contact.gap_rounding(trial)) > 1.0
+    """Return whether a displacement penetrates a surface by more than rounding.  Collective."""
+    return _deepest_penetration(step, trial, c, lambda contact: contact.gap_rounding(trial)) > 1.0
 
 
-def _deepest(
+def _deepest_penetration(
     step: LoadStep,
     trial: np.ndarray,
     c: np.ndarray | None,
     unit: Callable = lambda contact: 1.0,
 ) -> float:
-    """The deepest penetration of all contacts, at least zero, in a unit of length.  Collective."""
+    """Return the deepest penetration of all contacts, at least zero.  Collective.
+
+    Args:
+        step: The step.
+        trial: Displacement, owned degrees of freedom.
+        c: Motions of surfaces driven by force, ``shape=(m,)``.
+        unit: Function of a contact; its value divides the penetrations of that contact.
+    """
     depths = [-contact.at(trial, c).gap / unit(contact) for contact in step.contacts]
     return step.body.largest(np.concatenate([np.zeros(1), *depths]))
 
 
 def refined(state: StepState) -> StepState:
-    """The state without reactions, with another digit where what is left of ``b`` counts.  Collective."""
+    """Return a contact-free state after one step of iterative refinement.  Collective.
+
+    The state is returned unchanged if its errors are within the tolerance, or if refinement does
+    not reduce them.
+    """
     step, errors = state.step, state.errors
     if errors.largest <= step.tol:
         return state

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Adaptive refinement: cells with large errors are divided, mesh after mesh, until a quantity is accurate enough."""
+"""Adaptive mesh refinement until the estimated error of a quantity is below a tolerance."""
 
 from __future__ import annotations
 
@@ -21,14 +21,21 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.problem import ContactProblem
 
-# Squares that differ by less, as of cells that symmetry makes equal, are divided together.
+# Relative difference below which two squared cell errors count as equal.  Cells that are equal by
+# symmetry are then refined together, in spite of rounding.
 EQUAL_SQUARES = 1e-6
 
 Pair = tuple["ContactProblem", "ContactProblem"]
 
 
 class Tried(NamedTuple):
-    """A mesh that ``adapt`` has tried: its number of cells, the value of the quantity, and its estimated relative error."""
+    """Result of ``adapt`` on one mesh.
+
+    Attributes:
+        cells: Number of cells of the mesh.
+        value: Value of the quantity in the lower-order problem.
+        error: Estimated relative error of the value.
+    """
 
     cells: int
     value: float
@@ -37,15 +44,17 @@ class Tried(NamedTuple):
 
 @dataclass(frozen=True)
 class Adapted:
-    """What ``adapt`` returns.
+    """Result of ``adapt``: a quantity, its estimated error, and the problems on the last mesh.
 
     Attributes:
-        value: The quantity in the higher-order problem on the last mesh.
-        error: Estimated relative error of the lower-order problem on that mesh; conservative for ``value``.
-        reached: Whether ``error`` is at most the requested one.
-        problem, reference: The two problems on the last mesh, at the end of the load history.
+        value: Value of the quantity in the higher-order problem on the last mesh.
+        error: Estimated relative error of the lower-order problem on the last mesh; conservative
+            for ``value``.
+        reached: Whether ``error`` is at most the requested relative error.
+        problem, reference: The lower-order and the higher-order problem on the last mesh, at the
+            end of the load history.
         estimate: ``Estimate`` of all quantities on the last mesh.
-        tried: A ``Tried`` for each mesh.
+        tried: Number of cells, value and error for each mesh, as ``Tried``.
 
     Example:
         >>> dc.Adapted.__name__
@@ -71,27 +80,34 @@ def adapt(
     share: float = 0.5,
     quantities: Mapping[str, Callable[[ContactProblem], float]] | None = None,
 ) -> Adapted:
-    """Refine a mesh where the error is, until a quantity is accurate enough.  Collective.
+    """Refine cells with large errors until a quantity has the requested accuracy.  Collective.
 
-    On each mesh, ``compute`` repeats the whole load history: no state is transferred from mesh to mesh.
-    ``estimate`` gives the error of the quantity and the energy norm of the difference on each cell; the cells with the largest
-    norms, which together make up the part ``share`` of the sum of squares, are divided (W. Doerfler, SIAM J. Numer. Anal. 33
-    (1996) 1106).  These are estimates, not bounds, and do not include the error of increments.  New boundary nodes are midpoints
-    of old edges, also on a curved boundary.
+    On each mesh, ``compute`` solves the whole load history: no state is transferred between meshes.
+    ``estimate`` gives the error of the quantity, and an error indicator for each cell: the energy
+    norm of the difference between the two problems.  The cells with the largest indicators are
+    refined (Doerfler marking): their squares make up the fraction ``share`` of the sum of squares
+    (W. Doerfler, SIAM J. Numer. Anal. 33 (1996) 1106).  The errors are estimates, not bounds, and
+    do not include the error caused by finite load increments.  New boundary nodes are midpoints of
+    edges of the coarser mesh, also on a curved boundary.
 
     Args:
-        compute: Function of a mesh that returns two problems on it, of lower and of higher order, at the end of the load history.
-        mesh: Initial mesh, of triangles or tetrahedra.
+        compute: Function of a mesh.  It returns two problems on this mesh at the end of the load
+            history: first the problem of lower order, then the problem of higher order.
+        mesh: Initial mesh of triangles or tetrahedra.
         accuracy: Requested relative error of the quantity.
-        quantity: Name of one of the quantities of ``estimate``, except ``pressure`` and ``shear``, or of ``quantities``.
+        quantity: Name of a quantity, built in (see ``estimate``; not ``pressure`` or ``shear``) or
+            from ``quantities``.
         meshes: Largest number of meshes.
-        share: Between 0 and 1; a smaller one means more meshes, each better adapted.
+        share: Fraction of the squared error on the refined cells, greater than 0 and at most 1.  A
+            smaller fraction leads to more meshes, each better adapted.
+        quantities: Further quantities: functions of a problem, by name (see ``estimate``).
 
     Returns:
-        An ``Adapted``; ``reached`` says whether the meshes sufficed.
+        An ``Adapted``; its attribute ``reached`` is True if the requested accuracy was reached.
 
     Raises:
-        ValueError: the mesh has other cells, the quantity is unknown, a number is out of range, or the problems are not on the mesh.
+        ValueError: the cells are neither triangles nor tetrahedra, the quantity is unknown, a
+            number is out of range, or ``compute`` does not return two problems on the mesh.
 
     Example:
         >>> def press(cube, order):  # and all steps of the load history
@@ -161,7 +177,12 @@ def _cell_map(mesh: Any):
 
 
 def _largest(cells: fem.Function, share: float) -> np.ndarray:
-    """Owned cells with the largest values, which together have this part of the sum of squares of all ranks' cells."""
+    """Return the owned cells to refine: those with the largest error indicators.  Collective.
+
+    Args:
+        cells: Error indicator of each cell, a function of degree 0.
+        share: Fraction of the sum of squares over all ranks that the cells to refine make up.
+    """
     comm = cells.function_space.mesh.comm
     squares = cells.x.array[: _cell_map(cells.function_space.mesh).size_local] ** 2
     falling = np.sort(np.concatenate(comm.allgather(squares)))[::-1]

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Finer meshes and smaller increments, one after another, until a number is accurate enough."""
+"""Mesh and increment refinement until the estimated error of a result is below a tolerance."""
 
 from __future__ import annotations
 
@@ -18,24 +18,28 @@ from dolfinx_contact.support.collective import agree, raised_together
 
 Mesh = TypeVar("Mesh")
 
-# Differences from mesh to mesh are taken to shrink at least and at most by these factors: the rest may be chance.
+# Smallest and largest ratio of two successive differences between meshes that the estimate of the
+# mesh error uses.  Ratios outside this range may be coincidence.
 SMALLEST_LARGEST_RATIO = 2.0, 4.0
-# An estimate falls by this factor from one mesh to the next, at most.
+# Largest factor by which the estimated mesh error may decrease from one mesh to the next.  A larger
+# decrease may be coincidence.
 LARGEST_DECREASE = 8.0
-# Part of the accuracy that is left to the increments.
+# Fraction of the requested error that the increments may cause.
 INCREMENT_SHARE = 0.5
 
 
 @dataclass(frozen=True)
 class Converged:
-    """What ``converge`` returns.
+    """Result of ``converge``: a computed number and its estimated error.
 
     Attributes:
-        value: The number from the finest run.
-        error: Its estimated relative error, ``mesh_error + increment_error``.
-        mesh_error, increment_error: The parts of mesh and increments.
-        reached: Whether ``error`` is at most the requested one.
-        tried: Values of all runs, by mesh and number of parts.
+        value: Number computed in the finest run.
+        error: Estimated relative error of ``value``, ``mesh_error + increment_error``.
+        mesh_error, increment_error: Estimated relative errors caused by the mesh and by the
+            increments.
+        reached: Whether ``error`` is at most the requested relative error.
+        tried: Computed numbers of all runs; the keys are pairs of the mesh and the number of parts
+            of each increment.
 
     Example:
         >>> found = dc.converge(lambda n, parts: 1.0 + n**-2, 0.01, meshes=[4, 8, 16])
@@ -62,30 +66,37 @@ def converge(
     halvings: int = 0,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Converged:
-    """Refine meshes and halve increments until the estimated error of a number is small enough.  Collective.
+    """Refine mesh and increments until a computed number has the requested accuracy.  Collective.
 
-    Increments are halved first on the coarser meshes, where this is cheap.  The estimates, which are not bounds:
+    The number of halvings of the increments is found on the coarser mesh, where it is cheap.  The
+    two errors are estimates, not bounds:
 
-    - increments: twice the change caused by halving them on the previous mesh, their error if convergence is of first order;
-    - mesh: the change from the previous mesh, divided by ``s - 1``, where ``s`` is the factor by which the last change was smaller
-      than the one before, within 2 to 4 (2 for two meshes).  With cells of half the size, ``s = 2**p`` for errors of order p (L. F. Richardson,
-      Phil. Trans. R. Soc. A 226 (1927) 299).  From mesh to mesh, it falls to an eighth at most: two values may agree by chance.
+    - Increments: twice the change caused by halving the increments on the previous mesh.  This is
+      the error if the increments converge with first order.
+    - Mesh: the change from the previous mesh, divided by ``s - 1``, where ``s`` is the ratio of the
+      last two changes, limited to 2 to 4 (``s = 2`` for two meshes).  If the cell size is halved,
+      ``s = 2**p`` for errors of order p (L. F. Richardson, Phil. Trans. R. Soc. A 226 (1927) 299).
+      From one mesh to the next, the estimate decreases at most by a factor of eight, since two
+      values may agree by coincidence.
 
     Args:
-        compute: Function of one of ``meshes`` and a number of parts, 1, 2, 4 ..., that runs the load history with every increment
-            divided into this number of parts and returns the number, the same on all ranks.
+        compute: Function of one entry of ``meshes`` and a number of parts (1, 2, 4, ...).  It
+            solves the load history with every increment divided into this number of parts, and
+            returns the computed number, the same on all ranks.
         accuracy: Requested relative error.
-        meshes: First arguments of ``compute``, from the coarsest mesh to the finest, at least two, each with cells of half the
-            size.
-        halvings: Largest number of halvings of the increments; 0 if there is no history, or its error is not to be estimated.
-        comm: The ranks that compute together; ``MPI.COMM_SELF`` if each rank computes a separate number.
+        meshes: At least two first arguments of ``compute``, from the coarsest mesh to the finest,
+            each with half the cell size of the previous one.
+        halvings: Largest number of halvings of the increments.  With 0, the error caused by the
+            increments is not estimated, for instance since there is only one step.
+        comm: Communicator of the ranks that compute together; ``MPI.COMM_SELF`` if each rank
+            computes a separate number.
 
     Returns:
-        A ``Converged``; ``reached`` says whether meshes and halvings sufficed.
+        A ``Converged``; its attribute ``reached`` is True if the requested accuracy was reached.
 
     Raises:
-        ValueError: there are fewer than two meshes, or one is given twice; the accuracy is not positive; or a value is zero, not a
-            finite real number, or not the same on all ranks.
+        ValueError: there are fewer than two meshes, a mesh is given twice, the accuracy is not
+            positive, or a computed number is zero, not finite, not real, or differs between ranks.
 
     Example:
         >>> found = dc.converge(lambda n, parts: 1.0 + n**-2 + 0.1 / parts, 0.01, [4, 8, 16, 32], halvings=6)
@@ -102,7 +113,9 @@ def converge(
 
     halved, of_mesh = 0, 0.0
     for level in range(1, len(meshes)):
-        halved, increments = _halve(lambda k, n=level - 1: at(n, k), halved, halvings, accuracy)
+        halved, increments = _halvings_needed(
+            lambda k, n=level - 1: at(n, k), halved, halvings, accuracy
+        )
         last, value = at(level - 1, halved), at(level, halved)
         change = abs(value - last)
         shrunk = SMALLEST_LARGEST_RATIO[0]
@@ -116,10 +129,20 @@ def converge(
     return Converged(value, *errors, sum(errors) <= accuracy, tried)
 
 
-def _halve(
+def _halvings_needed(
     at: Callable[[int], float], halved: int, halvings: int, accuracy: float
 ) -> tuple[int, float]:
-    """How often increments must be halved on one mesh, and the error that is left to them."""
+    """Return the number of halvings that the increments need on one mesh, and the remaining error.
+
+    Args:
+        at: Function of the number of halvings that returns the computed number on this mesh.
+        halved: Number of halvings to begin with.
+        halvings: Largest number of halvings; with 0, both results are zero.
+        accuracy: Requested relative error of mesh and increments together.
+
+    Returns:
+        Number of halvings, and the absolute error caused by the increments after these halvings.
+    """
     while halvings:
         before, half = at(halved), at(halved + 1)
         error = 2 * abs(half - before)
@@ -130,7 +153,19 @@ def _halve(
 
 
 def _value(compute: Callable, tried: dict[tuple, float], key: tuple, comm: MPI.Comm) -> float:
-    """Of a run, which is made once."""
+    """Return the number that ``compute`` returns for ``key``.  Collective.
+
+    Each number is computed only once.
+
+    Args:
+        compute: Function of a mesh and a number of parts.
+        tried: Numbers computed so far, by ``key``; a new number is added.
+        key: Mesh and number of parts of each increment.
+        comm: Communicator of the ranks that compute together.
+
+    Raises:
+        ValueError: the number is zero, not finite, not real, or differs between ranks.
+    """
     if key not in tried:
         with raised_together(comm):
             returned = compute(*key)
@@ -146,7 +181,11 @@ def _value(compute: Callable, tried: dict[tuple, float], key: tuple, comm: MPI.C
 
 
 def _checked(compute: object, accuracy: Any, meshes: Any, halvings: Any) -> float:
-    """The accuracy, if all makes sense."""
+    """Return the accuracy as a number after a check of the arguments of ``converge``.
+
+    Raises:
+        ValueError: an argument is invalid.
+    """
     accuracy = positive("accuracy", accuracy, finite=True)
     if not callable(compute):
         raise ValueError(
@@ -178,7 +217,7 @@ def _checked(compute: object, accuracy: Any, meshes: Any, halvings: Any) -> floa
 
 
 def _warn_of_equal(tried: dict[tuple, float]) -> None:
-    """Warn of runs that should differ and do not in any digit: an error estimated from them is zero."""
+    """Warn if two runs returned equal numbers, since the error estimated from them is zero."""
     first: dict[float, tuple] = {}
     for key, value in tried.items():
         if first.setdefault(value, key) != key:

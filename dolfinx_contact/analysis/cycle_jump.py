@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Wear over many cycles: a simulated cycle counts for many, and an estimated error determines for how many."""
+"""Wear over many load cycles by cycle jumps, whose length is controlled by an estimated error."""
 
 from __future__ import annotations
 
@@ -27,19 +27,22 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
 
-# The shortest jump: the cycles of its fine run are simulated one by one.
+# Length of the shortest jump, cycles: its fine run simulates every cycle.
 SHORTEST_JUMP = 2
 
-# Jumps aim at a difference of so many accuracies and may miss that by a factor; from one to the next they grow and shrink by these factors at most.
+# Step size control.  The target of the estimated difference, as a multiple of the requested
+# accuracy; the factor by which an accepted jump may exceed the target; the largest and smallest
+# ratio of the lengths of successive jumps.
 ACCURACIES_AIMED_AT = 1.5
 ACCEPTED_EXCESS = 1.5
 LARGEST_GROWTH = 6.0
 SMALLEST_REDUCTION = 0.1
 
-# Part of the largest mu, or p, by which friction that evolves is to change in a jump.
+# Target of the change of evolving friction in a jump, relative to the largest mu or p.
 FRICTION_CHANGE = 0.25
 
-# Part of all that is worn, of which a jump may have the accuracy as its own error, however little it wears itself.
+# Fraction of the total wear that is added to the wear of a jump where its error is made relative.
+# Without it, jumps with little wear would need an unreasonably small error.
 WORN_SHARE = 0.05
 
 RECORD_FILE = "record.json"
@@ -47,20 +50,21 @@ RECORD_FILE = "record.json"
 
 @dataclass(frozen=True)
 class CycleJump:
-    """What ``cycle_jump`` returns.
+    """Result of ``cycle_jump``: worn volume, wear depth and their estimated errors.
 
     Attributes:
-        cycles: Number of cycles.
-        simulated: Number of simulated cycles, including those of rejected jumps.
-        accepted, rejected: Number of jumps.
+        cycles: Number of load cycles.
+        simulated: Number of simulated cycles, including the cycles of rejected jumps.
+        accepted, rejected: Number of accepted and rejected jumps.
         volume: Worn volume of all contacts, length cubed (per thickness in two dimensions).
-        depth: Largest worn depth, length.
-        volume_error: Estimated error of the volume, relative to it.
-        depth_error: Largest estimated error of a node's depth, relative to ``depth``.
-        profile_error: Integral of the nodes' estimated errors over the surface, relative to the volume.
+        depth: Largest wear depth, length.
+        volume_error: Estimated error of the worn volume, relative to ``volume``.
+        depth_error: Largest estimated error of a nodal wear depth, relative to ``depth``.
+        profile_error: Integral of the estimated errors of the nodal wear depths over the surface,
+            relative to ``volume``.
         reached: Whether all three errors are at most the requested accuracy.
-        table: A dictionary for each accepted jump: ``cycle``, the cycle at its end; ``jump``, its length; and ``volume``,
-            ``depth`` and ``simulated`` as above.
+        table: A dictionary for each accepted jump: ``cycle``, the cycle at its end; ``jump``, its
+            length in cycles; ``volume``, ``depth`` and ``simulated`` at its end, defined as above.
 
     Example:
         >>> def cycle(done):
@@ -98,32 +102,49 @@ def cycle_jump(
 ) -> CycleJump:
     """Simulate wear over many load cycles, of which only a few are computed.  Collective.
 
-    In a jump of n cycles, wear, work and slip of each step of one simulated cycle count n times (``contact.repeats``).  Each jump is computed
-    twice from the same state: a coarse run of one simulated cycle, and a fine run of two, each for half of the jump.  First-order errors of the
-    coarse run are twice those of the fine one, and Richardson extrapolation removes them.  The jump ends with a step without motion or wear.
+    In a jump of n cycles, the wear, dissipation and slip of one simulated cycle are multiplied by n
+    (``contact.repeats``).  Each jump is computed twice from the same state.  The coarse run
+    simulates one cycle for the whole jump.  The fine run simulates two cycles, each for half of
+    the jump.  The first-order error of the coarse run is about twice the error of the fine run.
+    Richardson extrapolation removes both.  The jump ends with one step without motion or wear.
 
-    Half the change of the runs' difference since the last jump, beyond the square of lengths, is to be ``accuracy`` times the wear of the jump, or
-    a twentieth of that times all wear so far, and evolving friction is to change by at most about a quarter.  Else, or if a step does not converge,
-    the jump is repeated with fewer cycles.  The first jumps, until stick and slip zones have settled, have two.  One of the last jumps is
-    also computed in three parts, which measures its error.  Those of others follow: over the wear it is as the square of the length.
+    The length of a jump is controlled by the difference between the two runs.  If the error were
+    purely of first order, this difference would grow with the square of the length.  Half of the
+    deviation from this prediction must be at most about ``accuracy`` times the sum of the wear in
+    the jump and a twentieth of the total wear.  Evolving friction must change by at most about a
+    quarter.  If a jump violates these limits, or one of its steps does not converge, it is repeated
+    with fewer cycles.  The first jumps have two cycles until the stick and slip zones have settled.
+
+    One of the last jumps is also computed in three parts, to estimate its error.  The errors of the
+    other jumps follow from it: relative to the wear in the jump, they grow with the square of the
+    length.
 
     Args:
-        problem: The ContactProblem, in the state before the first cycle.
-        cycle: Function of the number of cycles done, which takes the problem through one cycle by ``problem.solve()``.  It is called
-            repeatedly from earlier states, so it must set all loads that its steps need.
-        cycles: Number of cycles.
-        accuracy: Requested relative error of worn volume, largest depth and profile.
-        longest, max_cycles: Largest number of cycles in a jump, and to simulate in this call; a jump that has begun is finished.
-        path: Folder of checkpoints, one after every jump; if it contains some, the run continues from the last.
-        monitor: None, or a function of a row of the table, called after every jump, in the state at its end.
+        problem: The ContactProblem in the state before the first cycle.
+        cycle: Function of the number of completed cycles.  It simulates one cycle by calls of
+            ``problem.solve()``.  Since it is also called from earlier states, it must set all
+            loads.
+        cycles: Number of load cycles.
+        accuracy: Requested relative error of worn volume, largest wear depth and wear profile.
+        longest: Largest number of cycles in a jump.
+        max_cycles: Largest number of cycles to simulate in this call; the current jump is
+            completed.
+        path: Folder of checkpoints, written after every jump.  If it contains checkpoints, the run
+            continues from the last one.
+        monitor: None, or a function of a row of the table, called after every jump in the state at
+            the end of the jump.
 
     Returns:
-        A ``CycleJump``; the problem is in the state after the last cycle.  On a terminal there is a progress bar if tqdm is installed.
+        A ``CycleJump``.  The problem is in the state after the last cycle.  On a terminal, a
+        progress bar is shown if tqdm is installed.
 
     Raises:
-        NotConverged: a step of cycles simulated one by one did not converge; after any exception, the last jump's end is restored.
-        RuntimeError: ``max_cycles`` were simulated; with ``path``, the same call continues.
-        ValueError: no contact wears, a cycle has no step, a number is out of range, or the folder belongs to another run.
+        NotConverged: a step of a jump of minimal length did not converge.  After any exception, the
+            problem is in the state at the end of the last jump.
+        RuntimeError: ``max_cycles`` cycles were simulated.  If ``path`` is given, the same call
+            continues the run.
+        ValueError: no contact has a wear law, a cycle has no load step, a number is out of range,
+            or the folder belongs to another run.
 
     Example:
         >>> def cycle(done):
@@ -133,11 +154,11 @@ def cycle_jump(
         >>> dc.cycle_jump(problem, cycle, 4).table[-1]["cycle"]
         4
     """
-    given = _begun(problem, cycle, cycles, accuracy, longest, max_cycles, path, monitor)
-    return _jump_on(*given, monitor).found()
+    given = _start_or_continue(problem, cycle, cycles, accuracy, longest, max_cycles, path, monitor)
+    return _run_jumps(*given, monitor).result()
 
 
-def _begun(
+def _start_or_continue(
     problem: ContactProblem,
     cycle: Any,
     cycles: Any,
@@ -147,7 +168,15 @@ def _begun(
     path: Any,
     monitor: Any,
 ) -> tuple:
-    """The run as it begins or goes on, the numbers of cycles, and the folder, from checked arguments of ``cycle_jump``.  Collective."""
+    """Check the arguments of ``cycle_jump``, and return the new or continued run.  Collective.
+
+    Returns:
+        The ``_Run``, the number of cycles, the largest number of cycles to simulate, and the
+        ``_Folder`` of checkpoints or None.
+
+    Raises:
+        ValueError: an argument is invalid, or the folder belongs to another run.
+    """
     comm = a_problem(problem).body.comm
     with raised_together(comm):
         cycles = int(positive("cycles", cycles, whole=True))
@@ -166,17 +195,24 @@ def _begun(
     return run, cycles, max_cycles, folder
 
 
-def _jump_on(
+def _run_jumps(
     run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None
 ) -> _Run:
-    """Jump until all cycles are done, or ``most`` are simulated; whatever happens the problem is at the end of the last jump.  Collective."""
+    """Compute jumps until all cycles are completed, and return the run.  Collective.
+
+    In any case, also after an exception, the problem is left in the state at the end of the last
+    jump.
+
+    Raises:
+        RuntimeError: ``most`` cycles were simulated before all ``cycles`` were completed.
+    """
     comm = run.problem.body.comm
     begun = run.record["simulated"]
     with progress_bar(comm.rank, cycles, run.record["done"]) as shown:
         try:
             while run.record["done"] < cycles:
                 if run.record["simulated"] - begun >= most:
-                    raise RuntimeError(run.told(cycles, folder is not None))
+                    raise RuntimeError(run.limit_message(cycles, folder is not None))
                 row = run.jump(cycles)
                 if folder is not None:
                     folder.write()
@@ -185,7 +221,7 @@ def _jump_on(
                         monitor(row)
                 shown(run.record["done"])
         finally:
-            run.show()
+            run.restore_end()
     return run
 
 
@@ -201,7 +237,15 @@ def _check(problem: Any, cycle: object, monitor: object) -> None:
 
 
 class _State(NamedTuple):
-    """Snapshot of the problem, depths at this rank's nodes that wear, sums of each contact, and friction at this rank's nodes."""
+    """State of the problem at the beginning or end of a jump.
+
+    Attributes:
+        snapshot: Snapshot of the problem, for ``problem.restore``.
+        depth: Wear depths at this rank's nodes, on both sides of all contacts with wear, length.
+        sums: Accumulated history variables of each contact, by name.
+        friction: Coefficients mu of the friction cone and p of the slip rule at this rank's nodes,
+            two components each, ``shape=(n, 4)``.
+    """
 
     snapshot: Any
     depth: np.ndarray
@@ -210,13 +254,16 @@ class _State(NamedTuple):
 
 
 class _Run:
-    """A programme on its way.
+    """Progress of a ``cycle_jump`` simulation, which computes one jump after another.
 
     Attributes:
-        end: The ``_State`` after the last jump.
-        coarse: That of its coarse run, which tells the error of first order.
-        record: What a checkpoint has beside them: cycles ``done`` and ``simulated``, jumps ``rejected``, length of the
-            ``next`` one, the ``table``, and ``measured``: row of a jump, and errors of volume, depth and profile that it made.
+        end: ``_State`` at the end of the last jump.
+        coarse: ``_State`` at the end of the coarse run of the last jump, from which the first-order
+            error is estimated.
+        record: Progress that a checkpoint contains beside the two states: number of cycles ``done``
+            and ``simulated``, number of jumps ``rejected``, length of the ``next`` jump, the
+            ``table``, and ``measured``: table row of the jump that was also computed in three
+            parts, and the estimated absolute errors of volume, depth and profile in this jump.
     """
 
     def __init__(self, problem: ContactProblem, cycle: Callable, accuracy: float, longest: float):
@@ -226,7 +273,7 @@ class _Run:
         self._area = np.concatenate(
             [area for c in self._worn for area in (c.whole_area, c.opposite_area)]
         )
-        self.end = self.coarse = self.present()
+        self.end = self.coarse = self.current_state()
         self.record: dict[str, Any] = {
             "done": 0,
             "simulated": 0,
@@ -236,8 +283,8 @@ class _Run:
             "measured": [0] + 3 * [np.inf],
         }
 
-    def present(self) -> _State:
-        """The present state."""
+    def current_state(self) -> _State:
+        """Return the present ``_State`` of the problem."""
         depths = [depth for c in self._worn for depth in (c.wear_depth, c.opposite_wear_depth)]
         sums = [_sums(contact) for contact in self.problem.contacts]
         friction = [rows(c.friction, c.nodes.size)[:, :4] for c in self.problem.contacts]
@@ -245,13 +292,13 @@ class _Run:
             self.problem.snapshot(), np.concatenate(depths), sums, np.concatenate(friction)
         )
 
-    def show(self) -> None:
-        """Put the problem into the state after the last jump."""
+    def restore_end(self) -> None:
+        """Restore the state of the problem at the end of the last jump."""
         self._count(1)
         self.problem.restore(self.end.snapshot)
 
-    def found(self) -> CycleJump:
-        table, record, errors = self.table, self.record, self._errors()
+    def result(self) -> CycleJump:
+        table, record, errors = self.table, self.record, self._relative_errors()
         worn = table[-1]["volume"], table[-1]["depth"]
         return CycleJump(
             record["done"],
@@ -264,8 +311,13 @@ class _Run:
             table,
         )
 
-    def told(self, cycles: int, kept: bool) -> str:
-        """Why it ends before so many cycles."""
+    def limit_message(self, cycles: int, kept: bool) -> str:
+        """Return the error message for a run that has simulated ``max_cycles`` cycles.
+
+        Args:
+            cycles: Requested number of load cycles.
+            kept: Whether checkpoints are written, so that the same call continues the run.
+        """
         done, last = self.record["done"], self.table[-1]
         on = (
             "the same call goes on from there"
@@ -279,29 +331,41 @@ class _Run:
         return self.record["table"]
 
     def jump(self, cycles: int) -> dict[str, Any]:
-        """Make the next jump towards so many cycles; returns its row of the table.  Collective."""
+        """Compute the next jump and return its row of the table.  Collective.
+
+        Args:
+            cycles: Number of load cycles of the whole run, which the jump does not exceed.
+        """
         while True:
             length = int(max(min(self.record["next"], self._longest), SHORTEST_JUMP))
             left = cycles - self.record["done"]
-            length = _even(left, length)
-            late = 2 * length >= left or _even(left - length, length) <= SHORTEST_JUMP
-            row = self._tried(length, late)
+            length = _even_length(left, length)
+            late = 2 * length >= left or _even_length(left - length, length) <= SHORTEST_JUMP
+            row = self._try_jump(length, late)
             if row is not None:
-                self.show()
+                self.restore_end()
                 return row
             self.record["rejected"] += 1
 
-    def _tried(self, length: int, late: bool) -> dict[str, Any] | None:
-        """The row of a jump of so many cycles, None where it is rejected; says how long the next one may be, and measures a late one.  Collective."""
+    def _try_jump(self, length: int, late: bool) -> dict[str, Any] | None:
+        """Compute a jump and return its row of the table, or None if it is rejected.  Collective.
+
+        The length of the next jump is stored in ``record``.
+
+        Args:
+            length: Number of cycles of the jump.
+            late: Whether this is one of the last jumps; if so, its error is estimated by a run in
+                three parts.
+        """
         plain = length <= SHORTEST_JUMP  # the fine run simulates all
-        coarse = self._through([length])
+        coarse = self._simulate([length])
         fine = end = coarse
         if length > 1 and (plain or coarse):
-            fine = end = self._through(_parts(length, 2), must=plain)
+            fine = end = self._simulate(_parts(length, 2), must=plain)
         if coarse and fine and not plain:
-            end = self._extrapolated(coarse, fine, length)
-        volume, depth, local = self._compared(coarse, fine, end, length)
-        over = max(local / (ACCURACIES_AIMED_AT * self._accuracy), self._changed(end) ** 2)
+            end = self._extrapolate(coarse, fine, length)
+        volume, depth, local = self._compare_runs(coarse, fine, end, length)
+        over = max(local / (ACCURACIES_AIMED_AT * self._accuracy), self._friction_change(end) ** 2)
         accepted = end is not None and (plain or over <= ACCEPTED_EXCESS)
         factor = (
             min(max(over**-0.5, SMALLEST_REDUCTION), LARGEST_GROWTH if accepted else 0.5)
@@ -312,7 +376,7 @@ class _Run:
         if not accepted:
             return None
         if late and not plain and length > self.table[self.record["measured"][0]]["jump"]:
-            self._measure(fine, end, length)
+            self._estimate_errors(fine, end, length)
         self.end, self.coarse = end, coarse or end
         self.record["done"] += length
         self.table.append(
@@ -326,8 +390,14 @@ class _Run:
         )
         return self.table[-1]
 
-    def _through(self, parts: list[int], must: bool = False) -> _State | None:
-        """The state after a cycle for each of ``parts`` that counts so many times; None where it does not converge, unless it must."""
+    def _simulate(self, parts: list[int], must: bool = False) -> _State | None:
+        """Return the state after one simulated cycle for each of ``parts``.  Collective.
+
+        Args:
+            parts: Numbers of load cycles that each simulated cycle represents.
+            must: Whether a step that does not converge raises ``NotConverged``; if False, None is
+                returned.
+        """
         problem, done = self.problem, self.record["done"]
         problem.restore(self.end.snapshot)
         try:
@@ -346,14 +416,19 @@ class _Run:
             if must:
                 raise
             return None
-        return self.present()
+        return self.current_state()
 
-    def _extrapolated(self, coarse: _State, fine: _State, length: int) -> _State | None:
-        """The state with the fine run's sums less their error of first order, in equilibrium; None where that does not converge."""
-        more = _extrapolation(length, 1, 2)
+    def _extrapolate(self, coarse: _State, fine: _State, length: int) -> _State | None:
+        """Return the state after Richardson extrapolation.  Collective.
+
+        Accumulated history variables of the fine run are corrected by their first-order error.  One
+        step without motion or wear then restores equilibrium.  If it does not converge, None is
+        returned.
+        """
+        more = _extrapolation_factor(length, 1, 2)
         for contact, *sums in zip(self.problem.contacts, self.end.sums, coarse.sums, fine.sums):
             start, one, two = sums
-            _take_sums(
+            _set_sums(
                 contact,
                 {
                     name: np.maximum(
@@ -367,17 +442,27 @@ class _Run:
             self.problem.solve()
         except NotConverged:
             return None
-        return self.present()
+        return self.current_state()
 
     def _count(self, times: int) -> None:
         for contact in self.problem.contacts:
             contact.repeats = times
 
-    def _compared(self, coarse: Any, fine: Any, end: Any, length: int) -> tuple[float, ...]:
-        """Volume and largest depth at the end of a jump, and by how much runs differ in another way than in the last jump, over what it wears.
+    def _compare_runs(self, coarse: Any, fine: Any, end: Any, length: int) -> tuple[float, ...]:
+        """Return worn volume, largest wear depth and relative deviation of a jump.  Collective.
 
-        All reduced over the ranks.  Coarse and fine run of n cycles differ by ``n^2 a + n^3 b``, of which the last jump's tells ``a``; what is
-        left is about twice the error of the extrapolated end; infinite where a run did not converge, and for the first jump.
+        The fine and the coarse run of a jump of n cycles differ by ``n^2 a + n^3 b``.  The last
+        jump gives ``a``.  The deviation is the remaining part of the difference, relative to the
+        wear in the jump.  It is about twice the error of the extrapolated state.
+
+        Args:
+            coarse, fine: States at the end of the coarse and the fine run, or None.
+            end: State after extrapolation, or None if it did not converge.
+            length: Number of cycles of the jump.
+
+        Returns:
+            Worn volume and largest wear depth at the end of the jump, over all ranks, and the
+            deviation.  The deviation is infinite if a run did not converge, and for the first jump.
         """
         if end is None:
             return 0.0, 0.0, np.inf
@@ -385,7 +470,7 @@ class _Run:
         worn, off = end.depth - self.end.depth, np.zeros_like(area)
         if last and fine is not coarse and coarse:
             before = (self.end.depth - self.coarse.depth) / (
-                1.0 + _extrapolation(last["jump"], 1, 2)
+                1.0 + _extrapolation_factor(last["jump"], 1, 2)
             )
             off = fine.depth - coarse.depth - (length / last["jump"]) ** 2 * before
         volume, more, new = map(
@@ -393,16 +478,26 @@ class _Run:
         )
         depth, deeper, most = (body.largest(np.abs(depths)) for depths in (end.depth, worn, off))
         local = max(
-            _part(new, more + WORN_SHARE * volume), _part(most, deeper + WORN_SHARE * depth)
+            _ratio(new, more + WORN_SHARE * volume), _ratio(most, deeper + WORN_SHARE * depth)
         )
         return volume, depth, local if last and coarse else np.inf
 
-    def _measure(self, fine: _State, end: _State, length: int) -> None:
-        """Errors of a jump by a run in three parts, which, extrapolated, has a third of them.  Collective."""
-        third = self._through(_parts(length, 3))
+    def _estimate_errors(self, fine: _State, end: _State, length: int) -> None:
+        """Estimate the errors of a jump by a run in three parts.  Collective.
+
+        The estimated errors are stored in ``record``.  The error of the extrapolated run in three
+        parts is about a third of the error of the jump.  If the run does not converge, nothing is
+        stored.
+
+        Args:
+            fine: State at the end of the fine run, in two parts.
+            end: State at the end of the jump.
+            length: Number of cycles of the jump.
+        """
+        third = self._simulate(_parts(length, 3))
         if third is None:
             return
-        better = third.depth + _extrapolation(length, 2, 3) * (third.depth - fine.depth)
+        better = third.depth + _extrapolation_factor(length, 2, 3) * (third.depth - fine.depth)
         off = 1.5 * (end.depth - np.maximum(better, self.end.depth))
         volume, profile = map(
             float, self.problem.body.total([self._area @ off, self._area @ np.abs(off)])
@@ -415,11 +510,13 @@ class _Run:
                 profile,
             ]
 
-    def _errors(self) -> list[float]:
-        """Estimated errors of volume, depth and profile, relative, from those of the measured jump.
+    def _relative_errors(self) -> list[float]:
+        """Return the estimated relative errors of volume, depth and profile.
 
-        Over what it wears, a jump is off by the square of its length.  Errors of the volume add up, and fall as the rate of wear does, since both
-        obey the equation linearised; what is off in the shape beside that wears off in a jump.
+        They are extrapolated from the jump that was also computed in three parts.  The error of a
+        jump, relative to the wear in this jump, grows with the square of its length.  Volume errors
+        accumulate, and decrease in proportion to the wear rate, since both satisfy the same
+        linearised equation.  Other errors of the profile decay within one jump.
         """
         lengths, volumes = (
             np.array([row[name] for row in self.table], float) for name in ("jump", "volume")
@@ -430,10 +527,10 @@ class _Run:
         )
         row, *made = self.record["measured"]
         volume, depth, profile = (
-            _part(a, self.table[-1][name]) for a, name in zip(made, ("volume", "depth", "volume"))
+            _ratio(a, self.table[-1][name]) for a, name in zip(made, ("volume", "depth", "volume"))
         )
-        fall = min(1.0, _part(float(rates[-1]), float(rates[row])))
-        total = _part(float(np.minimum(rates, rates[-1]) @ cubes), float(rates[row] * cubes[row]))
+        fall = min(1.0, _ratio(float(rates[-1]), float(rates[row])))
+        total = _ratio(float(np.minimum(rates, rates[-1]) @ cubes), float(rates[row] * cubes[row]))
         added = (total - fall) * volume
         return (
             [total * volume, added + fall * depth, added + fall * profile]
@@ -441,40 +538,64 @@ class _Run:
             else [0.0] * 3
         )
 
-    def _changed(self, end: _State | None) -> float:
-        """By how much mu or p have changed in a jump, over CHANGE of the largest."""
+    def _friction_change(self, end: _State | None) -> float:
+        """Return the largest change of mu or p in a jump, relative to its target.  Collective.
+
+        The target is ``FRICTION_CHANGE`` times the largest mu or p.
+
+        Args:
+            end: State at the end of the jump; with None, the change is zero.
+        """
         if end is None:
             return 0.0
         largest, parts = self.problem.body.largest, []
         for columns in (slice(0, 2), slice(2, 4)):
             before, now = (side.friction[:, columns].ravel() for side in (self.end, end))
-            parts.append(_part(largest(np.abs(now - before)), largest(np.maximum(before, now))))
+            parts.append(_ratio(largest(np.abs(now - before)), largest(np.maximum(before, now))))
         return max(parts) / FRICTION_CHANGE
 
 
-def _even(left: int, length: int) -> int:
-    """The length of the next jump, such that the last ones have one length."""
+def _even_length(left: int, length: int) -> int:
+    """Return the length of the next jump, such that the remaining jumps have nearly equal lengths.
+
+    Args:
+        left: Number of remaining cycles.
+        length: Largest length of a jump.
+    """
     return -(-left // -(-left // length))
 
 
 def _parts(length: int, number: int) -> list[int]:
-    """A jump's length in so many parts, as equal as can be."""
+    """Divide the length of a jump into integer parts that differ by at most one cycle."""
     return np.diff(np.arange(number + 1) * length // number).tolist()
 
 
-def _extrapolation(length: int, fewer: int, more: int) -> float:
-    """Error of first order of a run in more parts, over its difference to one in fewer: it is as ``n (n - 1)``, none of single cycles."""
+def _extrapolation_factor(length: int, fewer: int, more: int) -> float:
+    """Return the factor for Richardson extrapolation from two runs of a jump.
+
+    The factor times the difference between both runs is the first-order correction of the run with
+    more parts.  The first-order error of a simulated cycle that represents n cycles is proportional
+    to ``n (n - 1)``, so it is zero for single cycles.
+
+    Args:
+        length: Number of cycles of the jump.
+        fewer, more: Numbers of parts in which the two runs divide the jump.
+    """
     one, two = (sum(n * (n - 1) for n in _parts(length, number)) for number in (fewer, more))
     return two / (one - two) if one > two else 0.0
 
 
-def _part(amount: float, whole: float) -> float:
-    """``of`` over ``whole``, none of nothing."""
+def _ratio(amount: float, whole: float) -> float:
+    """Return ``amount / whole``; zero if ``amount`` is zero, infinity if only ``whole`` is zero."""
     return amount / whole if amount > 0.0 and whole > 0.0 else np.inf if amount > 0.0 else 0.0
 
 
 def _is_record(record: Any) -> bool:
-    """Whether it is one that ``_Run`` has written; errors say that it is not, too."""
+    """Return whether a record read from a file is a complete record of a ``_Run``.
+
+    Raises:
+        ValueError, TypeError, KeyError or IndexError: the record has another structure.
+    """
     counts = [record[name] for name in ("done", "simulated", "rejected")]
     at, *errors = record["measured"]
     rows = [
@@ -495,9 +616,11 @@ def _is_record(record: Any) -> bool:
 
 
 class _Folder:
-    """Checkpoints of a programme: two of the problem, and a record that names them, which is replaced last.
+    """Folder with the checkpoints of a ``cycle_jump`` run.
 
-    Whenever the machine stops, the record and what it names are whole.
+    It contains two checkpoints of the problem and a record file.  The record file determines the
+    names of the checkpoints and is replaced last.  If the computer stops at any time, the record
+    and its checkpoints are complete.
     """
 
     def __init__(self, path: str | PathLike[str], run: _Run):
@@ -505,10 +628,11 @@ class _Folder:
         self._written: list[str] = []
 
     def read(self, cycles: int) -> None:
-        """Go on from where the folder says, if it is one.  Collective.
+        """Continue the run from the checkpoints in the folder, if there are any.  Collective.
 
         Raises:
-            ValueError: the record is broken, or of more cycles.
+            ValueError: the record is invalid, or the run in the folder has completed more than
+                ``cycles`` cycles.
         """
         record = by_first_rank(self._comm, lambda _: self._record(cycles))
         if record is None:
@@ -518,7 +642,7 @@ class _Folder:
         states = []
         for name in self._names():
             run.problem.load(self._path / name)
-            states.append(run.present())
+            states.append(run.current_state())
         run.coarse, run.end = states
         self._written = self._names()
 
@@ -543,11 +667,11 @@ class _Folder:
         return record
 
     def _names(self) -> list[str]:
-        """Names of the checkpoints: of the coarse run and of the end of the last jump."""
+        """Return the names of both checkpoint files: after the coarse run, and after the jump."""
         return [f"{self._run.record['done']}{suffix}.npz" for suffix in ("_coarse", "")]
 
     def write(self) -> None:
-        """Write the state after the last jump.  Collective."""
+        """Write the checkpoints and the record of the last jump.  Collective."""
         run = self._run
         names = self._names()
         for name, state in zip(names, (run.coarse, run.end)):
@@ -561,19 +685,26 @@ class _Folder:
                     file.flush()
                     os.fsync(file.fileno())
                 os.replace(unfinished, self._path / RECORD_FILE)
-                for name in self._written:  # before
+                for name in self._written:  # checkpoints of the previous jump
                     with suppress(OSError):
                         (self._path / name).unlink()
         self._written = names
 
 
 def _sums(contact: Contact) -> dict[str, np.ndarray]:
-    """What nodes have worked, slipped and worn since the start, ``shape=(n,)`` each, by name."""
+    """Return the accumulated nodal dissipation, slip and wear by name, each with ``shape=(n,)``."""
     return {name: values for name, values in contact.history.sums.items() if name != SLIP_KEPT}
 
 
-def _take_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
-    """Let the next step start from other ``sums``, none of them negative.  Collective where a deformable surface wears."""
+def _set_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
+    """Replace the accumulated history variables from which the next step starts.
+
+    Collective if a deformable surface wears.
+
+    Args:
+        contact: The contact.
+        sums: New values by name, not negative.
+    """
     sums = contact.history.sums | {name: frozen(values) for name, values in sums.items()}
     worn = contact.geometry.everywhere(sums[OPPOSITE_WEAR]) if OPPOSITE_WEAR in sums else None
     contact.go_back(contact.history.but(sums=sums, worn=worn))

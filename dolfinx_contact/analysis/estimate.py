@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Estimates of the discretisation error, from a more accurate problem that is taken through the same load history."""
+"""Estimates of the discretisation error by a more accurate problem with the same load history."""
 
 from __future__ import annotations
 
@@ -26,31 +26,36 @@ if TYPE_CHECKING:
 
 
 class Estimated(NamedTuple):
-    """A quantity of a problem and the estimate of its error, in its own unit."""
+    """Value of a quantity and its estimated error.
+
+    Attributes:
+        value: Value in the problem whose error is estimated, in the unit of the quantity.
+        error: Estimated absolute error of the value, in the same unit.
+    """
 
     value: float
     error: float
 
     @property
     def relative(self) -> float:
-        """Error relative to the size of the value; 0 if both are zero."""
+        """Estimated error divided by the absolute value; 0 if both are zero."""
         return 0.0 if self.error == 0 else float(np.divide(self.error, abs(self.value)))
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What ``estimate`` returns.
+    """Result of ``estimate``: quantities with estimated errors, and error indicators of cells.
 
     Attributes:
-        quantities: By name, ``Estimated``.
-        energy_norm: Energy norm of the difference of displacements over that of the reference, dimensionless: the mean error of
+        quantities: Value and estimated error of each quantity, as ``Estimated``, by name.
+        energy_norm: Energy norm of the difference between both displacements, divided by the energy
+            norm of the reference displacement; dimensionless.  It measures the mean error of the
             stresses.  None if the two problems have different meshes.
-        cells: Function of degree 0, the energy norm of the difference on each cell; the sum of squares is that of the body.  None
-            if ``energy_norm`` is.
+        cells: Error indicator of each cell, a function of degree 0: the energy norm of the
+            difference on this cell.  The sum of squares is the squared energy norm on the body.
+            None if the two problems have different meshes.
 
     Example:
-        What ``estimate`` returns, made by hand:
-
         >>> found = dc.Estimate(quantities={}, energy_norm=0.01, cells=None)
         >>> found.energy_norm
         0.01
@@ -94,28 +99,38 @@ def estimate(
 ) -> Estimate:
     """Estimate the discretisation error of a problem's present state.  Collective.
 
-    ``reference`` is the same body after the same load history, but with second order on the same mesh, a finer mesh, or smaller
-    increments.  The estimated error of a quantity is the difference, ``abs(J(u) - J(U)) * share``, which is the true error if
-    that of the reference is much smaller (saturation; R. E. Bank, R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  It is
-    an estimate, not a bound.  Each problem has its own slip history, so estimates for frictional work and other history variables
-    include accumulated errors.  Both problems may share a surface driven by displacement; a surface driven by force moves
-    differently in each, so make two.
+    ``reference`` is a problem of the same body after the same load history, but with second order
+    on the same mesh, with a finer mesh, or with smaller increments.  The estimated error of a
+    quantity J is ``abs(J(u) - J(U)) * share`` with the displacement ``U`` of the reference.  It is
+    close to the true error if the error of the reference is much smaller (saturation; R. E. Bank,
+    R. K. Smith, SIAM J. Numer. Anal. 30 (1993) 921).  It is an estimate, not a bound.
+
+    Each problem has its own slip history, so the estimates for dissipation and other history
+    variables include accumulated errors.  Both problems may share a surface driven by displacement.
+    A surface driven by force moves differently in the two problems, so each needs its own surface.
 
     Args:
         problem: The problem whose error is estimated.
-        reference: The more accurate one.  On the same mesh object, with a space that contains that of the problem, tractions are
-            compared, and cells get indicators.
-        quantities: Further functions by name, which take a problem and return a number, the same on all ranks, or several numbers,
-            such as the force after each step so far.  Of several numbers, the value is the largest, and the error is the largest of
-            theirs.  The built-in quantities are ``normal_force``, the sum of normal reactions of all contacts, ``tangential_force``,
-            the sum of the sizes of tangential reactions, ``dissipation``, and ``peak_pressure``, the largest nodal one.  On the same
-            mesh object, or if all contacts are with planes, there are also ``pressure`` and ``shear``: root mean squares of the nodal
-            normal and tangential tractions (reaction over area) over all contact facets.  Their errors are the root mean squares of
-            the differences.
-        share: Error over difference, ``1 / (1 - 2**-p)`` for a reference on cells of half the size and convergence of order p.
+        reference: The more accurate problem.  If it has the same mesh object and a space that
+            contains the space of ``problem``, ``energy_norm`` and ``cells`` are computed, too.
+        quantities: Further quantities by name: functions of a problem that return one number or
+            several numbers, the same on all ranks, for instance the forces after all steps so far.
+            For several numbers, the value is the number of largest absolute value, and the error is
+            the largest of all errors.  The built-in quantities are ``normal_force``, the sum of the
+            normal reactions of all contacts; ``tangential_force``, the sum of the norms of the
+            tangential reactions; ``dissipation``; and ``peak_pressure``, the largest nodal
+            pressure.  If both problems have the same mesh object, or if all contact surfaces are
+            plane, ``pressure`` and ``shear`` are added: root mean squares of the nodal normal and
+            tangential tractions (reaction divided by area) over all contact facets.  Their errors
+            are the root mean squares of the differences.
+        share: Ratio of the error to the difference: ``1 / (1 - 2**-p)`` if the reference has half
+            the cell size and the quantities converge with order p.
+
+    Returns:
+        The ``Estimate``.
 
     Raises:
-        ValueError: the problems do not belong together, or a quantity is not a finite number.
+        ValueError: the two problems do not match, or a quantity is not a finite number.
 
     Example:
         >>> W = functionspace(block, ("Lagrange", 2, (3,)))  # the same body in second order
@@ -148,10 +163,15 @@ def estimate(
 
 
 def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[float, fem.Function]:
-    """Energy norm of the difference of displacements, relative to that of the reference, and on each cell.  Collective.
+    """Return the energy norm of the displacement difference, on body and cells.  Collective.
 
-    With the tangent ``a(v, w)`` of the reference at its displacement ``U``, the squared norm on a cell K is ``a_K(e, e)`` with
-    ``e = U - u``.  Terms on facets count for their cells.
+    The squared norm on a cell K is ``a_K(e, e)`` with the difference ``e = U - u`` and the tangent
+    form ``a(v, w)`` of the reference at its displacement ``U``.  Facet integrals are added to the
+    cells of the facets.
+
+    Returns:
+        Norm on the body, relative to the norm of ``U``, and a function of degree 0 with the norm on
+        each cell, not divided by the norm of ``U``.
     """
     body = reference.body
     e, square = fem.Function(body.V), fem.Function(compat.functionspace(body.V.mesh, ("DG", 0)))
@@ -173,10 +193,15 @@ def indicators(problem: ContactProblem, reference: ContactProblem) -> tuple[floa
 
 
 def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, Estimated]:
-    """Root mean squares, over the contact surfaces, of pressure and shear and of their differences.  Collective.
+    """Return root mean squares of pressure and shear, with estimated errors.  Collective.
 
-    Nodal tractions of the problem, in the local frame, are interpolated at the reference's contact nodes, whose areas are the weights:
-    of second order Simpson's rule on edges and quadrilaterals, the middles of the edges on triangles.
+    The means are taken over the contact surfaces.  Nodal tractions of ``problem``, local frame, are
+    interpolated at the contact nodes of ``reference``.  The nodal areas of ``reference`` are the
+    quadrature weights.  For second order, this is Simpson's rule on edges and quadrilaterals, and
+    the midpoint rule on edges of triangles.
+
+    Returns:
+        ``pressure`` and ``shear``; each error is the root mean square of the difference.
     """
     sums, area = np.zeros((2, 2)), 0.0
     for contact, better in zip(problem.contacts, reference.contacts):
@@ -190,9 +215,19 @@ def tractions(problem: ContactProblem, reference: ContactProblem) -> dict[str, E
 
 
 def interpolated(contact: Contact, better: Any) -> np.ndarray:
-    """Nodal tractions of a contact at the nodes of another, local frame.  Collective.
+    """Return nodal tractions of a contact, interpolated at the nodes of another one.  Collective.
 
-    On one mesh as the finite elements do, on a plane between nodes, on triangles that Delaunay's rule makes of them.
+    If both contacts have the same mesh object, the shape functions of the finite elements are used.
+    Otherwise the surface must be plane.  The interpolation is then linear between the nodes, in
+    three dimensions on their Delaunay triangulation.  Outside of it, the value of the nearest node
+    is used.
+
+    Args:
+        contact: The contact with the tractions.
+        better: The contact at whose nodes the tractions are interpolated.
+
+    Returns:
+        ``shape=(n, gdim)``, local frame, force per area, for the ``n`` nodes of ``better``.
     """
     tractions, dim = per_area(contact.reaction, contact.area), contact.reaction.shape[1]
     if contact.V.mesh is better.V.mesh:
@@ -214,7 +249,7 @@ def interpolated(contact: Contact, better: Any) -> np.ndarray:
 
 
 def largest(numbers: ArrayLike) -> float:
-    """The number of the largest size."""
+    """Return the number with the largest absolute value."""
     numbers = np.ravel(numbers)
     return float(numbers[np.abs(numbers).argmax()])
 

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A load history in increments that are halved if a step fails, and grow again."""
+"""Load steps with adaptive increments: halved if a step does not converge, later doubled again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("dolfinx_contact")
 
-# Steps in a row after which an increment is doubled again; twice as many each time that the doubled one fails at once.
+# Number of consecutive converged steps after which the increment is doubled.  If the first step
+# with the doubled increment does not converge, this number is doubled for the current interval.
 EASY_STEPS = 2
 
 
@@ -39,24 +40,31 @@ def advance(
 ) -> History:
     """Solve the load steps of a load history, from ``start`` through all ``points``.
 
-    The increment from one point to the next is first tried as a whole.  If a step does not converge, it is repeated with half the
-    increment, from the last converged state.  After two converged steps, increments are doubled again; if the doubled one fails, only after
-    four, then eight.  Every point is the end of a step.  ``logging.getLogger("dolfinx_contact")`` reports halved increments; on a terminal there is a progress bar if tqdm is installed.
+    The first increment covers the whole interval between two points.  If a step does not converge,
+    it is repeated from the last converged state with half the increment.  After two consecutive
+    converged steps, the increment is doubled again.  If the doubled increment fails at once, the
+    next doubling takes place only after four converged steps, then eight.  Every point is the end
+    of a step.  ``logging.getLogger("dolfinx_contact")`` reports halved increments.  On a terminal,
+    a progress bar is shown if tqdm is installed.
 
     Args:
         problem: The ContactProblem.  Collective.
-        load_history: Function of a parameter, such as time, that sets loads, boundary values and planes.
-        points: Increasing values of the parameter.
-        start: Value of the parameter in the problem's present state.
-        smallest: Smallest increment, relative to the distance of its two points.
-        history: ``History`` that records every step, with the column ``t``; None makes one.
-        monitor: None, or a function of parameter and record, called after every step.
+        load_history: Function of a load parameter, such as time.  It sets the loads, boundary
+            values and positions of rigid surfaces.
+        points: Increasing values of the load parameter.
+        start: Value of the load parameter in the present state of the problem.
+        smallest: Smallest increment, relative to the interval between two points.
+        history: ``History`` that records every step; the load parameter is its column ``t``.  If
+            None, a new ``History`` is created.
+        monitor: None, or a function of the load parameter and the ``Step``, called after every
+            converged step.
 
     Returns:
-        The ``History``.
+        The ``History`` with one row for each converged step.
 
     Raises:
-        NotConverged: a step with the smallest increment did not converge; problem and table are at the last converged step.
+        NotConverged: a step with the smallest increment did not converge.  The problem and the
+            history keep the last converged step.
         ValueError: ``points`` do not increase.
 
     Example:
@@ -79,14 +87,18 @@ def advance(
 
     with progress_bar(comm.rank, ends[-1], start) as shown:
         for end in ends:
-            _in_increments(problem, load_history, now, end, smallest, accepted)
+            _solve_in_increments(problem, load_history, now, end, smallest, accepted)
     return history
 
 
 def _checked(
     comm: MPI.Comm, load_history: object, points: Any, start: Any, smallest: Any, monitor: object
 ) -> tuple[list, float, float]:
-    """Points, start and smallest increment as numbers, the same on all ranks.  Collective."""
+    """Return points, start and smallest increment as checked numbers.  Collective.
+
+    Raises:
+        ValueError: an argument of ``advance`` is invalid or differs between ranks.
+    """
     with raised_together(comm):
         start, ends = number("start", start), np.atleast_1d(finite("points", points))
         if ends.ndim != 1 or ends.size == 0 or not (np.diff(ends, prepend=start) > 0).all():
@@ -104,7 +116,7 @@ def _checked(
     return ends.tolist(), start, smallest
 
 
-def _in_increments(
+def _solve_in_increments(
     problem: ContactProblem,
     load_history: Callable,
     now: float,
@@ -112,9 +124,21 @@ def _in_increments(
     smallest: float,
     accepted: Callable,
 ) -> None:
-    """Steps from ``now`` to ``end``; parameter and record of each are ``accepted``."""
+    """Solve the load steps from ``now`` to ``end``, halving increments that do not converge.
+
+    Args:
+        problem: The ContactProblem.  Collective.
+        load_history: Function of the load parameter that sets the loads.
+        now: Value of the load parameter in the last converged state.
+        end: Value of the load parameter at the end of the last step.
+        smallest: Smallest increment, relative to ``end - now``.
+        accepted: Function of load parameter and ``Step``, called after every converged step.
+
+    Raises:
+        NotConverged: a step with the smallest increment did not converge.
+    """
     whole, begun = end - now, now
-    # Increments are the whole over ``parts``, of which so many are done.
+    # The interval is divided into ``parts`` equal increments, of which ``done`` have converged.
     parts, done, easy, wait, grown = 1, 0, 0, EASY_STEPS, False
     while done < parts:
         at = end if done + 1 == parts else begun + whole * ((done + 1) / parts)

@@ -1,3 +1,3 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Bodies as DOLFINx assembles them, without a word of contact."""
+"""Bodies, as assembled by DOLFINx, without contact."""

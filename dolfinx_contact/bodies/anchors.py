@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A body that soft springs or contact alone hold, held well by springs of its own whose forces are taken back."""
+"""Regularisation springs, with compensated forces, for bodies with soft or no supports."""
 
 from __future__ import annotations
 
@@ -14,25 +14,27 @@ if TYPE_CHECKING:
 
 
 class Anchors:
-    """Springs at as many degrees of freedom as there are soft rigid motions, so that none is left.
+    """Regularisation springs at selected degrees of freedom, one for each soft rigid motion.
 
-    Solving with ``K`` passes through displacements of the size of force over spring. ``A = K + E a E^T`` holds the
-    body; ``K u = f`` is ``A u = f + E s`` with the forces ``s = a E^T u`` that undo the springs, one unknown and
-    one equation more a spring.  Where contact alone holds the body these equations are its equilibrium of forces and moments.
+    The solution of ``K u = f`` for a softly supported body passes through very large displacements.
+    ``A = K + E a E^T`` is well supported.  ``K u = f`` is equivalent to ``A u = f + E s`` with the
+    compensating forces ``s = a E^T u``: one additional unknown and equation for each spring.  If
+    contact alone supports the body, these equations are its equilibrium of forces and moments.
 
     Args:
-        body: ElasticBody with its assembled stiffness and ``soft`` motions, at least one.  Collective.
+        body: ElasticBody with its assembled stiffness and at least one ``soft`` motion.
+            Collective.
 
     Attributes:
-        dofs: Those with a spring that this rank owns, ``shape=(m,)``.
-        stiffness: ``a`` of each, ``shape=(m,)``, force per length.
+        dofs: Owned degrees of freedom with a spring, ``shape=(m,)``.
+        stiffness: Stiffness ``a`` of each spring of this rank, ``shape=(m,)``, force per length.
         count: Number of springs of all ranks.
-        A: The stiffness with the springs, a PETSc matrix.
-        solver: Its ``LinearSolver``.
+        A: The stiffness matrix with the springs, a PETSc matrix.
+        solver: ``LinearSolver`` of ``A``.
     """
 
     def __init__(self, body: ElasticBody):
-        self._body, self.dofs = body, _pivots(body.soft, body.comm)
+        self._body, self.dofs = body, _pivot_dofs(body.soft, body.comm)
         self.count = body.soft.shape[1]
         diagonal = body.K.getDiagonal().array_r
         self.stiffness = diagonal[self.dofs].copy()
@@ -44,34 +46,43 @@ class Anchors:
 
     @property
     def ksp(self):
-        """The linear solver of A, for many right-hand sides at a time."""
+        """PETSc KSP of ``A``, for many right-hand sides at a time."""
         return self.solver.ksp
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """A^-1 b; arrays of owned degrees of freedom."""
+        """Return ``A^-1 b``; arrays of owned degrees of freedom."""
         return self.solver.solve(b)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
-        """A x; arrays of owned degrees of freedom."""
+        """Return ``A x``; arrays of owned degrees of freedom."""
         forces = self._body.multiply(x)
         forces[self.dofs] += self.stiffness * x[self.dofs]
         return forces
 
     def columns(self) -> tuple[np.ndarray, np.ndarray]:
-        """``E a`` and ``a`` of the springs of all ranks, ``shape=(owned dofs, m)`` and ``(m,)``.  Collective."""
+        """Return ``E a`` and ``a`` of all ranks' springs, ``shape=(owned dofs, m)`` and ``(m,)``.
+        Collective.
+        """
         counts = self._body.comm.allgather(self.dofs.size)
         forces, first = np.zeros((self._body.size, self.count)), sum(counts[: self._body.comm.rank])
         forces[self.dofs, first + np.arange(self.dofs.size)] = self.stiffness
         return forces, np.concatenate(self._body.comm.allgather(self.stiffness))
 
     def destroy(self) -> None:
-        """Free matrix and factors.  Collective."""
+        """Free the matrix and its solver.  Collective."""
         self.solver.destroy()
         self.A.destroy()
 
 
-def _pivots(modes: np.ndarray, comm: MPI.Comm) -> np.ndarray:
-    """Owned degrees of freedom whose values tell the modes apart: rows chosen by their length, one after another."""
+def _pivot_dofs(modes: np.ndarray, comm: MPI.Comm) -> np.ndarray:
+    """Owned degrees of freedom at which the modes are linearly independent, one for each mode.
+
+    They are the pivot rows of a Gram-Schmidt elimination, the longest remaining row first.
+
+    Args:
+        modes: Owned rows of the modes, ``shape=(owned dofs, m)``.
+        comm: MPI communicator.
+    """
     left, chosen = modes.copy(), []
     for _ in range(modes.shape[1]):
         length = np.linalg.norm(left, axis=1)

@@ -1,6 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The elastic body: what DOLFINx assembles and PETSc solves; vectors are arrays of the degrees of freedom of this rank."""
+"""The elastic body: assembled by DOLFINx, solved by PETSc.
+
+Vectors are NumPy arrays of the degrees of freedom of this rank.
+"""
 
 from __future__ import annotations
 
@@ -44,27 +47,28 @@ _instances = count()
 
 
 class FreeState(NamedTuple):
-    """The displacement without contact under a load, arrays of owned degrees of freedom."""
+    """Contact-free displacement under a load; arrays of owned degrees of freedom."""
 
-    digest: np.ndarray  # of the stiffness
-    load: np.ndarray
+    digest: np.ndarray  # hash of the stiffness
+    load: np.ndarray  # right-hand side
     displacement: np.ndarray
-    exact: bool  # or to three digits
+    exact: bool  # False if it is accurate to three digits only
 
     def scaled(self, b: np.ndarray, fixed: np.ndarray, comm: MPI.Comm) -> np.ndarray | None:
-        """The displacement under ``b``, if that is the load times a factor.  Collective.
+        """Return the displacement under ``b`` if ``b`` is a multiple of the stored load, else None.
+        Collective.
 
         Args:
-            b: As ``ElasticBody.load`` returns it.
-            fixed: Fixed degrees of freedom, which hold boundary values.
+            b: Right-hand side, as ``ElasticBody.load`` returns it.
+            fixed: Fixed degrees of freedom, at which ``b`` contains boundary values.
             comm: MPI communicator.
         """
         asked_again = comm.allreduce(np.array_equal(b, self.load), op=MPI.LAND)
-        if asked_again:  # in the same step
+        if asked_again:  # the same load, within a step
             return self.displacement.copy()
         factor = max(comm.allgather(_ratio(b, self.load)))[1]
         sizes = np.abs([b - factor * self.load, b])
-        # Forces and boundary values have different units: each to its own rounding.
+        # Forces and boundary values have different units: each has its own rounding error.
         given = sizes[:, fixed]
         sizes[:, fixed] = 0.0
         largest = np.array([part.max(axis=1, initial=0.0) for part in (given, sizes)])
@@ -74,7 +78,7 @@ class FreeState(NamedTuple):
 
 
 def _ratio(b: np.ndarray, last: np.ndarray) -> tuple[float, float]:
-    """Largest entry of ``last`` in magnitude, and ``b`` over ``last`` there."""
+    """Return the largest magnitude in ``last``, and the ratio of ``b`` to ``last`` there."""
     if not last.any():
         return 0.0, 0.0
     k = np.abs(last).argmax()
@@ -82,28 +86,30 @@ def _ratio(b: np.ndarray, last: np.ndarray) -> tuple[float, float]:
 
 
 class ElasticBody(OverRanks):
-    """F(u) = K u - f on the free degrees of freedom, u given on the others.
+    """A body with residual ``F(u) = K u - f``, linear in u, with Dirichlet conditions.
 
-    Vectors are ``x`` and ``D F`` with ``u = D x``, see ``bodies/unknowns.py``; of displacements alone ``D`` is one.
+    Vectors are ``x`` and ``D F`` with ``u = D x``, see ``bodies/unknowns.py``.  If displacements
+    are the only unknowns, ``D`` is the identity.
 
     Args:
         F: Residual form, linear in ``u``.
         u: Displacement.
-        bcs: Dirichlet conditions; their values may change between steps, others come by ``support``.
-        derivative: Of ``F``, as ``derivative_of`` returns it.
-        options: PETSc options of the solver; by default a factorisation by MUMPS, for large bodies
+        bcs: Dirichlet conditions.  Their values may change between steps; ``support`` replaces
+            them.
+        derivative: Derivative of ``F``, as ``derivative_of`` returns it.
+        options: PETSc options of the solver.  By default a factorisation by MUMPS, for large bodies
             conjugate gradients with multigrid, see ``linear_solver.py``.
-        prefix: Their prefix.
-        displacements: Its ``Displacements``, where they are known.
-        form_options: Of the forms' compilation, see ``compat.compiled``.
+        prefix: Prefix of the PETSc options.
+        displacements: ``Displacements`` of the body; None creates them.
+        form_options: Options to compile the forms, see ``compat.compiled``.
     """
 
-    K: Any  # the PETSc matrix, None before the first step
-    soft: np.ndarray
-    nonlinear = False  # whether F is not linear in u, see ``NonlinearBody``
-    loose: LooseMotions | None = None  # where rigid motions cost nothing
-    crowded = False  # whether many contact nodes make multigrid the default, not factors
-    scale: np.ndarray | None = None  # D, (owned dofs,); None where it is one, or not yet known
+    K: Any  # PETSc matrix of the stiffness, None before the first step
+    soft: np.ndarray  # rigid-body modes with little strain energy, (owned dofs, m)
+    nonlinear = False  # whether F is nonlinear in u, see ``NonlinearBody``
+    loose: LooseMotions | None = None  # rigid-body modes without strain energy, None without any
+    crowded = False  # whether multigrid is the default because of many contact nodes
+    scale: np.ndarray | None = None  # D, (owned dofs,); None if it is one, or before assembly
 
     def __init__(
         self,
@@ -118,7 +124,7 @@ class ElasticBody(OverRanks):
     ):
         self.u, self.V = u, u.function_space
         self.comm = self.V.mesh.comm
-        compat.free_garbage(self.comm)  # of bodies that nobody closed
+        compat.free_garbage(self.comm)  # of bodies that were not closed
         self.tangent, self.form_options = derivative, form_options or {}
         self._residual_form = compat.compiled(F, **self.form_options)
         self._stiffness_form = compat.compiled(derivative, **self.form_options)
@@ -136,8 +142,8 @@ class ElasticBody(OverRanks):
         )  # a saddle point: no multigrid
         self.options = default if options is None else dict(options)
         self.prefix = prefix or f"dolfinx_contact_{next(_instances)}_"
-        self._digest: bytes | None = None  # of the stiffness that is assembled
-        self._assembled_with, self._loaded_with = None, None  # values of both kinds of parameters
+        self._digest: bytes | None = None  # hash of the assembled stiffness
+        self._assembled_with, self._loaded_with = None, None  # parameters of stiffness and loads
         self.assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
@@ -147,19 +153,20 @@ class ElasticBody(OverRanks):
         self.parts = rigid_motion.connected_parts(self.displacements)
 
     def support(self, bcs: Sequence[Any]) -> None:
-        """From now on these are the Dirichlet conditions; ``refresh`` sets everything up for them."""
+        """Replace the Dirichlet conditions; the next ``refresh`` imposes them on the stiffness."""
         self.bcs = list(bcs)
         fixed = [compat.bc_dofs(bc, self.size) for bc in self.bcs]
         self.fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int32), *fixed]))
 
     def refresh(self, x: np.ndarray | None = None) -> int:
-        """Assemble the stiffness if a constant or coefficient in it changed, or what is fixed.
+        """Assemble the stiffness if a constant, a coefficient or the set of fixed dofs has changed.
+        Collective.
 
         Args:
             x: Last converged displacement; not used here.
 
         Returns:
-            How often it was assembled so far: a number that changes with the matrix.
+            Number of assemblies so far, which identifies the matrix.
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
         agree_on_values(given, self.comm)
@@ -179,11 +186,11 @@ class ElasticBody(OverRanks):
         return self.assemblies
 
     def _all_same(self, same: bool) -> bool:
-        """Whether values are the same as before on all ranks.  Collective."""
+        """Whether a flag is true on all ranks.  Collective."""
         return self.comm.allreduce(bool(same), op=MPI.LAND)
 
     def _assemble(self) -> None:
-        """The stiffness, nothing held yet.  Collective."""
+        """Assemble the stiffness without Dirichlet conditions.  Collective."""
         self.forget_solver()
         self._free_matrices()
         if self.K is None:
@@ -198,14 +205,17 @@ class ElasticBody(OverRanks):
 
             self.scale = unknowns.scaled(self.K, self.displacements, self.scale)
             diagonal = unknowns.row_sizes(self.K, self.displacements)
-        # Rounding of a row of K u: as of a sum of so many terms of random sign as it has entries.
+        # Rounding error of a row of K u: a sum of terms of random sign, one for each entry.
         entries = self.K.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] / self.K.getSize()[0]
         self._row_size = np.sqrt(entries) * diagonal
         self._right, self._left = self.K.createVecs()
         self.assemblies += 1
 
     def _hold(self) -> None:
-        """Keep the forces of boundary values; then rows and columns of fixed dofs become the identity's."""
+        """Impose Dirichlet conditions: set rows and columns of fixed dofs to those of the identity.
+
+        The columns are kept, to compute forces by boundary values and support forces.
+        """
         first, last = self.K.getOwnershipRange()
         dofs = np.arange(first, last, dtype=np.int32), (first + self.fixed).astype(np.int32)
         rows, fixed = (PETSc.IS().createGeneral(each, comm=self.comm) for each in dofs)
@@ -216,25 +226,27 @@ class ElasticBody(OverRanks):
             part.destroy()
 
     def diagonal(self) -> np.ndarray:
-        """Diagonal of K, owned degrees of freedom."""
+        """Diagonal of ``K``, owned degrees of freedom."""
         diagonal = self.K.getDiagonal()
         values = diagonal.array_r.copy()
         diagonal.destroy()
         return values
 
     def stiffness_norm(self) -> float:
-        """Frobenius norm of K: to rounding the same however the mesh is shared.  Collective."""
+        """Frobenius norm of ``K``, independent of the partition of the mesh up to rounding.
+        Collective.
+        """
         return self.K.norm(PETSc.NormType.FROBENIUS)
 
     def _free_matrices(self) -> None:
-        """Free what belongs to the last stiffness.  Collective."""
+        """Free the PETSc objects that belong to the last stiffness.  Collective."""
         for part in ("_coupling", "_lift", "_lifted", "_right", "_left"):
             if getattr(self, part) is not None:
                 getattr(self, part).destroy()
             setattr(self, part, None)
 
     def close(self) -> None:
-        """Free everything that PETSc holds.  Collective; nothing can be solved any more."""
+        """Free all PETSc objects; the body cannot be solved afterwards.  Collective."""
         self.forget_solver()
         self._free_matrices()
         if self.K is not None:
@@ -248,43 +260,56 @@ class ElasticBody(OverRanks):
     # -- unknowns ------------------------------------------------------------------------------
 
     def show(self, x: np.ndarray) -> None:
-        """Let ``u`` have these values, the first of which are the owned ones.  Collective."""
+        """Set ``u`` from the unknowns ``x`` and update its ghosts.  Collective.
+
+        Args:
+            x: Unknowns, owned degrees of freedom first; ghosts are ignored.
+        """
         self.u.x.array[: self.size] = self.values(x[: self.size])
         self.u.x.scatter_forward()
 
     def values(self, x: np.ndarray) -> np.ndarray:
-        """``u`` of owned degrees of freedom."""
+        """Return values of ``u``, ``D x``, from unknowns ``x``, owned degrees of freedom."""
         return x if self.scale is None else self.scale * x
 
     def taken(self, values: np.ndarray) -> np.ndarray:
-        """``x`` of values of ``u``, the first of which are the owned ones."""
+        """Return unknowns ``x = D^-1 u`` from values of ``u``, owned degrees of freedom.
+
+        Args:
+            values: Values of ``u``, owned degrees of freedom first; ghosts are ignored.
+        """
         values = values[: self.size].copy()
         return values if self.scale is None else values / self.scale
 
     def boundary_values(self) -> np.ndarray:
-        """``x`` of the Dirichlet conditions' values, zero at free degrees of freedom."""
+        """Return unknowns prescribed by Dirichlet conditions, zero at free degrees of freedom."""
         values = np.zeros_like(self.u.x.array)
         compat.set_bc_values(values, self.bcs)
         return self.taken(values)
 
     def farthest(self, x: np.ndarray) -> float:
-        """Largest component of a displacement, of either sign, over all ranks."""
+        """Return the largest magnitude of a displacement component over all ranks.  Collective."""
         return self.largest(np.abs(self.displacements.rows(x)))
 
     def put(self, values: np.ndarray) -> None:
-        """As ``show``, and let what the user makes of ``u`` follow, see ``NonlinearBody``.  Collective."""
+        """Set ``u`` from the unknowns, and update the user's fields that depend on it.  Collective.
+
+        Only a ``NonlinearBody`` has such fields.
+        """
         self.show(values)
 
     # -- loads and residuals -------------------------------------------------------------------
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:
-        """Boundary values and loads of this step.
+        """Return the right-hand side ``b`` with boundary values, and the external forces.
+        Collective.
 
-        F is assembled where a constant or coefficient in it changed, else the loads are the last ones.
+        F is assembled only if a constant or coefficient in it has changed.
 
         Returns:
-            ``b`` with ``b - K u`` the residual forces for any ``u`` that has the boundary values
-            (which ``b`` holds at fixed degrees of freedom), and the external forces alone.
+            ``b``, so that ``b - K u`` is the residual for any ``u`` with the boundary values, which
+            ``b`` contains at fixed degrees of freedom; and the external forces, zero at fixed
+            degrees of freedom.
         """
         lift = self.boundary_values()
         if not self._all_same(same_values(self._load_parameters, self._loaded_with)):
@@ -299,7 +324,7 @@ class ElasticBody(OverRanks):
         return b, external
 
     def carried(self, motion: np.ndarray) -> np.ndarray:
-        """``K d`` of a motion of supports alone, zero at fixed degrees of freedom."""
+        """Return ``K d`` for a displacement ``d`` of the supports alone, zero at fixed dofs."""
         self._lift.array_w[:] = motion[self.fixed]
         self._coupling.mult(self._lift, self._lifted)
         forces = self._lifted.array_r.copy()
@@ -307,20 +332,20 @@ class ElasticBody(OverRanks):
         return forces
 
     def support_forces(self, x: np.ndarray) -> np.ndarray:
-        """What the supports carry at ``x``, at fixed degrees of freedom, contact reactions left out.
+        """Return support forces at ``x`` without contact reactions, at fixed degrees of freedom.
 
-        By K, of which one triangle beside the other is taken to be the same.
+        ``K`` is assumed to be symmetric: its stored columns are used as rows.
         """
         self._right.array_w[:] = x
         self._coupling.multTranspose(self._right, self._lift)
         return self._lift.array_r - self._external[self.fixed]
 
     def cancelling(self, x: np.ndarray) -> np.ndarray:
-        """Size of the terms that cancel in ``K x``, ``shape=(owned dofs,)``, force units."""
+        """Estimate the magnitude of the terms that cancel in ``K x``, ``shape=(owned dofs,)``."""
         return self._row_size * np.abs(x)
 
     def internal_force(self, values: np.ndarray) -> np.ndarray:
-        """F assembled by DOLFINx at a displacement, owned entries; ``u`` itself is left as it was."""
+        """Return F assembled at a displacement, owned entries; ``u`` is restored afterwards."""
         kept = self.u.x.array.copy()
         try:
             self.put(values)
@@ -331,11 +356,11 @@ class ElasticBody(OverRanks):
         return residual if self.scale is None else self.scale * residual
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """F at a displacement of owned degrees of freedom, what supports carry included."""
+        """Return F at the unknowns ``x``, support forces included, owned degrees of freedom."""
         return self.internal_force(x)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
-        """K x; rows and columns of fixed degrees of freedom are those of the identity."""
+        """Return ``K x``, with rows and columns of the identity for fixed degrees of freedom."""
         self._right.array_w[:] = x
         known = None if self.loose is not None else self._elastic
         half = None if known is None else known.halved
@@ -347,7 +372,15 @@ class ElasticBody(OverRanks):
     def solve(
         self, b: np.ndarray, rough: bool = False, start: np.ndarray | None = None
     ) -> np.ndarray:
-        """K^-1 b, with anchors where the body is loose; the solver is set up at the first call and kept while K stands."""
+        """Return ``K^-1 b``; for a body with loose motions, ``A^-1 b`` with regularisation springs.
+
+        The solver is set up at the first call and kept until ``K`` changes.
+
+        Args:
+            b: Right-hand side, owned degrees of freedom.
+            rough: Whether three digits are enough.
+            start: Initial guess; None means zero.
+        """
         return self._own_solver().solve(b, rough, start)
 
     def _own_solver(self) -> LinearSolver:
@@ -359,11 +392,14 @@ class ElasticBody(OverRanks):
         return self._elastic
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:
-        """Displacement under ``b`` alone; where ``b`` is an earlier one times a factor, so is the answer.
+        """Return the contact-free displacement under ``b``, owned degrees of freedom.
+
+        If ``b`` is a multiple of the last right-hand side, the last solution is scaled.
 
         Args:
-            b: As ``load`` returns it.
-            rough: Three digits are enough, see ``linear_solver.ROUGH_TOLERANCE``; only where they are cheaper.
+            b: Right-hand side, as ``load`` returns it.
+            rough: Whether three digits are enough, see ``linear_solver.ROUGH_TOLERANCE``; used only
+                with iterative solvers.
         """
         known = self.last_free_state
         if known is not None and known.digest.tobytes() != self._digest:
@@ -379,18 +415,20 @@ class ElasticBody(OverRanks):
         return x
 
     def forget(self) -> None:
-        """Assemble and set up everything anew when it is next needed."""
+        """Discard the stiffness: the next ``refresh`` assembles it and sets up its solver again."""
         self.K = self._digest = None
 
     def forget_solver(self) -> None:
-        """Set the solver of K up anew when it is next needed.  Collective."""
+        """Discard the solver of ``K``; the next solve sets it up again.  Collective."""
         for part in filter(None, (self._elastic, self._anchors)):
             part.destroy()
         self._elastic = self._anchors = None
 
     @property
     def anchors(self) -> Anchors | None:
-        """Springs for the soft rigid motions, None where there are none.  Collective."""
+        """Regularisation springs for the soft rigid motions; None if there are none.
+        Collective.
+        """
         if self._anchors is None and self.soft.shape[1] > 0:
             from dolfinx_contact.bodies.anchors import Anchors
 
@@ -399,37 +437,44 @@ class ElasticBody(OverRanks):
 
     @property
     def ksp(self):
-        """The linear solver of K, for many right-hand sides at a time."""
+        """PETSc KSP of ``K``, for many right-hand sides at a time."""
         return self._own_solver().ksp
 
     @property
     def exact(self) -> bool:
-        """Whether solves are exact and cheap, as with a factorisation.  Collective at first."""
+        """Whether linear systems are solved by factorisation, exactly and cheaply.
+
+        Collective at the first call, which sets up the solver.
+        """
         return self.ksp.getType() == "preonly"
 
     @property
-    def _usual(self) -> dict[str, Any] | None:
-        """PETSc options of the solvers of this body, None for those that a matrix of that size has by default."""
+    def _solver_options(self) -> dict[str, Any] | None:
+        """PETSc options for this body's linear systems; None means defaults by matrix size."""
         return MULTIGRID_OPTIONS if self.options is None and self.crowded else self.options
 
     def solver(self, A: PETSc.Mat) -> LinearSolver:
-        """The solver of another matrix on ``V`` by the options of this body."""
-        return LinearSolver(A, self._usual, self.prefix, self.rigid_modes)
+        """Return a ``LinearSolver`` of another matrix on ``V``, with this body's PETSc options."""
+        return LinearSolver(A, self._solver_options, self.prefix, self.rigid_modes)
 
     def stiffened(self, S: PETSc.Mat, how: PETSc.Mat.Structure):
-        """The stiffness, anchors included, plus springs ``S``, and what applies its preconditioner; GAMG's levels are those of K.
+        """Return the stiffness plus springs, and a preconditioner of the sum.  Collective.
 
-        ``how`` the entries of S lie to those of K: a PETSc ``Mat.Structure``.
+        Regularisation springs are included.  With GAMG, the preconditioner uses the levels of
+        ``K``.
 
-        Collective.
+        Args:
+            S: Matrix of the springs.
+            how: PETSc ``Mat.Structure``: relation of the nonzero pattern of ``S`` to the pattern of
+                ``K``.
         """
         K = self.anchors.A if self.loose else self.K
-        if preconditioner(K, self._usual, self.prefix) == "gamg":
+        if preconditioner(K, self._solver_options, self.prefix) == "gamg":
             return self._own_solver().stiffened(S, how)
         A = K.copy()
         A.axpy(1.0, S, how)
         return A, self.solver(A)
 
     def rigid_modes(self) -> np.ndarray:
-        """Orthonormal rigid motions that vanish at fixed degrees of freedom."""
+        """Return orthonormal rigid-body modes, ``shape=(owned dofs, m)``, zero at fixed dofs."""
         return rigid_motion.free_modes(self)

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What users give of a body: their forms and the derivative of F, values in them, whether the stiffness is that of a material."""
+"""Checks of the user's forms, parameters and boundary conditions, and the derivative of F."""
 
 from __future__ import annotations
 
@@ -24,13 +24,16 @@ if TYPE_CHECKING:
 
 
 def derivative_of(F: Any, u: fem.Function, J: Any, moving: bool = False):
-    """The bilinear form of the tangent, and whether F is linear in u.
+    """Return the bilinear form of the tangent, and whether F is linear in u.
 
     Args:
         F: Residual form.
         u: Displacement.
         J: Derivative of F, or None.
-        moving: Whether coefficients of F depend on ``u`` in a way that UFL does not know.
+        moving: Whether coefficients of F depend on ``u`` in a way unknown to UFL.
+
+    Raises:
+        ValueError: F is not a residual form on the space of u, does not depend on u, or needs a J.
     """
     if not isinstance(F, ufl.Form) or len(F.arguments()) != 1:
         raise ValueError(
@@ -63,12 +66,12 @@ def derivative_of(F: Any, u: fem.Function, J: Any, moving: bool = False):
 
 
 def check_meshes(form: ufl.Form, u: fem.Function, entity_maps: Any) -> None:
-    """Raise a ``ValueError`` if a form has integrals or Functions on another mesh, and nothing says how they lie in each other.
+    """Raise a ``ValueError`` if a form involves another mesh than ``u``, without entity maps.
 
     Args:
         form: Residual form.
         u: Displacement.
-        entity_maps: What the user gave.
+        entity_maps: Entity maps given by the user, or None.
     """
     domains = [integral.ufl_domain() for integral in form.integrals()]
     domains += [c.ufl_function_space().ufl_domain() for c in form.coefficients()]
@@ -87,7 +90,7 @@ def depends_on(form: ufl.Form, u: fem.Function) -> bool:
 
 
 def digest_of(parameters: Iterable[Any], *more: Any) -> bytes:
-    """A number that changes with the values of constants and coefficients, and with more bytes or arrays."""
+    """Hash of the values of constants and coefficients, and of additional bytes or arrays."""
     digest = hashlib.blake2b()
     for part in more:
         digest.update(part)
@@ -103,7 +106,12 @@ def values_of(parameters: Iterable[Any]) -> list[np.ndarray]:
 
 
 def same_values(parameters: Iterable[Any], before: list[np.ndarray] | None) -> bool:
-    """Whether constants and coefficients have the values that ``values_of`` has returned, on this rank; None is no."""
+    """Whether constants and coefficients have given values on this rank; False if those are None.
+
+    Args:
+        parameters: Constants and coefficients.
+        before: Values, as ``values_of`` returned them, or None.
+    """
     if before is None:
         return False
     now = (each.x.array if hasattr(each, "x") else each.value for each in parameters)
@@ -111,7 +119,10 @@ def same_values(parameters: Iterable[Any], before: list[np.ndarray] | None) -> b
 
 
 def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
-    """Raise a ``ValueError`` if an entry is not finite, or one of a displacement is not positive."""
+    """Raise a ``ValueError`` if a diagonal entry of the stiffness is not finite or not positive.
+
+    Entries of unknowns other than displacements need not be positive.
+    """
     if not np.isfinite(diagonal).all():
         raise ValueError(
             "the stiffness contains NaN or infinity: check the material parameters in F (nu = 0.5 has no stiffness)."
@@ -126,10 +137,11 @@ def check_diagonal(diagonal: np.ndarray, displacements: Displacements) -> None:
 
 
 def check_dilation(body: ElasticBody) -> None:
-    """Raise a ``ValueError`` if the body gains energy by growing, as with Poisson's ratio above 0.5.  Collective.
+    """Raise a ``ValueError`` if uniform expansion releases energy: Poisson's ratio above 0.5.
+    Collective.
 
     Args:
-        body: ElasticBody, its stiffness assembled, nothing held yet.
+        body: ElasticBody with its stiffness assembled, without Dirichlet conditions.
     """
     displacements = body.displacements
     if displacements.mixed:
@@ -146,9 +158,13 @@ def check_dilation(body: ElasticBody) -> None:
 
 
 def agree_on_values(parameters: Iterable[Any], comm: MPI.Comm) -> None:
-    """Raise a ``ValueError`` if a constant of forms or conditions differs between ranks: different problems.
+    """Raise a ``ValueError`` on all ranks if a constant differs between ranks.  Collective.
 
-    Of Functions the values of the ranks that own them count: ghosts are brought up to date.  Collective.
+    Ghost values of Functions are updated.
+
+    Args:
+        parameters: Constants and coefficients of forms and boundary conditions.
+        comm: MPI communicator.
     """
     for function in parameters:
         if hasattr(function, "x"):
@@ -165,7 +181,7 @@ def agree_on_values(parameters: Iterable[Any], comm: MPI.Comm) -> None:
 
 
 def warn_of_unread(options: list[str]) -> None:
-    """Warn of PETSc options that were not asked for; those of levels are only where there are levels."""
+    """Warn of PETSc options that were not read, except options of multigrid levels."""
     unread = [name for name in options if not name.startswith(("mg_levels_", "mg_coarse_"))]
     if unread:
         warnings.warn(
@@ -176,7 +192,12 @@ def warn_of_unread(options: list[str]) -> None:
 
 
 def check_finite(arrays: dict, comm: MPI.Comm) -> None:
-    """Raise a ``ValueError`` on all ranks if one of the arrays, by their names, is not finite.  Collective."""
+    """Raise a ``ValueError`` on all ranks if an array contains NaN or infinity.  Collective.
+
+    Args:
+        arrays: Arrays by their names in the message.
+        comm: MPI communicator.
+    """
     with raised_together(comm):
         for name, values in arrays.items():
             if not np.isfinite(values).all():

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Functions of the user that a step moves on, and that a rejected step leaves as they were."""
+"""Internal variables of a material, updated by converged steps and unchanged by failed ones."""
 
 from __future__ import annotations
 
@@ -16,23 +16,28 @@ from dolfinx_contact.support.numbering import original_cells
 
 
 class InternalVariables(Guarded):
-    """Internal variables of a material, such as plastic strains, hardening or viscous stresses, and the user's functions that
-    update them.
+    """Internal variables of a material, and the user's functions that update them.
+
+    Examples of internal variables are plastic strains, hardening or viscous stresses.
 
     Args:
         state: The user's Functions.  A failed step leaves them unchanged; checkpoints contain them.
-        before_residual: None, or ``f(u)``, called before each assembly of F or J.  It sets their coefficients from ``u`` and
-            ``state``, and must not change ``state``.  ``ContactProblem`` then needs ``J``.
-        after_step: None, or ``f(u)``, called once after every converged step.  It updates ``state``.
+        before_residual: None, or ``f(u)``, called before each assembly of F or J.  It sets their
+            coefficients from ``u`` and ``state``, and must not change ``state``.
+            ``ContactProblem`` then needs ``J``.
+        after_step: None, or ``f(u)``, called once after every converged step.  It updates
+            ``state``.
 
     Raises:
-        ValueError: an entry of ``state`` is not a Function, or one of the other arguments is not callable.
+        ValueError: an entry of ``state`` is not a Function, or one of the other arguments is not
+            callable.
 
     Example:
         >>> creep = fem.Function(V)
         >>> def flow(u): creep.x.array[:] += 0.1 * (u.x.array - creep.x.array)
         >>> internal = dc.InternalVariables([creep], after_step=flow)
-        >>> creeping = dc.ContactProblem(F, u, dc.Contact(V, foot, plane, friction), bcs=[bc], internal=internal)
+        >>> contact = dc.Contact(V, foot, plane, friction)
+        >>> creeping = dc.ContactProblem(F, u, contact, bcs=[bc], internal=internal)
     """
 
     _remedy = "make new InternalVariables, and a ContactProblem with them."
@@ -59,16 +64,16 @@ class InternalVariables(Guarded):
         self._made = True
 
     def values(self) -> tuple[np.ndarray, ...]:
-        """What they are now, for ``put``."""
+        """Return copies of the present values of all internal variables, ghosts included."""
         return tuple(function.x.array.copy() for function in self.state)
 
     def put(self, values: Sequence[np.ndarray]) -> None:
-        """Let them be what they were."""
+        """Restore the internal variables to values that ``values`` returned."""
         for function, array in zip(self.state, values):
             function.x.array[:] = array
 
     def move_on(self, u: fem.Function) -> None:
-        """Let the user move them on with the converged displacement.  Collective."""
+        """Call the user's ``after_step`` with the converged displacement.  Collective."""
         if self.after_step is not None:
             with raised_together(u.function_space.mesh.comm):
                 self.after_step(u)
@@ -76,7 +81,9 @@ class InternalVariables(Guarded):
     # -- checkpoints ---------------------------------------------------------------------------
 
     def cells(self) -> dict[str, np.ndarray]:
-        """Original indices of this rank's cells, by the name of rows; nothing without functions.  Collective."""
+        """Return a dictionary with original indices of this rank's cells, empty without variables.
+        Collective.
+        """
         if not self.state:
             return {}
         meshes = [function.function_space.mesh for function in self.state]
@@ -86,7 +93,7 @@ class InternalVariables(Guarded):
             return {"state_nodes": original_cells(meshes[0])}
 
     def save(self) -> dict[str, np.ndarray]:
-        """Cells, and the values of each function, a row a cell."""
+        """Return arrays for a checkpoint: cell indices and values, one row for each cell."""
         rows = self.cells()
         for k, function in enumerate(self.state):
             dofs = compat.cell_dofs(function.function_space)
@@ -94,7 +101,11 @@ class InternalVariables(Guarded):
         return rows
 
     def loaded(self, rows: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-        """The values, as ``values`` returns them, of what ``save`` returned, for the cells that this rank owns; they are put, too.  Collective."""
+        """Restore the internal variables from a checkpoint, and return their values.  Collective.
+
+        Args:
+            rows: Arrays that ``save`` returned, reordered to the cells owned by this rank.
+        """
         for k, function in enumerate(self.state):
             values, dofs = rows[f"state_{k}"], compat.cell_dofs(function.function_space)
             function.x.array[dofs[: len(values)]] = values

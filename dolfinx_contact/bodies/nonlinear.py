@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A body whose residual form is not linear in the displacement: large strains, plasticity, follower loads."""
+"""A body whose residual form is nonlinear in u: large strains, plasticity, follower loads."""
 
 from __future__ import annotations
 
@@ -24,10 +24,15 @@ if TYPE_CHECKING:
 
 
 class NonlinearBody(ElasticBody):
-    """F(u) = 0 on the free degrees of freedom; ``K`` is the derivative of F where it was linearised last.
+    """A body with a nonlinear residual ``F(u) = 0`` and Dirichlet conditions.
 
-    ``residual`` is that of F.  All that has to do with ``K`` is about the linearised body,
-    ``F(x) + K (u - x)``, at the place ``x`` of the last ``linearise``.
+    ``K`` is the derivative of F at the last linearisation point.  All methods that involve ``K``
+    refer to the linearised body, ``F(x) + K (u - x)``, with the point ``x`` of the last
+    ``linearise``.  ``residual`` is the residual of F itself.
+
+    Args:
+        F, u, bcs, derivative, options, prefix, displacements, form_options: As in ``ElasticBody``.
+        before: The user's function ``before_residual``, or None, see ``InternalVariables``.
     """
 
     nonlinear = True
@@ -52,19 +57,21 @@ class NonlinearBody(ElasticBody):
     # -- at a displacement ---------------------------------------------------------------------
 
     def put(self, values: np.ndarray) -> None:
-        """Let ``u`` and what the user makes of it be those of a displacement, owned degrees of freedom.  Collective."""
+        """Set ``u`` from the unknowns, and call the user's ``before_residual``.  Collective."""
         self.show(values)
         if self._before is not None:
             with raised_together(self.comm):
                 self._before(self.u)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """See ``ElasticBody``; not finite where an element is turned inside out."""
+        """Return F at the unknowns ``x``; not finite if an element is turned inside out."""
         with np.errstate(all="ignore"):
             return self.internal_force(x)
 
     def linearise(self, x: np.ndarray) -> None:
-        """Let ``K`` be the derivative of F at a displacement, and the linearised body the one there.  Collective."""
+        """Assemble ``K``, the derivative of F, at the unknowns ``x``, unless it is there already.
+        Collective.
+        """
         if self._place is not None and self.same(x, self._place):
             return
         kept, self._place = self.u.x.array.copy(), None
@@ -75,7 +82,8 @@ class NonlinearBody(ElasticBody):
             self.u.x.array[:] = kept
         self._hold()
         self._place = x.copy()
-        # Rounding is that of the last converged displacement: beside the tangent of a senseless trial any force is small.
+        # Rounding is estimated with the tangent at the last converged displacement: the tangent at
+        # a bad iterate may be so large that any force seems to be rounding.
         if self._rounding is not None:
             self._row_size = self._rounding
 
@@ -84,16 +92,20 @@ class NonlinearBody(ElasticBody):
     def support(self, bcs: Sequence[Any]) -> None:
         """See ``ElasticBody``."""
         super().support(bcs)
-        self._place = self.soft = None  # where K stands, and motions that are soft: not known
+        self._place = self.soft = None  # linearisation point and soft modes: not known
 
     def refresh(self, x: np.ndarray | None = None) -> int:
-        """Agree on what is given, and linearise at the last converged displacement.
+        """Check that ranks agree on parameters, and linearise at the last converged displacement.
+        Collective.
 
         Args:
-            x: Last converged displacement, owned degrees of freedom; None leaves ``K`` as it is.
+            x: Last converged displacement, owned degrees of freedom; None leaves ``K`` unchanged.
 
         Returns:
-            How often ``K`` was assembled so far.
+            Number of assemblies of ``K`` so far.
+
+        Raises:
+            ValueError: a rigid motion of the body is unsupported, or the stiffness is not positive.
         """
         agree_on_values((*self._given, *compat.bc_constants(self.bcs)), self.comm)
         if x is not None:
@@ -113,10 +125,11 @@ class NonlinearBody(ElasticBody):
         return self.assemblies
 
     def load(self) -> tuple[np.ndarray, np.ndarray]:
-        """Boundary values of this step, and the external forces ``-F(0)``.
+        """Return boundary values of this step, and the external forces ``-F(0)``.
 
         Returns:
-            An array that is zero but for the boundary values at fixed degrees of freedom, and the forces.
+            Boundary values at fixed degrees of freedom, zero elsewhere; external forces, zero at
+            fixed degrees of freedom.
         """
         values = self.boundary_values()
         external = -self.internal_force(np.zeros(self.size))
@@ -127,11 +140,11 @@ class NonlinearBody(ElasticBody):
     # -- the linearised body -------------------------------------------------------------------
 
     def linear_load(self, values: np.ndarray, residual: np.ndarray) -> np.ndarray:
-        """``b`` of the linearised body, see ``ElasticBody.load``.
+        """Return the right-hand side ``b`` of the linearised body, see ``ElasticBody.load``.
 
         Args:
-            values: Zero but for the boundary values.
-            residual: F where ``K`` stands.
+            values: Boundary values, zero at free degrees of freedom.
+            residual: F at the linearisation point.
         """
         x = self._place
         motion = np.where(self._is_fixed(), values - x, 0.0)
@@ -148,13 +161,13 @@ class NonlinearBody(ElasticBody):
         return fixed
 
     def free_state(self, b: np.ndarray, rough: bool = False) -> np.ndarray:
-        """Displacement of the linearised body under ``b`` alone."""
+        """Return the contact-free displacement of the linearised body under ``b``."""
         x = self.solve(b, rough)
         x[self.fixed] = b[self.fixed]
         return x
 
     def stiffness_norm(self) -> float:
-        """Zero: the stiffness is that of a state, and tells no body from another."""
+        """Return zero: the stiffness depends on the state, so it does not identify the body."""
         return 0.0
 
     def forget(self) -> None:
@@ -164,5 +177,5 @@ class NonlinearBody(ElasticBody):
 
     @property
     def factorised(self) -> bool:
-        """Whether linear systems of this size are factorised."""
+        """Whether linear systems of this body are solved by factorisation."""
         return preconditioner(self.K, self.options, self.prefix) in ("lu", "cholesky")

@@ -1,6 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Rigid motions that nothing or only a soft spring holds: a factorisation does not notice them."""
+"""Rigid-body modes of a body: unsupported and softly supported ones, geometry, connected parts.
+
+A factorisation does not detect unsupported modes.
+"""
 
 from __future__ import annotations
 
@@ -17,28 +20,30 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.loose import LooseMotions
     from dolfinx_contact.contact.displacements import Displacements
 
-# Relative energies and squares of lengths below this are rounding, not stiffness or distance.
+# Relative energies and squared lengths below this are rounding errors.
 RELATIVE_ROUNDING = 1e-13
 
-# Below this a motion is so soft that solving with the stiffness loses digits which contact needs.
+# Relative energy below which a mode is soft: solving with the stiffness loses digits that contact
+# needs.
 SOFT_MOTION = 1e-4
 
-# About how many cells of a rank are asked for their strain.
+# Approximate number of cells of each rank at which the strain is sampled.
 SAMPLED_CELLS = 2000
 
 
 def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
-    """Rigid motions of a part of the body, of its ``parts``, that cost next to no energy.
+    """Return rigid-body modes with little strain energy, and those without any.  Collective.
 
-    Every connected part of the mesh is tried: a spring in F gives energy to the rigid motions that the boundary
-    conditions leave free.
+    Each connected part of the mesh is examined: springs in F give strain energy to rigid-body modes
+    that Dirichlet conditions leave free.
 
     Args:
-        body: ElasticBody with its assembled stiffness.  Collective.
+        body: ElasticBody with its assembled stiffness.
 
     Returns:
-        ``shape=(owned dofs, m)``, zero at fixed degrees of freedom; ``m = 0`` where all is held well.  Of these,
-        those that cost nothing, which contact alone can hold; None where all cost something.
+        Soft modes, ``shape=(owned dofs, m)``, zero at fixed degrees of freedom, ``m = 0`` if the
+        body is well supported; and ``LooseMotions``, the modes without energy, which only contact
+        can prevent, None if there are none.
     """
     displacements = body.displacements
     x = displacements.x[: displacements.count, : displacements.dim]
@@ -72,7 +77,13 @@ def soft_motions(body: ElasticBody) -> tuple[np.ndarray, LooseMotions | None]:
 
 
 def box(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> tuple[np.ndarray, float]:
-    """Middle and largest edge of the box around the nodes ``here``.  Collective."""
+    """Centre and largest edge of the bounding box of selected nodes.  Collective.
+
+    Args:
+        x: Nodal positions, ``shape=(n, gdim)``.
+        here: Selected nodes, ``shape=(n,)``, bool.
+        comm: MPI communicator.
+    """
     low = x[here].min(axis=0, initial=np.inf)
     high = x[here].max(axis=0, initial=-np.inf)
     comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
@@ -81,9 +92,17 @@ def box(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> tuple[np.ndarray, fl
 
 
 def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
-    """Translations, and rotations about the middle in units of the size, of the nodes ``here``.
+    """Rigid-body modes of selected nodes: translations, and rotations about their box's centre.
 
-    ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.
+    Rotations are scaled by the size of the box.
+
+    Args:
+        x: Nodal positions, ``shape=(n, gdim)``.
+        here: Selected nodes, ``shape=(n,)``, bool.
+        comm: MPI communicator.
+
+    Returns:
+        ``shape=(gdim n, 3)`` in two dimensions, ``(gdim n, 6)`` in three; zero at the other nodes.
     """
     n, gdim = x.shape
     middle, size = box(x, here, comm)
@@ -98,7 +117,10 @@ def rigid_modes(x: np.ndarray, here: np.ndarray, comm: MPI.Comm) -> np.ndarray:
 
 
 def free_modes(body: ElasticBody) -> np.ndarray:
-    """Orthonormal rigid motions of each part of the body that vanish at fixed degrees of freedom.  Collective."""
+    """Orthonormal rigid-body modes of each part of the body that vanish at fixed dofs.  Collective.
+
+    ``shape=(owned dofs, m)``.
+    """
     displacements, (part, parts) = body.displacements, body.parts
     x = displacements.x[: displacements.count, : displacements.dim]
     modes = np.concatenate(
@@ -112,13 +134,13 @@ def free_modes(body: ElasticBody) -> np.ndarray:
     products = body.total(modes.T @ modes)
     values, vectors = np.linalg.eigh(products)
     left = values > RELATIVE_ROUNDING * values[-1]
-    if not left.all():  # conditions fix a component of all nodes
+    if not left.all():  # Dirichlet conditions fix a component of all nodes
         return modes @ vectors[:, left] / np.sqrt(values[left])
     return np.linalg.solve(np.linalg.cholesky(products), modes.T).T
 
 
 def extents(displacements: Displacements) -> tuple[float, float]:
-    """Largest and smallest edge of the box around the body.  Collective."""
+    """Largest and smallest edge of the body's bounding box, length units.  Collective."""
     x, comm = displacements.x, displacements.V.mesh.comm
     edges = np.concatenate((x.max(axis=0, initial=-np.inf), (-x).max(axis=0, initial=-np.inf)))
     comm.Allreduce(MPI.IN_PLACE, edges, op=MPI.MAX)
@@ -127,11 +149,14 @@ def extents(displacements: Displacements) -> tuple[float, float]:
 
 
 def mean_strain(displacements: Displacements, u: np.ndarray) -> float:
-    """Root mean square of the largest principal strain, of either sign, over some thousand cells of each rank.  Collective.
+    """Root mean square of the largest principal strain in magnitude, sampled over cells.
+    Collective.
+
+    About ``SAMPLED_CELLS`` cells of each rank are used.
 
     Args:
         displacements: ``Displacements``.
-        u: Their degrees of freedom on this rank, those of ghosts included.
+        u: Displacement, degrees of freedom on this rank, ghosts included.
     """
     mesh = displacements.V.mesh
     nodes = compat.cell_nodes(displacements.V)[
@@ -147,18 +172,20 @@ def mean_strain(displacements: Displacements, u: np.ndarray) -> float:
     inertia = across @ x
     slopes = np.linalg.solve(inertia, across @ moved)
     strains = np.linalg.eigvalsh(0.5 * (slopes + slopes.transpose(0, 2, 1)))
-    volume = np.sqrt(np.linalg.det(inertia))  # of cells alike, but for a factor
+    volume = np.sqrt(np.linalg.det(inertia))  # up to a factor, for cells of one type
     parts = np.array([volume @ np.abs(strains).max(axis=1) ** 2, volume.sum()])
     mesh.comm.Allreduce(MPI.IN_PLACE, parts, op=MPI.SUM)
     return float(np.sqrt(parts[0] / parts[1]))
 
 
 def connected_parts(displacements: Displacements) -> tuple[np.ndarray, int]:
-    """Number of the connected part of the mesh that each owned node is in, and how many there are.  Collective."""
+    """Index of the connected part of the mesh for each owned node, and the number of parts.
+    Collective.
+    """
     V = displacements.V
     comm = V.mesh.comm
-    local = _local_parts(compat.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
-    # Names that no other rank uses; the owner of a node tells its name to those who see it as ghost.
+    local = _smallest_connected(compat.cell_nodes(V), V.tabulate_dof_coordinates().shape[0])
+    # Labels unique over all ranks; the owner of a node sends its label to ranks with its ghost.
     first = comm.exscan(local.max(initial=-1) + 1) or 0
     name = fem.Function(V)
     components = V.dofmap.index_map_bs
@@ -168,7 +195,7 @@ def connected_parts(displacements: Displacements) -> tuple[np.ndarray, int]:
     owners = name.x.array[::components].astype(np.int64)
     same = np.unique(np.column_stack([mine, owners]), axis=0)
     same = np.concatenate(comm.allgather(same))
-    joined = _local_parts(same, same.max() + 1)
+    joined = _smallest_connected(same, same.max() + 1)
     numbers, part = np.unique(joined[mine], return_inverse=True)
     everywhere = np.unique(np.concatenate(comm.allgather(numbers)))
     return np.searchsorted(everywhere, numbers)[part.reshape(-1)][
@@ -176,14 +203,19 @@ def connected_parts(displacements: Displacements) -> tuple[np.ndarray, int]:
     ], everywhere.size
 
 
-def _local_parts(groups: np.ndarray, size: int) -> np.ndarray:
-    """Smallest index that each of ``size`` nodes is connected to by groups of nodes, ``shape=(m, k)``."""
+def _smallest_connected(groups: np.ndarray, size: int) -> np.ndarray:
+    """Smallest index of a node connected to each node, ``shape=(size,)``.
+
+    Args:
+        groups: Groups of connected nodes, one per row, ``shape=(m, k)``.
+        size: Number of nodes.
+    """
     label = np.arange(size)
     while True:
         smallest = np.repeat(label[groups].min(axis=1, initial=size), groups.shape[1])
         following = label.copy()
         np.minimum.at(following, groups.ravel(), smallest)
-        following = following[following]  # a shortcut that halves the way to the smallest
+        following = following[following]  # pointer jumping: halves the distance to the smallest
         if np.array_equal(following, label):
             return label
         label = following

@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The unknowns of a mixed space as lengths and their residuals as forces: ``u = D x`` and ``D F``.
+"""Scaling ``D`` of a mixed space's unknowns, ``u = D x``, to lengths, and residuals to forces.
 
-``D`` is one for displacements.  For other unknowns, as pressures, it makes ``x`` a length and the residual, as of
-volumes, a force, see ``scales``: all that compares, adds and minimises is then about lengths and forces alone, and the
-units of those unknowns do not matter.  ``D`` is that of the first stiffness, and stays.
+``D`` is one for displacements.  For other unknowns, such as pressures, it turns ``x`` into a length
+and the residual, such as a volume, into a force, see ``scales``.  Norms and tolerances then involve
+lengths and forces only, independent of the units of these unknowns.  ``D`` is computed from the
+first stiffness and kept.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ if TYPE_CHECKING:
 
 
 def scaled(K: PETSc.Mat, displacements: Displacements, D: np.ndarray | None = None) -> np.ndarray:
-    """Make ``D K D`` of an assembled stiffness, in place.  Collective.
+    """Scale an assembled stiffness in place to ``D K D``, and return ``D``.  Collective.
 
     Args:
         K: PETSc matrix.
         displacements: ``Displacements`` of a mixed space.
-        D: Of the first stiffness, ``shape=(owned dofs,)``; None takes it from this one.
+        D: Scaling from the first stiffness, ``shape=(owned dofs,)``; None computes it from this
+            matrix.
 
     Returns:
         ``D``, see ``scales``.
@@ -40,7 +42,7 @@ def scaled(K: PETSc.Mat, displacements: Displacements, D: np.ndarray | None = No
 
 
 def row_sizes(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
-    """Size of the entries in each row: the diagonal one, of unknowns besides displacements the norm of all."""
+    """Magnitude of each row of ``K``: diagonal entry for displacements, norm for other unknowns."""
     diagonal = K.getDiagonal()
     values = np.abs(diagonal.array_r)
     diagonal.destroy()
@@ -49,14 +51,17 @@ def row_sizes(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
 
 
 def scales(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
-    """``D`` of a stiffness: what makes a residual of other unknowns a force, ``shape=(owned dofs,)``.
+    """Return the scaling ``D`` of the unknowns of a mixed space, ``shape=(owned dofs,)``.
+    Collective.
 
-    A residual ``c`` in the equation of an unknown ``q`` that acts on displacements is removed by its change ``c / s``,
-    ``s = |K_qq| + sum |K_qj K_jq| / K_jj``, while each displacement ``j`` gives way by itself.  That makes forces
-    ``K_jq c / s``, whose norm is ``D c``.  Unknowns that act on those unknowns come next, in the same way.
+    ``D`` turns the residual of an unknown other than a displacement into a force.  A residual ``c``
+    in the equation of an unknown ``q`` that acts on displacements is removed by the change
+    ``c / s`` of ``q``, with ``s = |K_qq| + sum |K_qj K_jq| / K_jj``, if each displacement ``j``
+    responds independently.  The change causes forces ``K_jq c / s``, whose norm is ``D c``.
+    Unknowns that act only on such unknowns follow, in the same way.
 
     Raises:
-        ValueError: on all ranks, if unknowns act on no displacement.
+        ValueError: on all ranks, if some unknowns act on no displacement, directly or indirectly.
     """
     rows = _rows(K)
     transposed = K.transpose(PETSc.Mat())
@@ -89,20 +94,20 @@ def scales(K: PETSc.Mat, displacements: Displacements) -> np.ndarray:
 
 
 def _rows(K: PETSc.Mat) -> sparse.csr_matrix:
-    """Owned rows of an assembled matrix."""
+    """Owned rows of an assembled matrix, as a SciPy matrix."""
     indptr, indices, values = K.getValuesCSR()
     return sparse.csr_matrix((values, indices, indptr), (len(indptr) - 1, K.getSize()[1]))
 
 
 def _matrix(K: PETSc.Mat, rows: sparse.csr_matrix):
-    """A PETSc matrix of owned rows, shared among ranks as ``K``."""
+    """PETSc matrix with given owned rows and the layout of ``K``.  Collective."""
     rows = rows.tocsr()
     csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
     return PETSc.Mat().createAIJ(K.getSizes(), csr=csr, comm=K.comm)
 
 
 def _product(A: PETSc.Mat, values: np.ndarray) -> np.ndarray:
-    """``A x``, owned entries."""
+    """Return ``A x``, owned entries.  Collective."""
     right, left = A.createVecs()
     right.array_w[:] = values
     A.mult(right, left)

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Check of axes of friction that belong to a body which turns on a rigid surface."""
+"""Check for friction axes of a body that turns on a rigid surface."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from dolfinx_contact.checks.check import Check, CheckedStep
 from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.fields import turn_of_nodes
 
-# Radians by which a body may turn under axes that stay in space, though they are the body's.
+# Largest rotation of a body, radians, with friction axes that belong to it but stay fixed in space.
 LARGEST_ROTATION = 0.05
 
 
 class AxesStay(Check):
-    """Of a body that has turned on a rigid surface, which carries no axes of a body."""
+    """Warning if a body has turned on a rigid surface while its friction axes stay fixed in space.
+
+    Args:
+        contact: A contact on a rigid surface whose friction axes are a field of the body.
+    """
 
     def __init__(self, contact: Contact):
         self._contact = contact

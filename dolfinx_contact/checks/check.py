@@ -1,6 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What steps take for granted, checked after each of them until the user has been told: one class a check, imported where it applies."""
+"""Base class of checks of modelling assumptions, which run after each step and warn at most once.
+
+Each check is a class.  Modules with special checks are imported only if these apply.
+"""
 
 from __future__ import annotations
 
@@ -18,22 +21,22 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import NodalStiffness
     from dolfinx_contact.results.record import Counts
 
-# What is rounding, radians, or over the size of a body.
+# Negligible rotation, radians, or length relative to the size of a body.
 NEGLIGIBLE_PART = 1e-6
 
 logger = logging.getLogger("dolfinx_contact")
 
 
 class CheckedStep(NamedTuple):
-    """The state that a step has ended in, as checks get it.
+    """State at the end of a step, the argument of checks.
 
     Attributes:
         body: The body.
-        contacts: All contacts, whose ``reaction``, ``gap`` and the like are those of the step.
-        stiffness: Of their nodes.
-        u: Displacement, degrees of freedom of this rank with those of ghosts.
-        counts: Nodes of all contacts by status.
-        over: Names of the classes of checks that are over: the user was told, or nothing is left to be looked at.
+        contacts: All contacts, with ``reaction``, ``gap`` etc. at the end of the step.
+        stiffness: Nodal stiffness of each contact.
+        u: Displacement, owned degrees of freedom and ghosts.
+        counts: Number of nodes of all contacts by status.
+        over: Class names of finished checks, which have warned or no longer apply.
     """
 
     body: ElasticBody
@@ -45,26 +48,38 @@ class CheckedStep(NamedTuple):
 
 
 class Check(ABC):
-    """Base class of checks; ``problem.checks`` has those of a problem, see docs/extending.md.
+    """Base class of the checks in ``problem.checks``, see docs/extending.md.
 
     Attributes:
-        level: At which ``logging`` is told; None warns.
+        level: ``logging`` level of the message; None issues a Python warning instead.
     """
 
     level: ClassVar[int | None] = None
 
     @abstractmethod
     def run(self, step: CheckedStep) -> str | None:
-        """What the user is to be told, once; empty where nothing is left to be looked at, None where the next step is.  Collective.
+        """Message for the user, an empty string if the check no longer applies, or None.
+        Collective.
 
-        The same on all ranks.
+        The check is finished after a message or an empty string.  None repeats it after the next
+        step.  The result is the same on all ranks.
+
+        Args:
+            step: State at the end of the step.
         """
 
 
 def run_checks(
     checks: Sequence[Check], step: CheckedStep
 ) -> tuple[tuple[Check, ...], frozenset[str]]:
-    """Run checks, warn in the name of who called ``solve``; those that are left, and names of those that are over.  Collective."""
+    """Run checks, and return the unfinished ones and the class names of finished ones.  Collective.
+
+    Messages are logged, or issued as warnings at the line that called ``solve``.
+
+    Args:
+        checks: Checks to run.
+        step: State at the end of the step.
+    """
     left = []
     for check in checks:
         message = check.run(step)
@@ -80,7 +95,11 @@ def run_checks(
 
 
 def checked_checks(checks: Any) -> tuple[Check, ...]:
-    """Checks, all of classes derived from ``Check``."""
+    """Tuple of the given checks, a single one or several.
+
+    Raises:
+        ValueError: An object is not an instance of ``Check``.
+    """
     checks = (checks,) if isinstance(checks, Check) else tuple(checks)
     for check in checks:
         if not isinstance(check, Check):
@@ -91,6 +110,6 @@ def checked_checks(checks: Any) -> tuple[Check, ...]:
 
 
 def place_of(where: Sequence[float]) -> str:
-    """A position in words."""
+    """Text of a position, such as "(1, 0, 0.5)"; negligible components become zero."""
     where = np.where(np.abs(where) < NEGLIGIBLE_PART * np.abs(where).max(), 0.0, where)
     return f"({', '.join(f'{x:.3g}' for x in where)})"

@@ -1,9 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What the nodes of facets cannot see: surfaces between them, round bodies of straight cells, slopes of wavy faces.
+"""Checks for geometry that contact nodes do not resolve.
 
-Lengths are compared with ``r_n / kappa``, by how much a reaction would push its node in by itself: a length that the
-nodes miss is an error of their forces of about ``kappa`` times that length.
+They find rigid surfaces that vary between nodes, round bodies meshed with straight cells, and
+steep slopes of wavy faces.  Lengths are compared with ``r_n / kappa``, the indentation of a node
+by its own reaction: an unresolved length causes an error of nodal forces of about ``kappa``
+times that length.
 """
 
 from __future__ import annotations
@@ -19,40 +21,50 @@ from dolfinx_contact.contact.contact import Contact
 from dolfinx_contact.contact.facets import Facets, facets_of, gauss
 from dolfinx_contact.support.collective import raised_together
 
-# What is missed, over the largest ``r_n / kappa``, above which the user is told.
+# Unresolved length, relative to the largest ``r_n / kappa``, above which a warning is issued.
 LARGEST_MISS = 1.0
 
-# A surface stands out between nodes of a round body on its own account if it does by more than so many times the body.
+# A surface, and not the faceting of a round body, causes a deviation between nodes if the deviation
+# is larger than this factor times the distance of the smooth body from the facet.
 SAG_RATIO = 4.0
 
-# Part of the reactions by which slopes of a wavy face, which are neglected, turn them; length of differences over the body.
+# Largest slope of a wavy face, weighted by reactions; slopes are neglected in the contact normal.
+# Length of finite differences, relative to the size of the body.
 LARGEST_SLOPE = 0.1
 DIFFERENCE_LENGTH = 1e-5
 
-# Part of a hollow between nodes that these may be open and still count as touching.
+# Largest gap of nodes that count as touching, as a fraction of the depth of a hollow between them.
 TOUCHING_PART = 0.1
 
-# How often points of a facet are taken about the deepest one, and by how much nearer to each other.
+# Number of sampling passes per facet, each around the deepest point so far, and the ratio of
+# sampling distances of successive passes.
 CLOSER_LOOKS = 3
 CLOSER_FACTOR = 0.25
 
-# In how many facets of a rank points are moved: the surface may be slow to ask for distances.
+# Number of facets of a rank that are sampled more than once, as distances of a surface may be slow
+# to evaluate.
 DEEPEST_FACETS = 64
 
 
 class Missed(NamedTuple):
-    """A length that the nodes of a facet miss; of two the larger one is the larger tuple."""
+    """Length that the nodes of a facet do not resolve; tuples compare by length."""
 
     length: float = 0.0
-    where: tuple = ()
-    size: float = 0.0  # of the facet
-    needed: float = 0.0  # about the size that would see it
-    hollow: bool = False  # whether the surface recedes
+    where: tuple = ()  # position
+    size: float = 0.0  # facet size
+    needed: float = 0.0  # approximate facet size that resolves the length
+    hollow: bool = False  # whether the surface recedes between the nodes
 
     def or_more(
         self, lengths: Any, where: Any, size: Any, needed: Any = 0.0, hollow: Any = False
     ) -> Missed:
-        """This one, or the largest of those of some facets."""
+        """The entry with the largest length among this one and those of some facets.
+
+        Args:
+            lengths: Unresolved length of each facet, ``shape=(m,)``.
+            where: Positions, ``shape=(m, gdim)``.
+            size, needed, hollow: Fields of this name, one value per facet or for all.
+        """
         if not lengths.size:
             return self
         k = int(lengths.argmax())
@@ -61,15 +73,15 @@ class Missed(NamedTuple):
 
 
 def facets_of_contact(contact: Contact) -> list[Facets]:
-    """The facets of a contact.  Collective."""
+    """Geometry of the facets of a contact, grouped by shape.  Collective."""
     return facets_of(contact.displacements, contact.facets)
 
 
-class _OfFacets(Check):
-    """What facets of some contacts miss.  Collective.
+class _FacetCheck(Check):
+    """Base class of checks for lengths that the nodes of facets do not resolve.  Collective.
 
     Args:
-        facets: Those of each contact.
+        facets: Facets of each contact.
     """
 
     def __init__(self, facets: dict[Contact, list[Facets]]):
@@ -94,7 +106,7 @@ class _OfFacets(Check):
 
     @abstractmethod
     def _concerns(self, contact: Contact, facets: list[Facets]) -> bool:
-        """Whether there is anything to be looked at.  Collective."""
+        """Whether the check applies to a contact.  Collective."""
 
     @abstractmethod
     def _missed(
@@ -105,18 +117,32 @@ class _OfFacets(Check):
         pushed: float,
         worn: np.ndarray | None,
     ) -> Missed:
-        """The largest length that nodes of facets of this rank miss."""
+        """The largest length that the nodes of this rank's facets do not resolve.
+
+        Args:
+            contact: The contact.
+            parts: Facets of the contact.
+            u: Displacement, owned degrees of freedom and ghosts.
+            pushed: Largest indentation of a node by its own reaction, length.
+            worn: Worn depth at this rank's nodes and ghosts; None without wear.
+        """
 
     @abstractmethod
     def _message(self, contact: Contact, missed: Missed, pushed: float) -> str:
-        """It in words, where the largest reaction pushes its node in by ``pushed``."""
+        """Message for an unresolved length.
+
+        Args:
+            contact: The contact.
+            missed: The unresolved length.
+            pushed: Largest indentation of a node by its own reaction, length.
+        """
 
 
-class Straight(_OfFacets):
-    """Nodes amid straight edges stand off a round body, where it touches."""
+class Straight(_FacetCheck):
+    """Warning if nodes on straight edges deviate from a round body in the contact zone."""
 
     def _concerns(self, contact: Contact, parts: list[Facets]) -> bool:
-        """Whether nodes between vertices stand where straight edges put them, beside a body that is round.  Collective."""
+        """Whether mid-edge nodes lie on straight edges although the body is round.  Collective."""
         most = 0.0
         for facets in parts:
             flat = facets.at_nodes @ facets.x[:, facets.vertices]
@@ -132,9 +158,8 @@ class Straight(_OfFacets):
         for facets in parts:
             x = _positions(contact, facets, u)
             sag = facets.sag_at_nodes()
-            if (
-                pushed == 0.0
-            ):  # nodes that stand out of a hollow body, and touch nothing, are no harm
+            # Without contact, nodes that protrude from a concave body do no harm.
+            if pushed == 0.0:
                 sag = np.maximum(sag, 0.0)
             sag = np.abs(sag).max(axis=1)
             near = contact.surface.distances(x).min(axis=1) <= sag
@@ -155,8 +180,8 @@ class Straight(_OfFacets):
         )
 
 
-class Between(_OfFacets):
-    """The surface goes into facets between nodes, or recedes between nodes that touch."""
+class Between(_FacetCheck):
+    """Warning if the surface penetrates facets between nodes, or recedes between touching nodes."""
 
     def _concerns(self, contact: Contact, parts: list[Facets]) -> bool:
         return contact.surface.varies
@@ -204,7 +229,16 @@ def _within(
     opened: np.ndarray | None,
     missed: Missed,
 ) -> Missed:
-    """The same of facets with nodes at ``x``, at these distances from the surface and these gaps."""
+    """The larger of ``missed`` and the largest length that the nodes of some facets do not resolve.
+
+    Args:
+        contact: The contact.
+        facets: The facets.
+        x: Current positions of their nodes, ``shape=(m, k, gdim)``.
+        gaps: Distances of these nodes from the surface without wear, ``shape=(m, k)``.
+        opened: Gaps of these nodes with wear, ``shape=(m, k)``.
+        missed: Largest unresolved length of other facets.
+    """
     half, centre = 0.5, np.full((len(x), 1, facets.dim), 0.5)
     rule = 2.0 * gauss(facets.dim) - 1.0
     for _ in range(CLOSER_LOOKS):
@@ -234,12 +268,16 @@ def _within(
 
 
 def _positions(contact: Contact, facets: Facets, u: np.ndarray) -> np.ndarray:
-    """Where the nodes of facets now stand, ``shape=(m, k, gdim)``."""
+    """Current positions of the nodes of facets, ``shape=(m, k, gdim)``, at displacement ``u``."""
     return facets.x + u[contact.displacements.dofs(facets.nodes.ravel())].reshape(facets.x.shape)
 
 
 class Slopes(Check):
-    """Of a wavy face that is steep where nodes press on it, whose reactions are along the plane's normal."""
+    """Warning if a wavy face is steep in the contact zone, as its normal reactions ignore slopes.
+
+    Args:
+        contact: A contact on a plane with a ``height``.
+    """
 
     def __init__(self, contact: Contact):
         self._contact = contact
@@ -253,7 +291,7 @@ class Slopes(Check):
                 ends = [
                     contact.surface.distances(x + side * length * along) for side in (1.0, -1.0)
                 ]
-                with np.errstate(invalid="ignore"):  # infinite where it has none
+                with np.errstate(invalid="ignore"):  # distances are infinite outside the surface
                     slopes = (ends[0] - ends[1]) / (2.0 * length)
                 squares += np.square(np.where(np.isfinite(slopes), slopes, 0.0))
         sizes = np.array([squares @ force**2, force @ force])

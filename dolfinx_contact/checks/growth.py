@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""By how much a linear body that turns is too large.
+"""Spurious growth of a rotating body in linear elasticity.
 
-A body that is linear in ``u`` and turns by ``theta`` moves along the tangents of circles, and so grows without any
-stress, by ``theta^2 / 2`` of its size.  That matters where contact and supports do not let it, beside the lengths by
-which these deform it.
+In linear elasticity, points of a rotating body move along the tangents of circles.  So a
+rotation by ``theta`` enlarges the body by ``theta^2 / 2`` of its size without stress.  This
+matters if contact and supports prevent a growth that is comparable with the deformation that
+they cause.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
-# About how many nodes of a rank are asked how the body turns.
+# Approximate number of nodes per rank that determine the rotation of the body.
 SAMPLED_NODES = 2000
 
-# Part of a length that is rounding; part of the growth that has to be hindered: as much is left of it where a body is strained.
+# Fraction of a length that may be rounding.  Smallest fraction of the growth that counts as
+# prevented; below it, the strain of the body alone explains the remainder.
 LENGTH_ROUNDING = 1e-13
 HINDERED_PART = 1e-2
 
 
 class Turn:
-    """Mean rotations of the connected parts of a body.  Collective.
+    """Mean rotations of the connected parts of a body, and growth due to them.  Collective.
 
     Args:
-        body: The body, with its ``parts``.
+        body: The body.
     """
 
     def __init__(self, body: ElasticBody):
@@ -62,19 +64,28 @@ class Turn:
         self._fit = sparse.csr_matrix((fit.ravel(), places), (m * self._count, displacements.size))
 
     def angles(self, u: np.ndarray) -> np.ndarray:
-        """Rotation vector of each part, ``shape=(parts, 3)``, in 2-D ``(parts, 1)``, by least squares over its nodes.  Collective."""
+        """Rotation vector of each part, ``shape=(parts, 3)``, in 2-D ``(parts, 1)``, radians.
+        Collective.
+
+        It is a least-squares fit over the nodes of the part.
+
+        Args:
+            u: Displacement, owned degrees of freedom.
+        """
         return self._body.total(self._fit @ u).reshape(self._count, -1)
 
     def share(self, contacts: Sequence[Contact], u: np.ndarray, angles: np.ndarray) -> float:
-        """What contact and supports do not let the body grow, over that by which they deform it; 0 where it grows freely.  Collective.
+        """Ratio of the growth prevented by contact and supports to their deformation of the body.
 
-        Both are motions along normals of the nodes that touch, or would if the body had not grown, and of supports, but for what rigid
-        motions of the body and free motions of surfaces account for: root mean squares.
+        Both are root mean squares of motions: along the normals of nodes in contact (or in contact
+        if the body had not grown), and along constrained degrees of freedom.  Motions that
+        rigid-body modes and free motions of the surfaces can produce are subtracted.  The ratio is
+        zero if the body can grow freely.  Collective.
 
         Args:
             contacts: All contacts, in the state of ``u``.
-            u: Displacement of owned degrees of freedom.
-            angles: As ``angles`` returns them.
+            u: Displacement, owned degrees of freedom.
+            angles: Rotation vectors, as the method ``angles`` returns them.
         """
         body, displacements = self._body, self._body.displacements
         motions = self._motions(u, angles)
@@ -96,7 +107,7 @@ class Turn:
         return float(np.sqrt(grown / deformed)) if deformed > 0.0 else np.inf
 
     def _driven(self, contacts: Sequence[Contact]) -> DrivenSurfaces | None:
-        """Surfaces that force drives, None where there are none.  Collective."""
+        """Surfaces driven by forces, or None without such surfaces.  Collective."""
         if not any(contact.surface.motions for contact in contacts):
             return None
         from dolfinx_contact.surfaces.driven import DrivenSurfaces
@@ -104,7 +115,15 @@ class Turn:
         return DrivenSurfaces(self._body, [step_of(contact) for contact in contacts])
 
     def _motions(self, u: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """By what the body grows, by what else than turning it moves, and rigid motions of its parts, ``shape=(owned dofs, 2 + m)``."""
+        """Growth, displacement without rotation, and rigid-body modes of all parts, as columns.
+
+        Args:
+            u: Displacement, owned degrees of freedom.
+            angles: Rotation vectors of the parts.
+
+        Returns:
+            ``shape=(owned dofs, 2 + m)`` for m modes.
+        """
         displacements = self._body.displacements
         x, moved = (
             displacements.x[: displacements.count, : displacements.dim],
@@ -124,7 +143,15 @@ class Turn:
 
 
 def _moved(contact: Contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Motions of the nodes of a contact, ``shape=(n, gdim, m)``, and their gaps, in frames of where they stand at ``u``."""
+    """Motions, ``shape=(n, gdim, m)``, and gaps, ``shape=(n,)``, of contact nodes.
+
+    Motions are components in the local frames at displacement ``u``.
+
+    Args:
+        contact: The contact.
+        u: Displacement, owned degrees of freedom.
+        motions: Displacement fields, ``shape=(owned dofs, m)``.
+    """
     if not contact.surface.curved or contact.surface.deformable:
         return contact.points.motion(motions), contact.present.gap
     surface, there = contact.geometry.ended_at(u)
@@ -134,18 +161,28 @@ def _moved(contact: Contact, u: np.ndarray, motions: np.ndarray) -> tuple[np.nda
 
 
 def _left(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
-    """Squares of the first two columns less what all others account for, ``shape=(2,)``.  Collective."""
+    """Sums of squares of the first two columns after projection, ``shape=(2,)``.  Collective.
+
+    The components in the span of all other columns are removed by least squares.
+
+    Args:
+        body: The body.
+        rows: This rank's rows of the columns.
+    """
     left, rest = rows[:, :2].copy(), rows[:, 2:]
     size = np.sqrt(body.total((rest**2).sum(axis=0)))
     rest = rest / np.where(size > 0.0, size, 1.0)
     inverse = np.linalg.pinv(body.total(rest.T @ rest), rcond=LENGTH_ROUNDING, hermitian=True)
-    for _ in range(2):  # the second time for digits that the first one lost
+    for _ in range(2):  # the second pass removes rounding errors of the first
         left -= rest @ (inverse @ body.total(rest.T @ left))
     squares, all_ = body.total(np.array([(left**2).sum(axis=0), (rows[:, :2] ** 2).sum(axis=0)]))
     return np.where(squares > np.square([HINDERED_PART, LENGTH_ROUNDING]) * all_, squares, 0.0)
 
 
 def _turning(arms: np.ndarray) -> np.ndarray:
-    """Velocities of arms in rotations about each axis, ``shape=(n, gdim, 3)``, in 2-D ``(n, 2, 1)``."""
+    """Displacements of lever arms in unit rotations about each axis, ``shape=(n, gdim, 3)``.
+
+    In 2-D, the shape is ``(n, 2, 1)``.
+    """
     axes = np.eye(1 if arms.shape[1] == 2 else 3)
     return np.stack([cross(axis, arms) for axis in axes], axis=2)

@@ -1,6 +1,10 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Checks of every scene: sizes, growth by turning, wear in leaps, contacts that do not touch, slip that turns; and which apply to a scene."""
+"""Checks of a whole problem, and the selection of all checks that apply to it.
+
+The checks in this module concern the size of displacements and strains, growth by rotation, large
+steps of explicit wear, contacts that do not touch, and changes of the slip direction.
+"""
 
 from __future__ import annotations
 
@@ -20,35 +24,38 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.interface import NodalStiffness
 
-# Mean strain above which what linear elasticity leaves out, half the strain as a part of it, is a tenth; a displacement of so many times
-# the size of a body is one in other units.
+# Mean strain above which the relative error of linear elasticity, half the strain, exceeds a tenth.
+# Displacement, relative to the size of the body, above which units are probably inconsistent.
 LARGE_STRAIN = 0.2
 LARGE_DISPLACEMENT = 10.0
 
-# By what a linear body that turns is too large, over the lengths by which contact and supports deform it.
+# Largest spurious growth of a rotating linear body, relative to its deformation by contact and
+# supports.
 GROWTH_SHARE = 0.1
 
-# Displacements turn a body by no more than so many times the half of their spread over its thickness: more than the thickness over the
-# root mean square of distances from the middle.
+# Upper bound of the rotation of a body, relative to half the spread of displacements divided by its
+# thickness.  It exceeds the ratio of thickness to root mean square distance from the centre.
 ROTATION_BOUND = 4.0
 
-# Smallest gap over the size of the body, and cosine between facets and a plane, from which on nothing is likely to touch.
+# Smallest gap relative to the size of the body above which contact is unlikely; cosine between
+# facet normals and the direction to a plane below which contact is unlikely.
 FAR_AWAY = 0.25
 FACING_COSINE = 0.1
 
-# Part of the frictional work that a turn of slip may leave unknown.
+# Largest uncertainty of the frictional work due to changes of the slip direction, relative to the
+# work.
 DOUBTFUL_WORK = 0.1
 
 
 class Size(Check):
-    """Of displacements far larger than the body, and of strains that are not small."""
+    """Warning about displacements or strains too large for linear elasticity."""
 
     def run(self, step: CheckedStep) -> str | None:
         body = step.body
         largest = body.farthest(step.u[: body.size])
         if (
             2.0 * largest <= LARGE_STRAIN * body.thickness
-        ):  # opposite faces may move against each other
+        ):  # factor 2: opposite faces may move towards each other
             return None
         if largest > LARGE_DISPLACEMENT * body.extent:
             return (
@@ -68,13 +75,13 @@ class Size(Check):
 
 
 class WearsInLeaps(Check):
-    """Of a step that wears off so much, after it, that the next one is unloaded by more than it carries."""
+    """Warning if explicit wear in a step would unload a node by more than its reaction."""
 
     def run(self, step: CheckedStep) -> str | None:
         for contact, stiffness in zip(step.contacts, step.stiffness):
             if contact.wear is None or contact.laws.wears_within or contact.repeats > 1.0:
                 continue
-            times, depth, where = _worn_in_a_leap(contact, stiffness)
+            times, depth, where = _largest_unloading(contact, stiffness)
             if times > 1.0:
                 return (
                     f"the depth of {depth:.2g} that this step wears off at the node at {place_of(where)} takes {times:.2g} times its "
@@ -84,11 +91,16 @@ class WearsInLeaps(Check):
         return None
 
 
-def _worn_in_a_leap(contact: Contact, stiffness: NodalStiffness) -> tuple[float, float, list]:
-    """Of the node whose depth worn in the last step unloads it most: by how many times its reaction, depth and position.  Collective.
+def _largest_unloading(contact: Contact, stiffness: NodalStiffness) -> tuple[float, float, list]:
+    """Largest relative unloading of a node by wear, its worn depth and its position.
 
-    Wear is explicit: the depth opens the gap of the next step.  With the node's own stiffness ``kappa`` it takes ``kappa`` times
-    the depth from the reaction.
+    Explicit wear opens the gap of the next step.  With the nodal stiffness ``kappa``, it reduces
+    the reaction by ``kappa`` times the depth; the ratio of this to the reaction is returned.
+    Collective.
+
+    Args:
+        contact: The contact.
+        stiffness: Nodal stiffness of the contact.
     """
     depth, carried = contact.history.unloads
     taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)
@@ -100,7 +112,7 @@ def _worn_in_a_leap(contact: Contact, stiffness: NodalStiffness) -> tuple[float,
 
 
 class Grows(Check):
-    """Of a linear body that turns, and grows by so much that contact feels it."""
+    """Warning if a linear body rotates so far that its spurious growth affects contact."""
 
     def __init__(self) -> None:
         self._turn: Turn | None = None
@@ -110,7 +122,9 @@ class Grows(Check):
         pushed = [c.reaction[:, -1] / nodal.normal for c, nodal in zip(contacts, step.stiffness)]
         felt = GROWTH_SHARE * body.largest(np.concatenate(pushed))
         if self._turn is None:
-            most = ROTATION_BOUND * _spread(body, u[: body.size]) / body.thickness  # of rotations
+            most = (
+                ROTATION_BOUND * _half_spread(body, u[: body.size]) / body.thickness
+            )  # upper bound of the rotation, radians
             if body.parts[1] == 1 and 0.5 * most**2 * body.extent <= felt:
                 return None
             from dolfinx_contact.checks.growth import Turn
@@ -138,8 +152,10 @@ class Grows(Check):
         )
 
 
-def _spread(body: ElasticBody, u: np.ndarray) -> float:
-    """Half of the largest difference of displacements, at most.  Collective."""
+def _half_spread(body: ElasticBody, u: np.ndarray) -> float:
+    """Upper bound of half the largest difference between nodal displacements, length.
+    Collective.
+    """
     rows = body.displacements.rows(u)
     ends = np.concatenate([side.max(axis=0, initial=-np.inf) for side in (rows, -rows)])
     body.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
@@ -147,7 +163,7 @@ def _spread(body: ElasticBody, u: np.ndarray) -> float:
 
 
 class NothingTouches(Check):
-    """Where no node has touched yet, of gaps and normals with which none is likely to."""
+    """Warning if no node has touched yet, and gaps or normals make contact unlikely."""
 
     def run(self, step: CheckedStep) -> str | None:
         body, contacts, counts = step.body, step.contacts, step.counts
@@ -174,12 +190,15 @@ class NothingTouches(Check):
 
 
 def smallest_gap(body: ElasticBody, contacts: Sequence[Contact]) -> float:
-    """The smallest gap of any node.  Collective."""
+    """Smallest gap of all contact nodes on all ranks, length.  Collective."""
     return -max(body.highest(-contact.present.gap) for contact in contacts)
 
 
 def _facing(body: ElasticBody, contact: Contact) -> float:
-    """Largest cosine between facets and a plane that they face.  Collective."""
+    """Largest cosine between the outward facet normals of a contact and the direction to its plane.
+
+    It is positive if any facet faces the plane.  Collective.
+    """
     from dolfinx_contact.contact.facets import facets_of
 
     facets = facets_of(contact.displacements, contact.facets)
@@ -189,7 +208,7 @@ def _facing(body: ElasticBody, contact: Contact) -> float:
 
 
 class NearestGap(Check):
-    """By how much the nearest node misses its surface: on the way there no mistake, and no warning."""
+    """Log message with the smallest gap while no node touches, which may be intended."""
 
     level = logging.WARNING
 
@@ -208,7 +227,11 @@ class NearestGap(Check):
 
 
 class OneFarAway(Check):
-    """Of one surface of several that is nowhere near while others are touched."""
+    """Log message if one surface is far away from all nodes while others are in contact.
+
+    Args:
+        contact: The contact with this surface.
+    """
 
     level = logging.WARNING
 
@@ -228,7 +251,7 @@ class OneFarAway(Check):
 
 
 class SlipTurns(Check):
-    """Of work that a turn of slip within the step leaves unknown."""
+    """Warning if changes of the slip direction within a step make the frictional work uncertain."""
 
     def run(self, step: CheckedStep) -> str | None:
         may = [c for c in step.contacts if c.history.doubtful_work is not None]
@@ -245,7 +268,7 @@ class SlipTurns(Check):
 
 
 def checks_of(body: ElasticBody, contacts: Sequence[Contact]) -> tuple[Check, ...]:
-    """The checks that apply to a body and its contacts.  Collective."""
+    """All checks that apply to a body and its contacts.  Collective."""
     found: list[Check] = [Size()]
     rigid = [contact for contact in contacts if not contact.surface.deformable]
     between = [c for c in rigid if c.surface.varies or c.displacements.degree > 1]

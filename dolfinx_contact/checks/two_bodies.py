@@ -1,6 +1,10 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Checks of two deformable bodies: which side carries the unknowns, how far they slide, what supports take of their friction."""
+"""Checks of contact between two deformable bodies.
+
+They concern the choice of the slave side, slip that is too large for small sliding, and friction
+lost at supports.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +13,22 @@ import logging
 from dolfinx_contact.checks.check import Check, CheckedStep
 from dolfinx_contact.contact.contact import Contact
 
-# Ratio of sizes of facets, or of stiffnesses, up to which two sides are alike.
+# Largest ratio of facet sizes, or of stiffnesses, at which two sides count as similar.
 ALIKE_RATIO = 2.0
 
-# Part of what friction can carry that supports may take.
+# Largest fraction of the friction limit of all nodes that may be lost at supports.
 LOST_FRICTION = 0.005
 
 
-class _OfContact(Check):
-    """Of one contact."""
+class _ContactCheck(Check):
+    """Base class of checks of a single contact."""
 
     def __init__(self, contact: Contact):
         self._contact = contact
 
 
-class Strayed(_OfContact):
-    """Of a node that has slid too far along a deformable surface, in small sliding."""
+class Strayed(_ContactCheck):
+    """Warning if a node has slid too far along a deformable surface for small sliding."""
 
     def run(self, step: CheckedStep) -> str | None:
         contact = self._contact
@@ -37,8 +41,8 @@ class Strayed(_OfContact):
         )
 
 
-class BetterSlave(_OfContact):
-    """As soon as nodes press, that the other side would be the better slave."""
+class BetterSlave(_ContactCheck):
+    """Log message, once nodes are in contact, if the master side would be the better slave."""
 
     level = logging.INFO
 
@@ -57,8 +61,11 @@ class BetterSlave(_OfContact):
         )
 
 
-class HeldAlong(_OfContact):
-    """Of nodes that have no friction because supports hold them along a deformable surface, once any node presses."""
+class HeldAlong(_ContactCheck):
+    """Warning about nodes that lose friction because supports constrain them tangentially.
+
+    The check needs at least one node in contact.
+    """
 
     def run(self, step: CheckedStep) -> str | None:
         body, contact = step.body, self._contact

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The contact of boundary nodes with a rigid surface: reactions and their history."""
+"""Contact of the boundary nodes of a body with a surface: results, laws and history."""
 
 from __future__ import annotations
 
@@ -46,35 +46,42 @@ if TYPE_CHECKING:
 
 
 class Contact(Guarded):
-    """Nodes of boundary facets that may touch a surface, rigid or deformable.
+    """Contact between the nodes of boundary facets and a surface, rigid or deformable.
 
-    Every node belongs to one rank; all arrays run over the ``n`` nodes that this rank owns.  The local frame is (t1, t2, n), in
-    two dimensions (t, n): the plane's axis, the direction across it, and the normal.  On a curved surface every node has its own
-    frame, see docs/surfaces.md.
+    Every node belongs to one rank.  All arrays run over the ``n`` nodes that this rank owns.  The
+    local frame is (t1, t2, n), in two dimensions (t, n): the axis of the surface, the tangential
+    direction across it, and the normal.  On a curved surface every node has its own frame, see
+    docs/surfaces.md.
 
     Args:
-        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or 2; or a mixed space, whose
-            first such sub-space is taken, or that sub-space itself.
-        facets: Local indices of boundary facets, integers; a rank may have none.  Or ``(facet_tags, tag)`` with one tag, an
-            integer, or several.
-        plane: The ``RigidPlane``, ``RigidSphere``, ``RigidCylinder``, ``RigidSurface`` or ``DeformableSurface``.
-        friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.  Coefficients may be given per
-            node, ``shape=(n, 2)`` for this rank's n nodes, or as fields, which the contact evaluates at its nodes.
-        wear: Archard's law, whose worn depth opens the gap; None is no wear.  Between two deformable bodies, the law has a
-            coefficient for each, see ``Wear``.
-        weight: Factor of the surface measure, the same as in the forms: ``2 * pi * r`` with axial symmetry, or a thickness.  A
-            number, a UFL expression, or a callable of ``x``, ``shape=(3, n)``.  It enters areas, and thus pressures, worn depths
-            and pressure-dependent friction.  Reactions follow from the forms, which must contain it.
+        V: Continuous Lagrange space of displacements, one component per dimension, of degree 1 or
+            2.  Alternatively a mixed space with exactly one such sub-space, or that sub-space.
+        facets: Local indices of boundary facets, integers; a rank may have none.  Alternatively
+            ``(facet_tags, tag)`` with one integer tag or several.
+        surface: A ``RigidPlane``, ``RigidSphere``, ``RigidCylinder``, ``RigidSurface`` or
+            ``DeformableSurface``.
+        friction: A ``Friction``, or a number, the isotropic coefficient, the same on all ranks.
+            Coefficients may be given per node, ``shape=(n, 2)`` for the n nodes of this rank, or as
+            fields, which the contact evaluates at its nodes.
+        wear: Archard's law, whose worn depth opens the gap; None for no wear.  Between two
+            deformable bodies, the law has a coefficient for each body, see ``Wear``.
+        weight: Factor of the surface measure, the same as in the forms: ``2 * pi * r`` with axial
+            symmetry, or a thickness.  A number, a UFL expression, or a callable of ``x``,
+            ``shape=(3, n)``.  It enters areas, and thus pressures, worn depths and
+            pressure-dependent friction.  Reactions follow from the forms, which must contain the
+            same factor.
 
     Raises:
-        ValueError: on all ranks, for facets that are not boundary facets of the mesh, an unsuitable space, a plane of another
-            dimension, or a plane without an axis if friction needs one.
+        ValueError: on all ranks, if facets are not boundary facets of the mesh, the space is
+            unsuitable, the surface has another dimension than the mesh, or the surface has no axis
+            although friction depends on the direction.
 
     Attributes:
-        nodes: Indices of the nodes among the blocks of ``displacements.V``, which is ``V`` or that sub-space collapsed,
-            ``shape=(n,)``: those of the facets, without the vertices of second-order tetrahedra, where a uniform pressure causes
+        nodes: Indices of the contact nodes among the blocks of ``displacements.V``, which is ``V``
+            or the collapsed displacement sub-space, ``shape=(n,)``.  They are the nodes of the
+            facets except the vertices of second-order tetrahedra, where a uniform pressure causes
             no force.
-        x: Reference positions, ``shape=(n, 3)``, global frame.
+        x: Reference positions of the contact nodes, ``shape=(n, 3)``, global frame.
 
     Example:
         >>> contact = dc.Contact(V, foot, plane, dc.Friction(mu=0.3))
@@ -149,8 +156,11 @@ class Contact(Guarded):
 
     @property
     def friction(self) -> Friction:
-        """The friction law.  Another one may be assigned between steps, on all ranks.  Fields are evaluated then, at the start of
-        each step, and during a step if they depend on its state.
+        """Friction law at the contact nodes.
+
+        Another law may be assigned between steps, on all ranks.  Fields are evaluated on assignment
+        and at the start of each step.  Fields that depend on the contact's state are also evaluated
+        during a step.
         """
         return self.laws.friction
 
@@ -160,7 +170,7 @@ class Contact(Guarded):
 
     @property
     def wear(self) -> Wear | None:
-        """The law of wear.  Another one may be assigned between steps, on all ranks."""
+        """Wear law; another law may be assigned between steps, on all ranks."""
         return self.laws.wear
 
     @wear.setter
@@ -169,7 +179,11 @@ class Contact(Guarded):
 
     @property
     def repeats(self) -> float:
-        """How many times what a step wears, works and slips counts, 1 at first, none at 0; ``cycle_jump`` sets it.  The same on all ranks."""
+        """Factor for the wear, frictional work and slip path of each step, dimensionless.
+
+        It is 1 at first, is set by ``cycle_jump``, and must be the same on all ranks.  At 0, steps
+        add nothing to these sums.
+        """
         return self._repeats
 
     @repeats.setter
@@ -181,33 +195,48 @@ class Contact(Guarded):
 
     @property
     def frame(self) -> np.ndarray:
-        """Rows (t1, t2, n), in 2-D (t, n), of the last step: ``shape=(gdim, gdim)``; on curved surfaces ``(n, gdim, gdim)``."""
+        """Local frame of the last step, rows (t1, t2, n), in 2-D (t, n), ``shape=(gdim, gdim)``.
+
+        On curved surfaces each node has its own frame, ``shape=(n, gdim, gdim)``.
+        """
         return self.history.frames.frame
 
     @property
     def points(self) -> ContactPoints:
-        """The ``ContactPoints``: the motion as a sparse operator, and the directions that supports hold."""
+        """Contact points of the last step.
+
+        They express motion as a sparse operator and know the prescribed directions.
+        """
         return self.history.frames.points
 
     def points_in(self, frames: np.ndarray) -> ContactPoints:
-        """The contact points with these frames, on rigid surfaces: the nodes.  A subclass may have others, see docs/extending.md.
+        """Return the ``ContactPoints`` on a rigid surface for given local frames.
+
+        Each contact node is one point.  A subclass may return other contact points, see
+        docs/extending.md.
 
         Args:
-            frames: Rows (t1, t2, n) at each node, ``shape=(n, gdim, gdim)``, global components, orthonormal.
+            frames: Rows (t1, t2, n) at each node, ``shape=(n, gdim, gdim)``, global components,
+                orthonormal.
         """
         displacements = self.displacements
         return ContactPoints(displacements.dofs(self.nodes), frames, displacements.owned)
 
     @property
     def changes(self) -> bool:
-        """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
+        """Whether the contact geometry may change within a step.
+
+        The geometry consists of gaps, normals, lever arms and friction axes bound to the surface.
+        The value is the same on all ranks.
+        """
         return self.geometry.changes(self.history, self.laws.textured)
 
     @property
     def slip_before_touching(self) -> np.ndarray:
-        """Tangential motion before touching, of nodes that landed in the last step, ``shape=(n, gdim - 1)``, local frame, length.
+        """Tangential motion of nodes before they touched in the last step, ``shape=(n, gdim - 1)``.
 
-        It does not count as slip if that changes friction.
+        Local frame, length.  It is excluded from the slip where the exclusion changes friction, and
+        zero for all other nodes.
         """
         before = self.history.landed_after
         return np.zeros_like(self.slip_increment) if before is None else before
@@ -225,7 +254,10 @@ class Contact(Guarded):
     # -- history -------------------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Clear the history: undeformed, unworn body, no reactions, the surface in its present position."""
+        """Clear the history: the body is undeformed and unworn, without reactions.
+
+        The surface keeps its present position.
+        """
         frames, moves = self.history.frames, wanders(self)
         if self.geometry.follows(moves, self.history):
             frames = self.geometry.standing(moves, frames)
@@ -235,13 +267,19 @@ class Contact(Guarded):
         self.go_back(History.of(self.geometry.at_rest(frames), frames))
 
     def go_back(self, history: History) -> None:
-        """Let this be the history; of a law of fields the numbers go along."""
+        """Replace the history and the present state by a given history and its last state.
+
+        If friction is given by fields, the nodal coefficients of that history are restored as well.
+        """
         self._history, self._present = history, history.last
         if self.laws.field and history.friction is not None:
             self.laws.take(self, history.friction)
 
     def accept(self, history: History) -> None:
-        """Let this be the history that a step has made, see ``ContactStep.ended``.  Collective."""
+        """Accept the history variables of a completed step.  Collective.
+
+        See ``ContactStep.ended``.
+        """
         self.laws.take(self, history.friction)
         self.go_back(history)
         self.measure.renew(self)
@@ -250,7 +288,7 @@ class Contact(Guarded):
 
     @property
     def present(self) -> State:
-        """The present state.  Another one may be assigned."""
+        """Present state of the contact nodes, which may be replaced by assignment."""
         return self._present
 
     @present.setter
@@ -259,12 +297,12 @@ class Contact(Guarded):
 
     @property
     def history(self) -> History:
-        """What the next step gets from those before."""
+        """History variables from which the next step starts, including the last converged state."""
         return self._history
 
     @property
     def displacement(self) -> np.ndarray:
-        """Displacement of the nodes relative to the surface, ``shape=(n, gdim)``, local frame, length."""
+        """Displacement of nodes relative to the surface, ``shape=(n, gdim)``, local frame, length."""
         return self.present.displacement
 
     @property
@@ -274,63 +312,81 @@ class Contact(Guarded):
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance to the surface, ``shape=(n,)``, length units; negative is penetration, infinite where nothing is opposite."""
+        """Distance of each node from the surface, ``shape=(n,)``, length.
+
+        Negative values are penetration.  It is infinite at nodes that face no part of a deformable
+        surface.
+        """
         bare = self.points.alone if self.history.bare is None else self.history.bare
         return frozen(np.where(bare, np.inf, self.present.gap)) if bare.any() else self.present.gap
 
     @property
     def slip_increment(self) -> np.ndarray:
-        """Slip relative to the surface in the last step, ``shape=(n, gdim - 1)``, local frame, length units."""
+        """Slip in the last step, relative to the surface, ``shape=(n, gdim - 1)``, length.
+
+        The frame is local.
+        """
         return self.present.slip_increment
 
     @property
     def status(self) -> np.ndarray:
-        """A ``Status`` per node, ``shape=(n,)``, integers: 0 open, 1 stick, 2 slip."""
+        """``Status`` of each node, ``shape=(n,)``, integers: 0 open, 1 stick, 2 slip."""
         return self.present.status
 
     @property
     def dissipation(self) -> np.ndarray:
-        """Frictional work since the start, ``shape=(n,)``, force times length; it never decreases."""
+        """Frictional work of each node since the start, ``shape=(n,)``, force times length.
+
+        It never decreases.
+        """
         return self.history.sums["dissipation"]
 
     @property
     def slip_path(self) -> np.ndarray:
-        """Length of the path slipped while in contact since the start, ``shape=(n,)``, length units."""
+        """Length of the slip path while in contact since the start, ``shape=(n,)``, length."""
         return self.history.sums["slip_path"]
 
     @property
     def wear_depth(self) -> np.ndarray:
-        """Depth worn off the contact's own nodes, ``shape=(n,)``, length; never decreases, zero without ``wear``.  Times ``whole_area`` it is volume."""
+        """Depth worn off the contact's own nodes, ``shape=(n,)``, length; zero without ``wear``.
+
+        It never decreases.  Its product with ``whole_area`` is the worn volume of each node.
+        """
         return self.history.sums["wear_depth"]
 
     @property
     def opposite_wear_depth(self) -> np.ndarray:
-        """Depth worn off a deformable surface, at its nodes ``opposite``, ``shape=(k,)``, length.  Times ``opposite_area`` it is volume."""
+        """Depth worn off a deformable surface at its nodes ``opposite``, ``shape=(k,)``, length.
+
+        Its product with ``opposite_area`` is the worn volume of each node.
+        """
         return self.history.sums.get(OPPOSITE_WEAR, np.zeros(self.opposite.size))
 
     @property
     def opening(self) -> np.ndarray:
-        """Depth by which wear of both sides opens the gap at each node, ``shape=(n,)``."""
+        """Gap opened at each node by the wear of both sides, ``shape=(n,)``, length."""
         return self.geometry.opening(self.points, self.history)
 
     @property
     def slip_kept(self) -> np.ndarray:
-        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``, local frame, length.
+        """Slip of sticking nodes since they last slipped, ``shape=(n, gdim - 1)``, length.
 
-        A tolerance leaves some of it in every step.  It does no work and is no path until the node slips.
+        The frame is local.  Within the tolerance of the solver, sticking nodes move a little in
+        every step.  This motion counts for work and slip path only when the node slips.
         """
         return self.history.slip_kept
 
     @property
     def load_function(self) -> np.ndarray:
-        """f = ||M^-1 r_t|| - r_n, ``shape=(n,)``, force units [dSFMH07, Eq. (1)]."""
+        """Load function f = ||M^-1 r_t|| - r_n, ``shape=(n,)``, force units [dSFMH07, Eq. (1)]."""
         return self.laws.kernel.load_function(self.reaction)
 
     @property
     def bipotential_gap(self) -> np.ndarray:
-        """Certificate b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
+        """Error measure b_c + Delta u . r >= 0 of each node, ``shape=(n,)``, force times length.
 
-        Zero exactly where the law holds [dSFMH07, Section 1].  Evaluated at ``max(gap, 0)``; ``gap`` shows penetration.
+        It is zero exactly where the contact law holds [dSFMH07, Section 1].  It is evaluated at
+        ``max(gap, 0)``; penetration appears in ``gap``.
         """
         return self.laws.kernel.bipotential_gap(
             self.reaction, np.maximum(self.present.gap, 0.0), self.slip_increment
@@ -338,34 +394,37 @@ class Contact(Guarded):
 
     @property
     def slip_residual(self) -> np.ndarray:
-        """Defect of the slip increments from the slip rule, ``shape=(n, gdim - 1)``, length.
+        """Residual of the slip rule at each node, ``shape=(n, gdim - 1)``, local frame, length.
 
-        ``Delta u_t + |Delta u_t| d`` on slipping nodes, ``d`` the unit vector along ``P^-2 r_t``, and ``Delta u_t``
-        on sticking ones [dSFMH07, Section 1]; zero on open and frictionless nodes.
+        On slipping nodes it is ``Delta u_t + |Delta u_t| d``, where ``d`` is the unit vector along
+        ``P^-2 r_t``.  On sticking nodes it is ``Delta u_t`` [dSFMH07, Section 1].  On open and
+        frictionless nodes it is zero.
         """
         return self.laws.kernel.slip_defect(self.reaction, self.slip_increment, self.status)
 
     def force(self) -> np.ndarray:
         """Total reaction, ``shape=(gdim,)``, global frame, the same on all ranks.  Collective.
 
-        With axial symmetry, only the axial component is a force; the radial one is a sum over the circumference, whose resultant
-        is zero.
+        With axial symmetry, only the axial component is a force.  The radial component is a sum
+        over the circumference, whose resultant is zero.
         """
         if self.surface.curved:
             return self.comm.allreduce(np.einsum("ni,nij->j", self.reaction, self.frame))
         return self.comm.allreduce(self.reaction.sum(axis=0)) @ self.frame
 
     def moment(self, u: fem.Function | None = None) -> np.ndarray:
-        """Moment of the reactions about the surface's point, ``shape=(3,)``, in 2-D one number, global frame.  Collective.
+        """Moment of the reactions about the point of the surface, global frame.  Collective.
 
-        Lever arms are taken in the deformed state, from the present position of the point.  After a step, the moment about free
-        axes equals ``surface.moment``.
+        Its shape is ``(3,)``; in 2-D it is one number.  Lever arms are taken in the deformed state,
+        from the present position of the point.  After a step, the moment about free axes equals
+        ``surface.moment``.
 
         Args:
-            u: The displacement, with a deformable surface, which has no point: the moment is about the origin.
+            u: Displacement; required for a deformable surface, for which the moment is about the
+                origin.
 
         Raises:
-            ValueError: a deformable surface without ``u``, which contacts know relative to the other body alone.
+            ValueError: if ``u`` is missing for a deformable surface.
         """
         forces = np.einsum("ni,nij->nj", self.reaction, self.points.frames)
         x = None if u is None else u.x.array
@@ -378,25 +437,33 @@ class Contact(Guarded):
 
     @property
     def area(self) -> np.ndarray:
-        """Area of the contact surface that belongs to each node, ``shape=(n,)``, undeformed state, see ``facing_areas``.
+        """Area of each node that faces the surface, ``shape=(n,)``, undeformed state.
 
-        The integral of the node's shape function times ``weight`` over the facets, projected on the surface; facets facing away
-        do not count.  In two dimensions it is a length, unless there is a weight.  The first call is collective.
+        It is the integral of the node's shape function times ``weight`` over the facets, projected
+        on a plane; facets that face away from the surface do not count, see ``facing_areas``.  On a
+        deformable surface only the fraction ``covered`` counts.  In two dimensions it is a length,
+        unless there is a weight.  The first call is collective.
         """
         return frozen(self.whole_area * self.covered)
 
     @property
     def whole_area(self) -> np.ndarray:
-        """The same with what is opposite nothing of a deformable surface, ``shape=(n,)``; worn depth is volume over it."""
+        """Area of each node including parts that face no deformable surface, ``shape=(n,)``.
+
+        Worn depth is worn volume divided by this area.  See ``area``.
+        """
         return self.measure.whole(self)
 
     @property
     def opposite_area(self) -> np.ndarray:
-        """Area of a deformable surface that belongs to its nodes ``opposite``, ``shape=(k,)``.  The first call is collective."""
+        """Area of each node ``opposite`` of a deformable surface, ``shape=(k,)``.
+
+        The first call is collective.
+        """
         return self.measure.opposite(self)
 
     def worn_volume(self) -> tuple[float, float]:
-        """Volume that both sides have lost, the contact's own and the opposite one.  Collective."""
+        """Return the worn volumes of the contact's own and of the opposite side.  Collective."""
         own, other = 0.0, 0.0
         if self.wear is not None:
             own = float(self.wear_depth @ self.whole_area)
@@ -405,32 +472,52 @@ class Contact(Guarded):
 
     @property
     def opposite(self) -> np.ndarray:
-        """Local indices of this rank's nodes on the deformable surface, none on rigid ones, ``shape=(k,)``."""
+        """Local indices of this rank's nodes on the deformable surface, ``shape=(k,)``.
+
+        Empty for rigid surfaces.
+        """
         return self.geometry.opposite
 
     @property
     def covered(self) -> np.ndarray:
-        """Part of each node's area that is opposite a deformable surface, ``shape=(n,)``; one on rigid ones."""
+        """Fraction of each node's area that faces a deformable surface, ``shape=(n,)``.
+
+        It is 1 on rigid surfaces.
+        """
         return self.geometry.covered(self.history.frames)
 
     @property
     def pressure(self) -> np.ndarray:
-        """Normal reaction over nodal area, ``shape=(n,)``, force per area; zero at nodes without area.  The first call is
-        collective."""
+        """Contact pressure at each node, normal reaction over ``area``, ``shape=(n,)``.
+
+        Force per area; zero at nodes without area.  The first call is collective.
+        """
         return fields.per_area(self.reaction[:, -1], self.area)
 
     def function(self, values: ArrayLike, name: str = "f", elsewhere: float = 0.0) -> fem.Function:
-        """A scalar Function for output with these values at the contact nodes, ``shape=(n,)``, and zero elsewhere.  Collective."""
+        """Return a scalar Function for output with given values at the contact nodes.  Collective.
+
+        Args:
+            values: Values at the contact nodes, ``shape=(n,)``.
+            name: Name of the Function.
+            elsewhere: Value at all other nodes.
+        """
         return fields.scalar(self.displacements.V, self.nodes, values, name, elsewhere)
 
     def wear_function(self, name: str = "wear_depth") -> fem.Function:
-        """Depth worn off both sides as a scalar Function for output, each at its own nodes, zero elsewhere.  Collective."""
+        """Return the depths worn off both sides as a scalar Function for output.  Collective.
+
+        Each depth is at the nodes of its own side; at all other nodes the Function is zero.
+        """
         nodes = np.concatenate((self.nodes, self.opposite))
         depths = np.concatenate((self.wear_depth, self.opposite_wear_depth))
         return fields.scalar(self.displacements.V, nodes, depths, name, 0.0)
 
     def reaction_function(self) -> fem.Function:
-        """Nodal reactions in global components as a Function on the space of displacements, zero elsewhere."""
+        """Return the nodal reactions as a Function on the displacement space, global components.
+
+        It is zero at all other nodes.
+        """
         function = fem.Function(self.displacements.V, name="reaction")
         forces = np.zeros(self.points.size)
         self.points.add_forces(self.reaction, forces)

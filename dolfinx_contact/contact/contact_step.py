@@ -1,9 +1,10 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A contact in one load step: what follows at its nodes from a displacement of the body.
+"""A contact in one load step: gaps, slips and reactions for a displacement of the body.
 
-Kinematics is affine in a step: frames, gaps and ways along the surface were taken for one position, see ``geometry.py``.  Surfaces
-that force drives move by further unknowns ``c``, see ``surfaces/driven.py``.
+Kinematics is affine within a step.  Frames, gaps and path lengths along the surface are evaluated
+at one position, see ``geometry.py``.  The unknown motions of surfaces driven by force are ``c``,
+see ``surfaces/driven.py``.
 """
 
 from __future__ import annotations
@@ -44,23 +45,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ContactStep:
-    """Frames, law and history of ``n`` nodes as a step has them.  Arrays are in the local frame; nothing in it changes.
+    """State-independent data of ``n`` contact nodes in one load step: frames, laws, history.
+
+    Instances are immutable.  Arrays are in the local frame.
 
     Attributes:
-        given: The contact: nodes, surface, areas.
-        frames: Frames and gaps.
-        friction: The law at the nodes; coefficients are numbers.
-        law: The kernel's law of this friction.
-        last: State at the end of the last step, in these frames.
-        moved: Motion of the surface, ``shape=(gdim,)`` or ``(n, gdim)``, length.
-        worn: Depths of both sides that have opened gaps before the step, ``shape=(n,)``, length.
-        clear: Gap of nodes that cannot touch, at least.
-        stiffness: ``NodalStiffness`` of the nodes; None where nothing is measured.
-        depth: What the step itself wears, ``shape=(n,)``, length; None is nothing.
-        before: Slip before nodes touch, which does not count, ``shape=(n, gdim - 1)``; None is none.
-        dragged: Slip of held nodes past which force drives the surface, ``shape=(n, gdim - 1)``, a direction; None is nowhere.
-        columns: ``D``, what the unknown motions ``c`` of surfaces move at the nodes, ``shape=(n, gdim, m)``; None where there are none.
-        begun: The law as the step began, if it follows the state; else None.
+        given: The ``Contact``: nodes, surface, areas, laws and history.
+        frames: Frames and gaps in the step.
+        friction: Friction law at the nodes, whose coefficients are numbers.
+        law: Law of the compiled kernel for this friction.
+        last: ``State`` at the end of the last step, in the frames of this step.
+        moved: Displacement of the surface, ``shape=(gdim,)`` or ``(n, gdim)``, length.
+        worn: Gap opened by the wear of both sides before the step, ``shape=(n,)``, length.
+        clear: Smallest gap of nodes that cannot touch, length.
+        stiffness: ``NodalStiffness`` of the nodes; None if it is not needed.
+        depth: Depth worn in this step, ``shape=(n,)``, length; None for zero.
+        before: Tangential motion before nodes touch, which does not count as slip,
+            ``shape=(n, gdim - 1)``, length; None for zero.
+        dragged: Slip directions of nodes held by supports along which a force-driven surface
+            slides, ``shape=(n, gdim - 1)``; zero at all other nodes, None if there are no such
+            nodes.
+        columns: Matrix ``D``: motion of the nodes per unit of the unknown surface motions ``c``,
+            ``shape=(n, gdim, m)``; None without unknown motions.
+        begun: Friction law at the start of the step if it depends on the state; otherwise None.
     """
 
     given: Contact
@@ -79,15 +86,15 @@ class ContactStep:
     begun: Friction | None = None
 
     def but(self, **parts: Any) -> ContactStep:
-        """The same with other parts."""
+        """Return a copy in which the given attributes are replaced."""
         return replace(self, **parts)
 
     def where_it_stands(self) -> ContactStep:
-        """The same with the surface where it stands now."""
+        """Return a copy of the step with the present displacement of the surface."""
         return self.but(moved=self.given.geometry.surface_moved(self.frames))
 
     def with_friction(self, friction: Friction) -> ContactStep:
-        """The same with another law."""
+        """Return a copy of the step with another friction law."""
         if friction is self.friction:
             return self
         return self.but(friction=friction, law=friction.law(self.points.dim))
@@ -126,18 +133,18 @@ class ContactStep:
 
     @property
     def points(self) -> ContactPoints:
-        """Rows of the motion, and what supports hold."""
+        """Contact points of the step: motion operator and prescribed directions."""
         return self.frames.points
 
     @property
     def opening(self) -> np.ndarray:
-        """Depth by which wear has opened the gap at each node, that of the step included, ``shape=(n,)``."""
+        """Gap opened at each node by wear, including wear in this step, ``shape=(n,)``, length."""
         return self.worn if self.depth is None else self.worn + self.depth
 
     # -- motion --------------------------------------------------------------------------------
 
     def at(self, u: np.ndarray, c: np.ndarray | None = None) -> State:
-        """The state of a displacement without reactions: gaps and slips since the last step.
+        """Return the state at a displacement: gaps, slips since the last step, zero reactions.
 
         Args:
             u: Displacement of owned degrees of freedom, length units.
@@ -159,7 +166,7 @@ class ContactStep:
         points.without_held(slip)
         if known is not None:
             slip += known
-        slip[points.alone] = 0.0  # opposite nothing
+        slip[points.alone] = 0.0  # facing no surface
         gap[points.closed] = np.maximum(gap[points.closed], self.clear)
         n = len(gap)
         return State(
@@ -167,26 +174,38 @@ class ContactStep:
         )
 
     def moved_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
-        """What moving the surface by one along, or turning it about an axis, moves at the nodes, ``shape=(n, gdim)``."""
+        """Return the surface's motion at each node for a unit rigid motion, ``shape=(n, gdim)``.
+
+        The frame is local.
+
+        Args:
+            axis: Unit vector of the motion, global frame; for rotations in 2-D one number.
+            turns: Whether the motion is a rotation about ``axis``; otherwise a translation along
+                it.
+        """
         frame, surface = self.frames.frame, self.surface
         if turns:
             return (frame @ cross(axis, self.frames.arms)[:, :, None])[:, :, 0]
         along = frame @ axis
-        if not (surface.curved or surface.spins):  # the axes are those of its frame
+        if not (surface.curved or surface.spins):  # motions are along the frame of a plane
             along = np.rint(along)
         return np.broadcast_to(along, (self.points.count, self.points.dim))
 
     def gap_rounding(self, u: np.ndarray) -> float:
-        """Bound of the rounding in a gap, that of solving for ``u`` included, length units."""
+        """Return an upper bound of the rounding error in a gap, length units.
+
+        It includes the rounding error of the solution ``u``.
+        """
         surface, motion = self.surface, self.points.motion(u)
         lengths = (surface.point, surface.displacement, motion)
         largest = max(np.abs(length).max(initial=0.0) for length in lengths)
         return self.given.geometry.gap_rounding_of(largest)
 
     def motion_rounding(self, u: np.ndarray, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Estimate of the rounding in each gap, ``shape=(n,)``, and slip, ``shape=(n, gdim - 1)``, length units.
+        """Return the estimated rounding errors of gaps and slips, length units.
 
-        That of the coordinates counts in the gap: a body drawn to rest on the plane may stand a last digit below it.
+        The arrays have ``shape=(n,)`` and ``(n, gdim - 1)``.  The error of gaps includes that of
+        the coordinates: a body meant to rest on a plane may lie below it by rounding.
         """
         terms = self.points.magnitudes(u) + np.abs(self.moved)
         x, point = self.given.geometry.x, self.surface.point
@@ -200,7 +219,11 @@ class ContactStep:
     # -- reactions -----------------------------------------------------------------------------
 
     def required(self, forces: np.ndarray) -> np.ndarray:
-        """Reactions that balance forces on the body, owned degrees of freedom, global frame: ``shape=(n, gdim)``."""
+        """Return the reactions that balance given forces on the body, ``shape=(n, gdim)``.
+
+        Args:
+            forces: Forces on owned degrees of freedom, global frame.
+        """
         reaction = self.points.reactions(-forces)
         reaction[self.points.closed] = 0.0
         return reaction
@@ -208,7 +231,14 @@ class ContactStep:
     def respond(
         self, u: np.ndarray, reaction: np.ndarray, map: NodalMap, c: np.ndarray | None = None
     ) -> State:
-        """The state with the reactions that a map makes of those given, at a displacement."""
+        """Return the state at a displacement, with the reactions and statuses from a nodal map.
+
+        Args:
+            u: Displacement of owned degrees of freedom, length units.
+            reaction: Reactions to which the map is applied, ``shape=(n, gdim)``, local frame.
+            map: Map from reactions, gaps and slips to new reactions.
+            c: Motions of surfaces, ``shape=(m,)``, length units.
+        """
         state = self.at(u, c)
         law = self.law_of(self.law, state.known)
         reaction, status = map(law, reaction, state.gap, state.slip_increment)
@@ -217,10 +247,14 @@ class ContactStep:
     def linearised(
         self, u: np.ndarray, reaction: np.ndarray, map: NodalMap, c: np.ndarray | None = None
     ) -> tuple[State, tuple[np.ndarray, np.ndarray]]:
-        """As ``respond``, and the (Clarke) derivatives of the new reactions on the branches taken.
+        """Return the state as in ``respond``, and the (Clarke) derivatives of its reactions.
+
+        Derivatives are those of the branches that the map selects.
 
         Returns:
-            The state; derivatives by the reaction before, dimensionless, and by slip and gap, force per length, ``shape=(n, gdim, gdim)`` each.
+            The state; derivatives with respect to the previous reaction, dimensionless, and with
+                respect
+            to slip and gap, force per length, ``shape=(n, gdim, gdim)`` each.
         """
         state = self.at(u, c)
         law = self.law_of(self.law, state.known)
@@ -228,7 +262,10 @@ class ContactStep:
         return state._replace(reaction=reaction, status=status), tuple(both)
 
     def measuring_map(self) -> NodalMap:
-        """The map by which states are measured, and which starts are chosen with."""
+        """Return the map with which residuals are computed and starting states are chosen.
+
+        It is the return map whose augmentation parameters are the normal stiffnesses.
+        """
         from dolfinx_contact.law.maps import ReturnMap
 
         return ReturnMap(self.stiffness.normal, self.stiffness.normal)
@@ -236,22 +273,25 @@ class ContactStep:
     # -- nodes that supports hold --------------------------------------------------------------
 
     def law_of(self, law: Any, known: np.ndarray | None, nodes: Any = slice(None)) -> Any:
-        """What takes the place of the kernel's law of some nodes where supports move, guide, or have moved them.
+        """Return the contact law of nodes, replaced at nodes whose slip is constrained by supports.
+
+        At these nodes a boundary condition prescribes the slip, leaves one direction free, or has
+        prescribed a slip in an earlier step.
 
         Args:
-            law: Of the kernel, of these nodes.
-            known: Slip that supports prescribe, ``shape=(n, gdim - 1)``; None is none.
-            nodes: Their indices, ``shape=(k,)``; all of them by default.
+            law: Law of the kernel for these nodes.
+            known: Slip prescribed by supports, ``shape=(n, gdim - 1)``; None for zero.
+            nodes: Indices of the nodes, ``shape=(k,)``; by default all nodes.
         """
         if not self.points.supported.size or self.friction.frictionless:
             return law
         every = isinstance(nodes, slice)
         if every and known is None and self.dragged is None:
-            return self._law_of_still_nodes
+            return self._law_without_prescribed_slip
         return self._supported(law, known, nodes, every)
 
     @cached_property
-    def _law_of_still_nodes(self) -> Any:
+    def _law_without_prescribed_slip(self) -> Any:
         return self._supported(self.law, None, slice(None), True)
 
     def _supported(self, law: Any, known: np.ndarray | None, nodes: Any, every: bool) -> Any:
@@ -271,7 +311,11 @@ class ContactStep:
 
     @cached_property
     def free_friction(self) -> Friction:
-        """Friction along the directions that supports leave free: at guided nodes, whose slip is along ``f``, ``f.d(f)``."""
+        """Friction law along the tangential directions that supports leave free.
+
+        At nodes that can slide along one direction ``f`` alone, the coefficient is ``f.d(f)``,
+        where ``d(f)`` is friction per unit normal reaction against slip along ``f``.
+        """
         points, friction = self.points, self.friction
         if not points.along.any() or friction.frictionless:
             return friction
@@ -280,13 +324,20 @@ class ContactStep:
         return guided(friction, points.count, points.supported, points.along)
 
     def known_slip(self, state: State) -> np.ndarray:
-        """Part of a state's slip that supports prescribe, ``shape=(n, gdim - 1)``."""
+        """Return the part of a state's slip that supports prescribe, ``shape=(n, gdim - 1)``."""
         return np.zeros_like(state.slip_increment) if state.known is None else state.known
 
     # -- end -----------------------------------------------------------------------------------
 
     def may_land(self, u: np.ndarray) -> bool:
-        """Whether nodes of this rank are open at the last displacement ``u``, and there is friction if they land.  Collective where points are not ``local``."""
+        """Return whether open nodes of this rank may touch with friction in this step. Collective
+        where points are not ``local``.
+
+        Nodes count that were open at the end of the last step, with a gap above rounding.
+
+        Args:
+            u: Last displacement of owned degrees of freedom, length units.
+        """
         opens = (self.last.reaction[:, -1] == 0.0) & ~self.points.closed
         if self.points.local and not opens.any():
             return False
@@ -294,7 +345,15 @@ class ContactStep:
         return bool(landing.any()) and not self.friction.frictionless
 
     def with_slip_past_edges(self, state: State, u: np.ndarray) -> State:
-        """A state in which nodes that have left what was opposite have slipped past its edge.  Collective between bodies."""
+        """Return a copy of a state with the slip of nodes that left the opposite surface.
+        Collective between bodies.
+
+        The slip of these nodes is measured against the points opposite at the start of the step.
+
+        Args:
+            state: State at the end of the step.
+            u: Displacement of owned degrees of freedom, length units.
+        """
         given = self.given
         found = given.geometry.slip_past_edge(u, self.frames, given.history)
         if found is None:
@@ -303,7 +362,11 @@ class ContactStep:
         return state._replace(slip_increment=np.where(left[:, None], slip, state.slip_increment))
 
     def with_own_gaps(self, state: State, u: np.ndarray) -> State:
-        """A state whose open nodes on a deformable surface have the gaps of a displacement, not of the rows that a step used.  Collective."""
+        """Return a copy of a state with the gaps of open nodes at displacement ``u``.  Collective.
+
+        On a deformable surface with large sliding, the step's mortar coefficients belong to another
+        displacement.  On other surfaces the state is returned unchanged.
+        """
         given = self.given
         if not given.geometry.renews_rows:
             return state
@@ -312,18 +375,18 @@ class ContactStep:
         return state._replace(gap=np.where(state.reaction[:, -1] > 0.0, state.gap, gap))
 
     def ended(self, state: State, u: np.ndarray | None = None) -> History:
-        """What the next step gets from this one, which ends in a state.  Collective on deformable surfaces.
+        """Return the history variables at the end of this step.  Collective on deformable surfaces.
 
         Args:
-            state: The state.
-            u: Its displacement, owned degrees of freedom; needed between bodies.
+            state: State at the end of the step.
+            u: Displacement of owned degrees of freedom at the end; needed between bodies.
         """
         geometry, frames = self.given.geometry, self.frames
         if self.surface.spin is not None:
             turned = geometry.turned_past(state.displacement, frames)
             state = state._replace(displacement=turned)
         state = frozen_state(state)
-        sums, worn, doubtful, unloads = self._summed(state)
+        sums, worn, doubtful, unloads = self._updated_sums(state)
         bare = None
         if geometry.renews_rows and u is not None:
             bare = geometry.gap_at(u, frames)[1].alone
@@ -332,15 +395,21 @@ class ContactStep:
             state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads
         )
 
-    def _summed(self, state: State) -> tuple:
-        """Sums, depths of the other side, doubtful work, and what unloads nodes, of ``History``.  Collective where the other side wears."""
+    def _updated_sums(self, state: State) -> tuple:
+        """Return the sums and the wear and work data of this step for its ``History``. Collective
+        if the opposite side wears.
+
+        Returns:
+            The attributes ``sums``, ``worn``, ``doubtful_work`` and ``unloads`` of ``History``.
+        """
         given, friction = self.given, self.friction
         history, repeats, covered = given.history, given.repeats, given.geometry.covered
         slip = history.slip_kept + state.slip_increment
         sticks = (friction.mu.any(axis=-1) & (state.status == int(Status.STICK)))[:, None]
         slip, kept = np.where(sticks, 0.0, slip), np.where(sticks, slip, 0.0)
         pressed = np.maximum(self.last.reaction[:, -1], state.reaction[:, -1])
-        # Of nodes that come in over an edge or leave in the step each slips half of it in the mean: paths of the first count wholly.
+        # Nodes that cross an edge in the step touch for half of it on average.  As many enter as
+        # leave: the whole slip of those that enter counts, none of those that leave.
         touches = (pressed > 0.0) & (covered(self.frames) > 0.0)
         work, turned = self.work(slip, state.reaction)
         work, turned = repeats * work, repeats * turned
@@ -369,34 +438,38 @@ class ContactStep:
         return self.law.bipotential_gap(state.reaction, gap, state.slip_increment)
 
     def opened(self, state: State) -> np.ndarray:
-        """Nodes that touched at the end of the last step and are open now, ``shape=(n,)``, booleans."""
+        """Nodes in contact at the end of the last step that are open now, ``shape=(n,)``, booleans."""
         return (self.last.reaction[:, -1] > 0.0) & (state.reaction[:, -1] == 0.0)
 
     def still(self, state: State, unknown: float) -> np.ndarray:
-        """Nodes called slipping whose slip, since they last stuck, is less than what is unknown of a state, ``shape=(n,)``, booleans.
+        """Slipping nodes whose slip is within the error of a state, ``shape=(n,)``, booleans.
 
-        On the edge of its cone it is rounding that decides which branch the projection of a node takes that does not move.
+        Slip counts since the node last stuck.  On the boundary of the friction cone, rounding
+        decides the status of a node that does not move.
 
         Args:
             state: The state.
-            unknown: Force; a slip counts by the force that it makes, ``|K_t Delta u_t|``.
+            unknown: Error of the state, force; a slip is compared by the force ``|K_t Delta u_t|``.
         """
         slips = state.status == int(Status.SLIP)
         if not slips.any():
             return slips
         kept = self.given.history.slip_kept
-        slip = kept + state.slip_increment  # else what is slow would never slip
+        slip = kept + state.slip_increment  # so that slow slip over many steps counts
         made = np.linalg.norm(np.einsum("nij,nj->ni", self.stiffness.tangential, slip), axis=1)
         return slips & (made <= unknown) & (self.friction.mu > 0.0).any(axis=-1)
 
     # -- work ----------------------------------------------------------------------------------
 
     def work(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Frictional work of the step along each principal direction, and what of it is owed to a turn, ``shape=(n, gdim - 1)`` each.
+        """Return the frictional work of the step and the part due to a change of slip direction.
+
+        Both have one column per principal friction direction, ``shape=(n, gdim - 1)``, force times
+        length.
 
         Args:
-            slip: Of the step, ``shape=(n, gdim - 1)``.
-            reaction: At its end, ``shape=(n, gdim)``.
+            slip: Slip in the step, ``shape=(n, gdim - 1)``, length.
+            reaction: Reactions at the end of the step, ``shape=(n, gdim)``, force.
         """
         if self.begun is not None:
             start, end, turned = self.works(slip, reaction)
@@ -405,7 +478,12 @@ class ContactStep:
         return work_of_friction(self.friction, *before, reaction, slip, self._friction_before)
 
     def works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Shares of that work that the forces at its start and at its end have, and what is owed to a turn, ``shape=(n, gdim - 1)`` each."""
+        """Return the frictional work due to the forces at the start and at the end of the step.
+
+        The third array is the part due to a change of slip direction.  Each has one column per
+        principal friction direction, ``shape=(n, gdim - 1)``, force times length.  Arguments as for
+        ``work``.
+        """
         none, before, slipped = np.zeros_like(reaction), self.last.reaction, self._slipped
         law = self.friction if self.begun is None else self.begun
         start, turned = work_of_friction(law, before, slipped, none, slip, self._friction_before)
@@ -414,19 +492,25 @@ class ContactStep:
 
     @cached_property
     def _slipped(self) -> np.ndarray:
-        """See ``slipped_last``, of the last step and its law."""
+        """Nodes whose last reaction determines their slip direction, ``shape=(n,)``, booleans.
+
+        See ``slipped_last``.
+        """
         slips = self.last.status == int(Status.SLIP)
         return slipped_last(self._friction_before or self.friction, self.last.reaction, slips)
 
     @cached_property
     def _friction_before(self) -> Friction | None:
-        """The law of the last step, its axes carried in space to the frames of this one; None before the first."""
+        """Friction law of the last step; None before the first step.
+
+        Its axes are carried in space to the frames of this step.
+        """
         law, before = self.given.history.friction, self.given.history.frames
         n, gdim = self.points.count, self.points.dim
         turns = gdim == 3 and before.points is not self.points
         if law is None or not turns or (law.axes is None and law.isotropic):
             return law
-        # grooves turn with the surface
+        # Friction axes turn with the surface.
         along = np.tile([1.0, 0.0], (n, 1)) if law.axes is None else law.axes
         axes = np.column_stack((along, np.zeros(n)))
         axes = carried(axes, before.frame, self.frames.frame)[:, :2]
@@ -439,13 +523,15 @@ def step_of(
     frames: Frames | None = None,
     begins: bool = False,
 ) -> ContactStep:
-    """The contact as a step has it that begins at its last state, where the surface stands.  Collective on deformable surfaces.
+    """Return the next step of a contact, from its last state.  Collective on deformable surfaces.
+
+    The surface is in its present position.
 
     Args:
         contact: The contact.
-        stiffness: Of the nodes.
-        frames: Of the step; None are those of the last one.
-        begins: Whether fields get their present values.  Collective.
+        stiffness: Stiffness of the contact nodes.
+        frames: Frames of the step; None for the frames of the last step.
+        begins: Whether friction given by fields is evaluated.  Collective.
     """
     geometry, laws, history = contact.geometry, contact.laws, contact.history
     frames = history.frames if frames is None else frames
@@ -458,14 +544,20 @@ def step_of(
 
 
 def wanders(contact: Contact) -> bool:
-    """Whether it matters where on the surface nodes are; the same on all ranks."""
+    """Whether the contact geometry depends on the position of nodes on the surface.
+
+    The value is the same on all ranks.
+    """
     return contact.surface.varies or contact.laws.textured
 
 
 def frames_of(
     contact: Contact, start: np.ndarray, at: np.ndarray | None = None, before: Frames | None = None
 ) -> Frames:
-    """Frames and gaps of a step, where the surface is at present, see ``Geometry.following``.  Collective."""
+    """Return frames and gaps of a step for the present position of the surface.  Collective.
+
+    See ``Geometry.following``.
+    """
     history, geometry = contact.history, contact.geometry
     moves = wanders(contact)
     if not geometry.follows(moves, history):
@@ -474,7 +566,14 @@ def frames_of(
 
 
 def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
-    """Let frames that are means of facets' know of supports at these degrees of freedom; the last state goes along.  Collective."""
+    """Exclude directions fixed by boundary conditions from averaged nodal normals.  Collective.
+
+    The last state is expressed in the new frames.  Frames that are not averaged over facets stay.
+
+    Args:
+        contact: The contact.
+        fixed: Owned degrees of freedom that boundary conditions fix.
+    """
     history, geometry = contact.history, contact.geometry
     frames = geometry.met(fixed, history.frames)
     if frames is not history.frames:
@@ -485,15 +584,17 @@ def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
 def nodal_stiffness(
     contact: Contact, K: PETSc.Mat, points: ContactPoints | None = None
 ) -> NodalStiffness:
-    """Normal and tangential blocks of the stiffness at the contact nodes, local frame.  Collective.
+    """Return the normal and tangential blocks of the stiffness at the contact nodes.  Collective.
+
+    The blocks are in the local frame.
 
     Args:
         contact: The contact.
         K: Assembled PETSc stiffness matrix on ``V``.
-        points: Of a step; None are those of the last one.
+        points: Contact points of a step; None for those of the last step.
 
     Raises:
-        ValueError: on all ranks, if a node does not resist being moved along the normal.
+        ValueError: on all ranks, if a node has no positive stiffness along the normal.
     """
     stiffness = (contact.points if points is None else points).stiffness(K)
     with raised_together(contact.comm):
@@ -508,7 +609,10 @@ def nodal_stiffness(
 
 
 def components(contacts: Sequence[ContactStep]) -> int:
-    """Components of a reaction: the normal one alone if no contact has friction.  Collective."""
+    """Return the number of reaction components that are needed.  Collective.
+
+    It is 1, the normal component, if no contact has friction; otherwise the dimension.
+    """
     smooth = all(contact.friction.frictionless for contact in contacts)
     if contacts[0].comm.allreduce(smooth, op=MPI.LAND):
         return 1

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The surface of a second deformable body, in the same mesh, on which a contact presses."""
+"""Surface of a second deformable body in the same mesh, the master side of a contact."""
 
 from __future__ import annotations
 
@@ -20,24 +20,28 @@ SLIDING_KINDS = ("large", "small")
 
 
 class DeformableSurface(Surface):
-    """Facets of a second deformable body, on which the facets of a contact press; the facets need not match.
+    """Surface of a second deformable body, the master side of a contact; meshes need not match.
 
-    Both bodies are parts of one DOLFINx mesh, usually unconnected.  The facets of the ``Contact`` are the slave side: its nodes
-    carry the reactions, and dual mortar shape functions transfer them to this side, see docs/theory/two_bodies.md.  As slave, prefer the
-    softer, finer or curved side.
+    Both bodies are parts of one DOLFINx mesh, usually unconnected.  The facets of the ``Contact``
+    are the slave side: its nodes carry the reactions, and dual mortar shape functions transfer them
+    to the master side, see docs/theory/two_bodies.md.  As slave, prefer the softer, finer or curved
+    side.
 
     Args:
-        V: The space of displacements, the same as that of the contact.
-        facets: Local indices of boundary facets of the other side, or ``(facet_tags, tag)``; as in ``Contact``.
-        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the tangent plane at each node.
-            It belongs to the slave, and is a line of its material at each node.  Needed unless friction is isotropic or bodies
-            two-dimensional.
-        sliding: "large" pairs the facets again in each step, at the positions of both bodies at its end.  "small" pairs them
-            once, in the undeformed state; this saves time if slip stays below a fraction of a facet.
+        V: The function space of the contact.
+        facets: Local indices of boundary facets of the master side, or ``(facet_tags, tag)``, as in
+            ``Contact``.
+        axis: First principal friction direction, ``shape=(gdim,)``, global frame, projected on the
+            tangent plane at each node.  It is a material direction of the slave at each node.
+            Needed in three dimensions unless friction is isotropic.
+        sliding: "large" pairs the facets again in each step, at the positions of both bodies at its
+            end.  "small" pairs them once, in the undeformed state; this saves time if slip stays
+            below a fraction of a facet.
 
     Raises:
-        ValueError: on all ranks, if ``V`` is not a function space, facets are empty or not on the boundary, ``axis`` is not a
-            vector of ``gdim`` numbers, or ``sliding`` has another value.
+        ValueError: On all ranks, if ``V`` is not a function space, facets are empty or not on the
+            boundary, ``axis`` is not a vector of ``gdim`` numbers, or ``sliding`` has another
+            value.
 
     Example:
         >>> below = dc.DeformableSurface(V, foot)  # then: dc.Contact(V, facets_above, below, friction)
@@ -75,7 +79,7 @@ class DeformableSurface(Surface):
 
     @property
     def displacement(self) -> np.ndarray:
-        """Zero: the surface moves with its body."""
+        """Prescribed displacement of the surface, always zero: the surface moves with its body."""
         return self._displacement
 
     @displacement.setter
@@ -84,7 +88,7 @@ class DeformableSurface(Surface):
 
     @property
     def rotation(self) -> np.ndarray:
-        """Zero: the surface turns with its body."""
+        """Prescribed rotation of the surface, always zero: the surface turns with its body."""
         return self._rotation
 
     @rotation.setter
@@ -96,7 +100,7 @@ class DeformableSurface(Surface):
             raise ValueError(f"surface.{name} cannot be {value!r}: {self._remedy}")
 
     def described(self) -> np.ndarray:
-        """Number of facets, and the axis."""
+        """Number of facets on all ranks, and the axis (zeros for None), as one array."""
         count = self.V.mesh.comm.allreduce(self.facets.size)
         return np.concatenate(([count], np.zeros(3) if self.axis is None else self.axis))
 

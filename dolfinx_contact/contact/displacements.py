@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The displacements among the unknowns of a function space: which degrees of freedom belong to which node."""
+"""Displacement degrees of freedom of a function space, plain or mixed, by node."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from dolfinx_contact import compat
 
 
 def displacement_part(V: fem.FunctionSpace):
-    """The sub-space of a mixed space that holds displacements; None of any other space.
+    """Displacement part of a mixed space; ``V`` for a sub-space, None for a plain space.
 
     Args:
         V: Any function space.
 
     Raises:
-        ValueError: a mixed space none of whose sub-spaces is continuous Lagrange with a component per dimension, or more than one.
+        ValueError: A mixed space has no sub-space of continuous Lagrange elements with one
+            component per dimension, or several.
     """
     gdim = V.mesh.geometry.dim
     if compat.is_part(V) and compat.value_size(V) == gdim and V.dofmap.index_map_bs == 1:
@@ -46,19 +47,21 @@ def displacement_part(V: fem.FunctionSpace):
 
 
 class Displacements:
-    """Nodes and components of the displacements of a space ``V``.
+    """Nodes and degrees of freedom of the displacements in a function space ``V``.
 
     Args:
-        V: A space of displacements; or a mixed space, see ``displacement_part``, or a sub-space of one.
+        V: A space of displacements, a mixed space (see ``displacement_part``), or a sub-space of
+            one.
 
     Attributes:
-        V: The space of displacements alone, whose numbering of nodes is meant everywhere.
-        mixed: Whether there are other unknowns.
-        size: Owned degrees of freedom of all unknowns.
-        owned: The same, the global number of the first, and how many all ranks have.
-        count: Owned nodes of the displacements.
-        dim: Their components.
-        degree: Of their shape functions.
+        V: The space of displacements alone.  Node indices always refer to this space.
+        mixed: Whether the given space has unknowns other than displacements.
+        size: Number of owned degrees of freedom of all unknowns.
+        owned: Number of owned degrees of freedom, global index of the first one, and number on all
+            ranks together, for all unknowns.
+        count: Number of owned displacement nodes.
+        dim: Number of displacement components.
+        degree: Polynomial degree of the displacement shape functions.
     """
 
     def __init__(self, V: fem.FunctionSpace):
@@ -75,22 +78,28 @@ class Displacements:
 
     @property
     def x(self) -> np.ndarray:
-        """Positions of the nodes, ghosts included, ``shape=(nodes, 3)``."""
+        """Positions of the displacement nodes, with ghosts, ``shape=(nodes, 3)``, length."""
         return self.V.tabulate_dof_coordinates()
 
     def dofs(self, nodes: np.ndarray) -> np.ndarray:
-        """Degrees of freedom of nodes, ``shape=(n, dim)``, in the numbering of all unknowns."""
+        """Local degrees of freedom of nodes in the given space, ``shape=(n, dim)``."""
         if self.mixed:
             return self._dofs[nodes]
         return self.dim * nodes[:, None] + np.arange(self.dim)
 
     def rows(self, values: np.ndarray) -> np.ndarray:
-        """Of values of owned degrees of freedom those of the displacements, ``shape=(nodes, dim)``."""
+        """Displacements in a vector of owned degrees of freedom, ``shape=(nodes, dim)``."""
         values = values[self._dofs[: self.count].ravel()] if self.mixed else values
         return values.reshape(self.count, self.dim)
 
     def vectors(self, rows: np.ndarray) -> np.ndarray:
-        """Values of owned nodes, ``shape=(nodes, dim, m)``, as ``shape=(owned dofs, m)``; other unknowns are zero."""
+        """Vectors of owned degrees of freedom, ``shape=(owned dofs, m)``, from nodal values.
+
+        Unknowns other than displacements are zero.
+
+        Args:
+            rows: Values at owned nodes, ``shape=(nodes, dim, m)``.
+        """
         flat = rows.reshape(self.count * self.dim, rows.shape[-1])
         if not self.mixed:
             return flat
@@ -99,7 +108,12 @@ class Displacements:
         return vectors
 
     def everywhere(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Values at some owned nodes, ``shape=(n,)``, at all nodes that this rank knows, ghosts included, zero elsewhere.  Collective."""
+        """Values at all nodes of this rank, with ghosts, from values at owned nodes.  Collective.
+
+        Args:
+            nodes: Local indices of owned nodes, ``shape=(n,)``.
+            values: Values at these nodes, ``shape=(n,)``; other nodes have zero.
+        """
         function = fem.Function(self.V)
         rows = function.x.array.reshape(-1, self.dim)
         rows[nodes, 0] = values
@@ -108,5 +122,5 @@ class Displacements:
 
     @cached_property
     def are(self) -> np.ndarray:
-        """Which owned degrees of freedom are displacements, booleans."""
+        """Mask of displacement degrees of freedom, ``shape=(owned dofs,)``."""
         return self.vectors(np.ones((self.count, self.dim, 1)))[:, 0] > 0.0

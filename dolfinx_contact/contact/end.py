@@ -1,8 +1,8 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What the geometry with which a step was solved misses at its end, as forces on nodes; the way of nodes along a rigid surface.
+"""Nodal forces due to errors of the contact geometry in a step; paths of nodes on rigid surfaces.
 
-A length counts as its product with the stiffness of its node, an angle as its product with the reaction.
+An error of length is multiplied by the stiffness of its node, an error of angle by the reaction.
 """
 
 from __future__ import annotations
@@ -21,15 +21,25 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.state import History, State
     from dolfinx_contact.surfaces.surface import Surface
 
-# Radians by which a normal may turn along the way of a step, and in how many places it is looked at.
+# Largest turn of a local frame along the path of a node in a step, radians: the path is then
+# shorter than half of the radius of curvature.
 LARGEST_TURN = 0.5
+
+# Number of intervals in which the path of a step is divided to find this turn.
 PLACES_ON_WAY = 32
 
 
 def pressed(
     contact: ContactStep, state: State, exact: np.ndarray, closed: np.ndarray
 ) -> np.ndarray:
-    """Normal forces that gaps at the end of a step, ``shape=(n,)``, would make beside those used, but at ``closed`` nodes."""
+    """Return the normal forces due to errors of the gaps in a step, ``shape=(n,)``.
+
+    Args:
+        contact: The contact in the step.
+        state: State at the end of the step.
+        exact: Gaps with the geometry at the end of the step, ``shape=(n,)``, length.
+        closed: Nodes that never touch, whose errors are zero, ``shape=(n,)``, booleans.
+    """
     presses = state.reaction[:, -1] > 0.0
     off = np.where(presses, np.abs(exact - state.gap), np.maximum(-exact, 0.0))
     off[closed] = 0.0
@@ -37,10 +47,16 @@ def pressed(
 
 
 def dragged(contact: ContactStep, state: State, missed: np.ndarray) -> np.ndarray:
-    """By how much ways that slips lack, ``shape=(n, gdim - 1)``, would change friction."""
+    """Return the changes of friction due to errors of the slips in a step, ``shape=(n,)``, force.
+
+    Args:
+        contact: The contact in the step.
+        state: State at the end of the step.
+        missed: Errors of the slips, ``shape=(n, gdim - 1)``, local frame, length; changed in place.
+    """
     contact.points.without_held(missed)
     made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, missed), axis=1)
-    # Friction of what slips turns at most as its slip does.
+    # The direction of friction of a slipping node changes at most as much as that of its slip.
     slip = np.linalg.norm(state.slip_increment, axis=1)
     friction = np.linalg.norm(state.reaction[:, :-1], axis=1)
     length = np.linalg.norm(missed, axis=1)
@@ -51,7 +67,10 @@ def dragged(contact: ContactStep, state: State, missed: np.ndarray) -> np.ndarra
 def missed_on_rigid(
     geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Of gaps, normals with textures, and ways, as forces on each node, ``shape=(n,)``."""
+    """Return errors of gaps, of normals with friction axes, and of path lengths on a rigid surface.
+
+    They are forces on each node, ``shape=(n,)`` each.
+    """
     r, frames = state.reaction, contact.frames
     with raised_together(contact.comm):  # the user's functions
         surface, there = geometry.ended_at(u)
@@ -73,14 +92,16 @@ def missed_on_rigid(
 def too_long_on_rigid(
     geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
 ) -> tuple[float, str]:
-    """After which part of a step a node's way cannot be followed, above one if all can, and why in words.
+    """Return the fraction of a step up to which the nodes' paths can be followed, and the reason.
 
-    The nearest point of the surface is followed along the way of node and surface, from where the node touches to where it
-    opens.  Its frame must not turn by more than half a radian, about the normal either: then the way is shorter than half of the least radius, and
-    the side of the surface stays.
+    The fraction exceeds 1 if all paths can be followed.  The nearest point of the surface is
+    followed along the path of node and surface, from where the node touches to where it opens.  The
+    local frame must not turn by more than half a radian, also not about the normal.  Then the path
+    is shorter than half of the smallest radius of curvature, and the node stays on the same side of
+    the surface.
     """
     with raised_together(contact.comm):  # the user's functions
-        turned = _turned_on_the_way(geometry, contact, state, u)
+        turned = _turn_along_path(geometry, contact, state, u)
     some = np.flatnonzero((turned > LARGEST_TURN).any(axis=0))
     if not some.size:
         return 2.0, ""
@@ -93,17 +114,20 @@ def too_long_on_rigid(
     )
 
 
-def _turned_on_the_way(
+def _turn_along_path(
     geometry: RigidGeometry, contact: ContactStep, state: State, u: np.ndarray
 ) -> np.ndarray:
-    """By how much each node's normal has turned along the way since it touched, ``shape=(PLACES + 1, n)``, radians."""
+    """Return the turn of each node's frame along its path since it touched, radians.
+
+    The array has ``shape=(PLACES_ON_WAY + 1, n)``.
+    """
     surface, there = geometry.ended_at(u)
     count, dim = there.shape
     if not count:
         return np.zeros((PLACES_ON_WAY + 1, 0))
-    y = _way(surface, geometry, contact.given.history, surface.relative(there))
+    y = _path(surface, geometry, contact.given.history, surface.relative(there))
     flat = y.reshape(-1, dim)
-    normals, distance = _looked_at(surface, flat)
+    normals, distance = _normals_and_distances(surface, flat)
     normals, touches = normals.reshape(y.shape), distance.reshape(-1, count) < 0.0
     touches[0] |= contact.last.reaction[:, -1] > 0.0
     touches[-1] |= state.reaction[:, -1] > 0.0
@@ -119,23 +143,24 @@ def _turned_on_the_way(
     return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
 
 
-def _looked_at(surface: Surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normals and distances at positions; NaN where there are none."""
+def _normals_and_distances(surface: Surface, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals and distances at positions, NaN where the surface cannot be evaluated."""
     try:
         return np.broadcast_to(surface.frames(y)[..., -1, :], y.shape), surface.distance(y)
     except ValueError:
         if len(y) == 1:
             return np.full(y.shape, np.nan), np.full(1, np.nan)
-        halves = [_looked_at(surface, part) for part in np.array_split(y, 2)]
+        halves = [_normals_and_distances(surface, part) for part in np.array_split(y, 2)]
         return tuple(map(np.concatenate, zip(*halves)))
 
 
-def _way(
+def _path(
     surface: Surface, geometry: RigidGeometry, history: History, end: np.ndarray
 ) -> np.ndarray:
-    """Positions along the way, relative to the surface, in its axes, ``shape=(PLACES + 1, n, gdim)``.
+    """Return positions along the paths of the nodes, relative to the surface, in its axes.
 
-    In space nodes go straight, and the surface moves and turns evenly.
+    The array has ``shape=(PLACES_ON_WAY + 1, n, gdim)``.  In space, nodes move on straight lines,
+    and the surface moves and rotates uniformly.
     """
     turned = geometry.turned_to(surface, history)
     start, end = geometry.started(history) - surface.point, end - surface.point

@@ -1,9 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Contact facets between their nodes: positions there, and where a body would stand that is as smooth as its normals say.
+"""Shape functions of contact facets, and deviation of facets from a smooth body.
 
-Contact is asked for at nodes alone.  Between them a facet is what the shape functions of the displacements make of its
-nodes, and a rigid surface may be nearer or farther than its gaps at the nodes tell.
+Contact conditions hold at the nodes only.  Between nodes, the shape functions of the displacements
+interpolate a facet, so a rigid surface may be nearer or farther than the nodal gaps indicate.
 """
 
 from __future__ import annotations
@@ -19,71 +19,94 @@ from dolfinx_contact.contact.shapes import monomials
 if TYPE_CHECKING:
     from dolfinx_contact.contact.displacements import Displacements
 
-# Points per direction of a facet: those of Gauss's rule, which no wave has at the same phase.
+# Sampling points per direction of a facet.  Gauss points, as no periodic profile has the same phase
+# at all of them.
 GAUSS_POINTS = 5
 
-# Cosine of an angle between normals of a facet and of the body at its vertices above which an edge is a sharp one.
+# An edge is sharp if the normals of a facet and of the body at a vertex differ by more than 20
+# degrees, that is, if the cosine of their angle is below this value.
 SHARP_EDGE = np.cos(np.deg2rad(20.0))
 
 
 class Facets(NamedTuple):
-    """Facets of one shape that this rank owns."""
+    """This rank's ``m`` facets of one shape, with ``k`` nodes and ``v`` vertices each."""
 
-    nodes: np.ndarray  # local nodes of each, (m, k)
-    x: np.ndarray  # where these are, (m, k, gdim)
-    local: np.ndarray  # where these are on the reference facet, (k, dim)
-    vertices: np.ndarray  # which of them are vertices, (v,)
-    dim: int  # of a facet
-    degree: int  # of the shape functions
-    inverse: np.ndarray  # of the matrix of monomials at the nodes, (k, k)
+    nodes: np.ndarray  # local node indices, (m, k)
+    x: np.ndarray  # positions of the nodes, (m, k, gdim)
+    local: np.ndarray  # positions of the nodes on the reference facet, (k, dim)
+    vertices: np.ndarray  # indices of the nodes that are vertices, (v,)
+    dim: int  # topological dimension of a facet
+    degree: int  # polynomial degree of the shape functions
+    inverse: np.ndarray  # inverse of the matrix of monomials at the nodes, (k, k)
     at_nodes: np.ndarray  # linear shape functions of the vertices at the nodes, (k, v)
     bend: np.ndarray  # (n_b - n_a) . (x_b - x_a) of normals and positions of vertices, (m, v, v)
-    curve: (
-        np.ndarray
-    )  # twice the smaller one of both parts of it, where they have one sign: none beside an edge
+    # Twice the smaller of the terms n_b . (x_b - x_a) and -n_a . (x_b - x_a), (m, v, v); zero if
+    # their signs differ, as beside an edge
+    curve: np.ndarray
     sharp: np.ndarray  # whether a vertex is on a sharp edge, (m,)
     size: np.ndarray  # diameters, (m,)
-    outwards: np.ndarray  # unit normals, (m, gdim)
+    outwards: np.ndarray  # outward unit normals, (m, gdim)
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
-        """Shape functions at points of the unit square or interval, ``shape=(..., dim)``: ``(..., k)``."""
+        """Values of the shape functions, ``shape=(..., k)``.
+
+        Args:
+            at: Points of the unit square or interval, ``shape=(..., dim)``; for triangles, the
+                unit square is mapped onto the unit triangle.
+        """
         return monomials(self._local(at), len(self.vertices), self.degree) @ self.inverse
 
     def hats(self, at: np.ndarray) -> np.ndarray:
-        """Linear shape functions of the vertices, ``shape=(..., v)``, at the same points."""
+        """Values of the linear shape functions of the vertices, ``shape=(..., v)``.
+
+        Args:
+            at: Points of the unit square or interval, as in ``shapes``, ``shape=(..., dim)``.
+        """
         corners = _corners(self.dim, len(self.vertices))
         inverse = np.linalg.inv(monomials(corners, len(corners), 1))
         return monomials(self._local(at), len(corners), 1) @ inverse
 
     def sag_at_nodes(self) -> np.ndarray:
-        """The same at the nodes, ``shape=(m, k)``, of what is round; not beside edges, blunt or sharp."""
+        """Distance of a smooth body from the facets at the nodes, ``shape=(m, k)``, length.
+
+        As ``sag``, but for round parts of the body: zero next to edges, blunt or sharp.
+        """
         hats = self.at_nodes
         return 0.25 * ((hats @ self.curve) * hats).sum(axis=-1) * ~self.sharp[:, None]
 
     def some(self, which: np.ndarray) -> Facets:
-        """Those of them that a mask or indices name."""
+        """The facets selected by a mask or indices."""
         rows = ("nodes", "x", "bend", "curve", "sharp", "size", "outwards")
         return self._replace(**{name: getattr(self, name)[which] for name in rows})
 
     def _local(self, at: np.ndarray) -> np.ndarray:
-        """The unit square as a triangle, if facets are triangles."""
+        """Points of the reference facet; a triangle is mapped from the unit square."""
         if self.dim == 1 or len(self.vertices) == 4:
             return at
         return np.stack((at[..., 0], at[..., 1] * (1.0 - at[..., 0])), axis=-1)
 
     def sag(self, hats: np.ndarray) -> np.ndarray:
-        """How far a smooth body with these normals at the vertices stands out of the facets, length, ``shape=(m, q)``.
+        """Distance by which a smooth body with the vertex normals protrudes from facets.
 
-        ``sum_{a<b} w_a w_b (n_b - n_a) . (x_b - x_a) / 2``, on an arc of radius R and chord h at its middle h^2 / 8R.
+        It is ``sum_{a<b} w_a w_b (n_b - n_a) . (x_b - x_a) / 2``; for an arc of radius R and chord
+        h, this is ``h^2 / 8R`` in the middle.
 
         Args:
-            hats: Linear shape functions ``w`` of the vertices, ``shape=(q, v)``, or ``(m, q, v)``.
+            hats: Linear shape functions ``w`` of the vertices, ``shape=(q, v)`` or ``(m, q, v)``.
+
+        Returns:
+            ``shape=(m, q)``, positive outwards.
         """
         return 0.25 * ((hats @ self.bend) * hats).sum(axis=-1)
 
 
 def facets_of(displacements: Displacements, facets: np.ndarray) -> list[Facets]:
-    """Facets, local indices, of which those that this rank owns count, those of each shape together.  Collective."""
+    """Geometry of the facets that this rank owns, grouped by shape.  Collective.
+
+    Args:
+        displacements: Nodes and degrees of freedom of the displacement space.
+        facets: Local facet indices; those of other ranks are ignored.
+    """
     V, topology = displacements.V, displacements.V.mesh.topology
     fdim = topology.dim - 1
     for dims in ((fdim, fdim + 1), (fdim + 1, fdim), (fdim + 1, 0)):
@@ -123,7 +146,7 @@ def _with_normals(V: fem.FunctionSpace, x: np.ndarray, groups: list, fdim: int) 
         normals.append(outwards)
         outwards = (
             outwards / _diameters(at)[:, None]
-        )  # normals on arcs are nearer to that of the shorter chord
+        )  # weight 1 / size: on an arc, the normal is nearer to the shorter chord's
         for corner in corners:
             np.add.at(sums, nodes[:, corner], outwards)
     compat.add_to_owners(total.x)
@@ -162,7 +185,12 @@ def _diameters(corners: np.ndarray) -> np.ndarray:
 
 
 def _outwards(corners: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Normals of facets, away from the middles of their cells, as long as the facets are large."""
+    """Outward normals of facets, ``shape=(m, gdim)``, with a length proportional to the facet area.
+
+    Args:
+        corners: Positions of the vertices, ``shape=(m, v, gdim)``.
+        middle: Midpoints of the adjacent cells, ``shape=(m, gdim)``.
+    """
     first = corners[:, 1] - corners[:, 0]
     if corners.shape[2] == 2:
         normal = np.column_stack((first[:, 1], -first[:, 0]))
@@ -175,7 +203,7 @@ def _outwards(corners: np.ndarray, middle: np.ndarray) -> np.ndarray:
 
 
 def gauss(dim: int) -> np.ndarray:
-    """Points of the unit square or interval, ``shape=(q, dim)``."""
+    """Gauss points of the unit square or interval, ``shape=(q, dim)``."""
     along = 0.5 + 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[0]
     return np.stack(np.meshgrid(*[along] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
 
@@ -187,7 +215,12 @@ def _corners(dim: int, count: int) -> np.ndarray:
 
 
 def _along(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Coordinates on a facet of the reference cell, of which its corners have those of ``_corners``."""
+    """Coordinates of points on the reference facet, ``shape=(k, dim)``.
+
+    Args:
+        points: Points on a facet of the reference cell, ``shape=(k, dim + 1)``.
+        corners: Vertices of this facet, in the order of ``_corners``, ``shape=(v, dim + 1)``.
+    """
     dim = points.shape[1] - 1
     axes = corners[1 : dim + 1] - corners[0]
     return np.linalg.lstsq(axes.T, (points - corners[0]).T, rcond=None)[0].T

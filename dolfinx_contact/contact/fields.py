@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Nodes of a surface that may touch, their areas, and values at them as functions for output."""
+"""Contact nodes, their nodal areas, and nodal values as DOLFINx Functions for output."""
 
 from __future__ import annotations
 
@@ -24,28 +24,30 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.contact.contact import Contact
 
-# Of the largest integral of a shape function over reference facets: below this it is rounding.
+# Integrals of shape functions below this fraction of the largest one count as zero.
 ZERO_INTEGRAL = 1e-10
 
-# By which Cauchy's inequality may miss equality.
+# Relative tolerance for equality in the Cauchy-Schwarz inequality.
 CAUCHY_DEFECT = 1e-10
 
-# Radians by which a plane may turn until areas that it sees, of which the cosine is left, are computed anew.
+# Rotation of a plane, radians, above which projected areas are computed again.  They change with
+# the cosine of the angle.
 TILT_OF_AREAS = 0.01
 
-# Largest force of a uniform pressure at a node that is left out, relative to the largest nodal force, without a warning.
+# Largest nodal force of a uniform pressure at an excluded node, relative to the largest nodal
+# force, that causes no warning.
 LEFT_OUT_FORCE = 0.01
 
 
 class SurfaceMeasure:
-    """What integrals over a contact's facets are taken with, and the areas of its nodes, which are computed when they are asked for.
+    """Surface measure of a contact, and the areas of its nodes, computed on first use.
 
     Args:
-        V: Space of the displacements alone.
-        weight: Factor of the surface measure, see ``Contact``; None is one.
+        V: Function space of the displacements, not mixed.
+        weight: Factor of the surface measure, see ``Contact``; None means one.
 
     Attributes:
-        weight: As ``weight_on`` returns it.
+        weight: The factor in UFL, as ``weight_on`` returns it.
     """
 
     def __init__(self, V: fem.FunctionSpace, weight: Any) -> None:
@@ -55,22 +57,26 @@ class SurfaceMeasure:
 
     @property
     def mesh_has_moved(self) -> bool:
-        """Whether the mesh has been moved or scaled since, on this rank."""
+        """Whether mesh coordinates on this rank have changed since construction."""
         return not np.array_equal(self._V.mesh.geometry.x, self._geometry)
 
     @property
     def density(self) -> np.ndarray | None:
-        """The weight at the nodes of ``V``, None where it is one.  Collective."""
+        """Weight of the surface measure at the nodes of ``V``, or None if it is one.
+        Collective.
+        """
         return None if self.weight is None else at_nodes(self._V, self.weight)
 
     @cached_property
     def axial(self) -> bool:
-        """Whether the weight is in proportion to the first coordinate, in two dimensions: axial symmetry.  Collective."""
+        """Whether the model is axisymmetric: 2-D, with a weight proportional to the radius.
+        Collective.
+        """
         plain = self.weight is None or self._V.mesh.geometry.dim == 3
         return not plain and grows_with_radius(self._V, self.weight)
 
     def whole(self, contact: Contact) -> np.ndarray:
-        """See ``Contact.whole_area``."""
+        """Nodal areas of the entire facets, see ``Contact.whole_area``."""
         if self._whole is None:
             surface, x = contact.surface, contact.x[:, : contact.points.dim]
             turn = none = np.eye(x.shape[1])
@@ -84,7 +90,7 @@ class SurfaceMeasure:
         return self._whole
 
     def opposite(self, contact: Contact) -> np.ndarray:
-        """See ``Contact.opposite_area``."""
+        """Nodal areas of the master side, see ``Contact.opposite_area``."""
         if self._opposite is None:
             found = np.zeros(0)
             if contact.surface.deformable:
@@ -94,7 +100,10 @@ class SurfaceMeasure:
         return self._opposite
 
     def renew(self, contact: Contact) -> None:
-        """Let areas that are known be those that a plane sees that has turned since.  Collective where it has."""
+        """Compute projected areas again if the plane has turned by more than ``TILT_OF_AREAS``.
+
+        Collective in that case.
+        """
         if self._whole is None or contact.surface.curved:
             return
         if np.abs(contact.surface.rotation - self._seen_from).max() > TILT_OF_AREAS:
@@ -103,7 +112,12 @@ class SurfaceMeasure:
 
 
 def weight_on(V: fem.FunctionSpace, weight: Any):
-    """The weight of the surface measure as UFL takes it: a number, an expression, or a callable of ``x``, interpolated.  Collective."""
+    """Weight of the surface measure as a UFL expression, or None for None.  Collective.
+
+    Args:
+        V: Function space of the displacements.
+        weight: A number, a UFL expression, or a callable of ``x``, which is interpolated.
+    """
     if weight is None or isinstance(weight, ufl.core.expr.Expr):
         return weight
     if not callable(weight):
@@ -116,7 +130,13 @@ def weight_on(V: fem.FunctionSpace, weight: Any):
 
 
 def at_nodes(V: fem.FunctionSpace, weight: Any) -> np.ndarray:
-    """What ``weight_on`` returns at the nodes of ``V`` that this rank knows, ``shape=(n,)``.  Collective."""
+    """Weight of the surface measure at this rank's nodes of ``V`` and ghosts, ``shape=(n,)``.
+    Collective.
+
+    Args:
+        V: Function space of the displacements.
+        weight: UFL expression, as ``weight_on`` returns it.
+    """
     scalars, parent = V.sub(0).collapse()
     values = fem.Function(scalars)
     if isinstance(weight, ufl.constantvalue.ConstantValue):  # it has no mesh
@@ -129,7 +149,15 @@ def at_nodes(V: fem.FunctionSpace, weight: Any) -> np.ndarray:
 
 
 def _assembled(density: Any, V: fem.FunctionSpace, facets: np.ndarray, weight: Any) -> np.ndarray:
-    """A density with a test function of ``V``, integrated over facets with a weight.  Collective."""
+    """Vector of a linear form on ``V``, integrated over facets, owned entries and ghosts.
+    Collective.
+
+    Args:
+        density: Integrand, which contains a test function of ``V``.
+        V: Function space.
+        facets: Local facet indices.
+        weight: Weight of the surface measure in UFL; None means one.
+    """
     mesh, fdim = V.mesh, V.mesh.topology.dim - 1
     mine = np.unique(facets[facets < mesh.topology.index_map(fdim).size_local])
     tags = meshtags(mesh, fdim, mine, np.ones(mine.size, dtype=np.int32))
@@ -142,13 +170,15 @@ def _assembled(density: Any, V: fem.FunctionSpace, facets: np.ndarray, weight: A
 def areas(
     V: fem.FunctionSpace, facets: np.ndarray, reference: bool = False, weight: Any = None
 ) -> np.ndarray:
-    """Integral of each shape function over facets, in the first component of an array on ``V``.  Collective.
+    """Integrals of scalar shape functions over facets, in component 0 of an array on ``V``.
+
+    Collective.
 
     Args:
-        V: The space.
-        facets: Local indices.
-        reference: Whether all facets count as large as the reference facet.
-        weight: Of the surface measure, as ``weight_on`` returns it.
+        V: Function space of the displacements.
+        facets: Local facet indices.
+        reference: Whether to integrate over the reference facet in place of each facet.
+        weight: Weight of the surface measure, as ``weight_on`` returns it.
     """
     shape = ufl.TestFunction(V)[0]
     if reference:
@@ -157,16 +187,22 @@ def areas(
 
 
 def facing_areas(contact: Contact, weight: Any, turn: np.ndarray) -> np.ndarray:
-    r"""Area of each node of a contact that faces its surface, ``shape=(n,)``, undeformed state.  Collective.
+    r"""Nodal areas of the part of the contact facets that faces the surface, ``shape=(n,)``.
 
-    On a plane with normal n it is projected, :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that a uniform pressure p makes the
-    reactions ``p A_i``.  On a curved surface, whose normals will be others when the body has moved, facets count by their own area
-    where they face it, :math:`n_f \cdot n < 0`; on a deformable one they are whole.
+    They are integrals over the undeformed facets.  For a plane with normal n they are projected,
+    :math:`A_i = \int N_i \max(0, -n_f \cdot n) ds`, so that a uniform pressure p gives the
+    reactions ``p A_i``.  For a curved surface, whose normals change when the body moves, facets
+    have their full area where :math:`n_f \cdot n < 0`, and zero elsewhere.  For a deformable
+    surface, all facets have their full area.  Collective.
 
     Args:
         contact: The contact.
-        weight: Of the surface measure, as ``weight_on`` returns it.
-        turn: Rotation of the contact nodes as a whole, ``shape=(gdim, gdim)``: the surface is seen from the undeformed body.
+        weight: Weight of the surface measure, as ``weight_on`` returns it.
+        turn: Mean rotation of the contact nodes, ``shape=(gdim, gdim)``, by which the normals of
+            the surface are turned back to the undeformed body.
+
+    Raises:
+        ValueError: On all ranks, if an area is negative or not finite.
     """
     V, surface = contact.displacements.V, contact.surface
     if surface.deformable:
@@ -194,10 +230,13 @@ def facing_areas(contact: Contact, weight: Any, turn: np.ndarray) -> np.ndarray:
 
 
 def turn_of_nodes(x: np.ndarray, there: np.ndarray, comm: MPI.Comm) -> np.ndarray:
-    """The rotation that takes nodes as a whole nearest to where they are, ``shape=(gdim, gdim)``; none where they do not tell.  Collective.
+    """Mean rotation of nodes by a least-squares fit, ``shape=(gdim, gdim)``.  Collective.
+
+    It is the identity if the positions do not determine a rotation.
 
     Args:
-        x, there: Positions of this rank's nodes, undeformed and now, each up to a translation, ``shape=(n, gdim)``.
+        x, there: Undeformed and current positions of this rank's nodes, each up to a translation,
+            ``shape=(n, gdim)``.
         comm: MPI communicator.
     """
     count = max(comm.allreduce(len(x)), 1)
@@ -206,7 +245,10 @@ def turn_of_nodes(x: np.ndarray, there: np.ndarray, comm: MPI.Comm) -> np.ndarra
 
 
 def nearest_rotation(products: np.ndarray) -> np.ndarray:
-    """The rotation ``R`` for which ``tr(R^T products)`` is largest, ``shape=(gdim, gdim)``; none where they do not tell."""
+    """Rotation ``R`` that maximises ``tr(R^T products)``, ``shape=(gdim, gdim)``.
+
+    It is the identity if ``products`` does not determine a rotation.
+    """
     left, sizes, right = np.linalg.svd(products)
     if not sizes[len(sizes) - 2] > ZERO_INTEGRAL * sizes[0]:
         return np.eye(len(sizes))
@@ -215,13 +257,15 @@ def nearest_rotation(products: np.ndarray) -> np.ndarray:
 
 
 def per_area(forces: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """Nodal forces, ``shape=(n, ...)``, over areas; zero where a node has none."""
+    """Nodal forces divided by nodal areas, ``shape=(n, ...)``; zero where the area is zero."""
     area = area.reshape(-1, *[1] * (forces.ndim - 1))
     return np.divide(forces, area, out=np.zeros_like(forces), where=area > 0.0)
 
 
 def grows_with_radius(V: fem.FunctionSpace, weight: Any) -> bool:
-    """Whether a weight is in proportion to the first coordinate all over the mesh, as in axial symmetry.  Collective."""
+    """Whether a weight is proportional to the first coordinate, as in axial symmetry.
+    Collective.
+    """
     r = ufl.SpatialCoordinate(V.mesh)[0]
     terms = (weight * weight, weight * r, r * r)
     here = [fem.assemble_scalar(fem.form(term * ufl.dx(V.mesh))) for term in terms]
@@ -232,16 +276,29 @@ def grows_with_radius(V: fem.FunctionSpace, weight: Any) -> bool:
 def contact_nodes(
     V: fem.FunctionSpace, facets: np.ndarray, weight: Any = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Owned nodes of facets that carry a part of a uniform pressure, and the others.  Collective.
+    """Owned nodes of facets that carry load under a uniform pressure, and all others.  Collective.
 
-    A uniform pressure p makes the force ``p A_i`` at a node, ``A_i`` the integral of its shape function. With first order,
-    and with second order on quadrilaterals and on edges, all are positive. Those of the vertices of triangles of second
-    order are zero, and the middles of their edges are the points of a rule that integrates quadratic functions exactly: the
-    vertices are left out. It is the element that decides, on the reference facet, so that a curved one cannot change it; and a weight
-    of the surface measure: on the axis of symmetry a node of second order carries nothing, either.
+    A uniform pressure p gives the nodal force ``p A_i``, where ``A_i`` is the integral of the shape
+    function.  For degree 1, and for degree 2 on quadrilaterals and intervals, all ``A_i`` are
+    positive.  At the vertices of second-order triangles ``A_i`` is zero, so they are no contact
+    nodes; the mid-edge nodes are the points of a quadrature rule that is exact for quadratic
+    functions.
+
+    Without a weight, the integrals are over the reference facet, so curved facets do not change the
+    selection.  A weight of the surface measure may exclude further nodes: on an axis of symmetry,
+    second-order nodes carry no load.
+
+    Args:
+        V: Function space of the displacements.
+        facets: Local facet indices.
+        weight: Weight of the surface measure in UFL; None means one.
+
+    Returns:
+        Local indices of the loaded nodes, and of the other nodes.
 
     Raises:
-        ValueError: on all ranks, if an integral is negative: such a node would have to pull.
+        ValueError: On all ranks, if an integral is negative, as the node would have to carry
+            tension.
     """
     nodes = fem.locate_dofs_topological(V, V.mesh.topology.dim - 1, facets)
     nodes = np.unique(nodes[nodes < V.dofmap.index_map.size_local])
@@ -266,7 +323,14 @@ def contact_nodes(
 def _warn_of_curved_edges(
     V: fem.FunctionSpace, facets: np.ndarray, kept: np.ndarray, left_out: np.ndarray, weight: Any
 ) -> None:
-    """Tell that a uniform pressure acts on nodes that are left out.  Collective."""
+    """Warn if a uniform pressure gives forces at excluded nodes, as on curved edges.  Collective.
+
+    Args:
+        V: Function space of the displacements.
+        facets: Local facet indices.
+        kept, left_out: Local indices of the contact nodes and of the excluded nodes.
+        weight: Weight of the surface measure in UFL; None means one.
+    """
     comm, dim = V.mesh.comm, V.mesh.geometry.dim
     if comm.allreduce(left_out.size) == 0:
         return
@@ -283,7 +347,15 @@ def _warn_of_curved_edges(
 
 
 def scalar(V: fem.FunctionSpace, nodes: np.ndarray, values: ArrayLike, name: str, elsewhere: float):
-    """Values at some nodes of ``V`` as a scalar Function.  Collective."""
+    """Scalar Function with given values at some nodes of ``V``.  Collective.
+
+    Args:
+        V: Function space of the displacements.
+        nodes: Local node indices, ``shape=(n,)``.
+        values: Values at these nodes, ``shape=(n,)``.
+        name: Name of the Function.
+        elsewhere: Value at all other nodes.
+    """
     scalars, parent = V.sub(0).collapse()
     node = np.ravel(parent) // V.dofmap.index_map_bs
     function = fem.Function(scalars, name=name)

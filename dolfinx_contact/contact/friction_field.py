@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Friction given by callables and Functions, evaluated at the nodes of a contact."""
+"""Friction and wear coefficients given by callables and Functions, evaluated at contact nodes."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.geometry import Frames
 
-# Part of a direction that has to lie in the plane.
+# Smallest tangential part of a given direction, relative to its length.
 TANGENTIAL_PART = 1e-8
 
-# Part of a direction that is rounding beside a principal one.
+# Component of a unit vector below which the vector counts as parallel to a principal direction.
 PRINCIPAL_ROUNDING = 1e-12
 
-# Arrays of a contact that coefficients may follow: arguments of callables.
+# Arrays of a contact on which coefficients may depend: names of arguments of callables.
 STATE_NAMES = ("pressure", "slip_path", "dissipation", "wear_depth")
 
 
 def followed(friction: Friction) -> list[str]:
-    """Names of the arrays of a contact that a law's coefficients follow."""
+    """Names of the contact arrays (``STATE_NAMES``) on which ``mu`` or ``p`` depends."""
     asked = {name for key in ("mu", "p") for name in _arguments(friction.given()[key])}
     return [name for name in STATE_NAMES if name in asked]
 
@@ -43,18 +43,18 @@ def on_nodes(
     frames: Frames,
     axes: Any = None,
 ) -> Friction:
-    """The law with coefficients and axes for each owned node of a contact.
+    """Friction with coefficients and axes evaluated at each owned node of a contact.
 
     Args:
         contact: The contact.
-        friction: A law with fields.
-        state: Arrays of the contact that the fields follow, by name.
-        frames: Of the nodes.
-        axes: Those of the nodes, if they are known.
+        friction: Friction with at least one field.
+        state: Arrays of the contact on which the fields depend, by name.
+        frames: Local frames of the nodes.
+        axes: Axes at the nodes, ``shape=(n, 2)``, if they are already available.
 
     Raises:
-        ValueError: values of another shape, Functions of another mesh or of a space that is not continuous, and what
-            ``Friction`` refuses.  On this rank alone.
+        ValueError: Values have a wrong shape or are invalid for ``Friction``; a Function is on
+            another mesh or in a discontinuous space.  Raised on this rank only.
     """
     given, k = friction.given(), friction.exponent
     mu, p = (_coefficients(contact, name, given[name], state) for name in ("mu", "p"))
@@ -63,15 +63,18 @@ def on_nodes(
 
 
 def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray) -> Friction:
-    """The law of nodes some of which can slide along one direction ``f`` alone, for their friction along it.
+    """Friction with coefficients along the free direction ``f`` at nodes that slide along it only.
 
-    Slip is along ``f``, and the slip rule says with which friction: ``|r_f| <= r_n f.P^2 f / |M^-1 P^2 f|``.  Of nodes
-    guided along a principal direction nothing has to be changed.
+    If slip is along ``f``, the slip rule limits the friction to
+    ``|r_f| <= r_n f.P^2 f / |M^-1 P^2 f|``.  Nodes whose ``f`` is a principal direction are
+    unchanged.
 
     Args:
-        friction: The law given, with coefficients or arrays of them.
+        friction: Friction with coefficients, or with arrays of them.
         count: Number of this rank's nodes.
-        nodes, along: Those held in any direction, and ``f`` of each, ``shape=(k, 2)``, local frame, zero where there is none.
+        nodes: Indices of nodes with a constrained tangential direction, ``shape=(k,)``.
+        along: Free direction ``f`` of these nodes, ``shape=(k, 2)``, unit vectors, local frame;
+            zero where none is free.
     """
     turned = friction.at(nodes).along_axes(along)
     oblique = (np.abs(turned) > PRINCIPAL_ROUNDING).all(axis=1)
@@ -86,12 +89,12 @@ def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray)
 
 
 def directed(friction: Friction, gdim: int) -> bool:
-    """Whether the axes may be directions in space, which need no axis of the plane."""
+    """Whether ``axes`` is a field in 3-D, so that the surface needs no axis of its own."""
     return friction.field and gdim == 3 and is_field(friction.given()["axes"])
 
 
 def _arguments(given: Callable) -> list[str]:
-    """Arrays of the contact that a field has as arguments; one whose arguments Python does not know has none."""
+    """Names of contact arrays among a callable's arguments; empty if unknown to Python."""
     if not callable(given) or hasattr(given, "function_space"):
         return []
     try:
@@ -114,10 +117,10 @@ def _coefficients(contact: Contact, name: str, given: Any, state: dict[str, np.n
 
 
 def wear_on_nodes(contact: Contact, wear: Wear | None) -> np.ndarray | None:
-    """Values of a wear law's field for each owned node of a contact, ``shape=(n, 2)``; None of numbers.
+    """Wear coefficients at each owned node, ``shape=(n, 2)``; None without a wear field.
 
     Raises:
-        ValueError: as ``on_nodes``, and for negative values.  On this rank alone.
+        ValueError: As in ``on_nodes``, or a value is negative.  Raised on this rank only.
     """
     if wear is None or not wear.field:
         return None
@@ -128,7 +131,13 @@ def wear_on_nodes(contact: Contact, wear: Wear | None) -> np.ndarray | None:
 
 
 def directions(contact: Contact, friction: Friction) -> np.ndarray:
-    """Directions of a field of axes at the reference positions of the nodes, ``shape=(n, 2)`` or ``(n, 3)``: the same in every state."""
+    """Unit vectors of a field of axes at the reference positions of the nodes.
+
+    They do not depend on the state.
+
+    Returns:
+        ``shape=(n, 3)``, global frame, or ``(n, 2)``, local frame, as the field returns them.
+    """
     values = _values(contact, "axes", friction.given()["axes"], {})
     return (values / np.linalg.norm(values, axis=0)).T.copy()
 
@@ -147,12 +156,21 @@ def axes_at(
     frame: np.ndarray,
     points: Any,
 ) -> np.ndarray:
-    """A field's axes in frames, ``shape=(n, 2)``: of the surface at these positions on it, of the body at the nodes.
+    """Unit vectors of a field of friction axes in local frames, ``shape=(n, 2)``.
 
-    Deformable bodies carry theirs with them.
+    Axes of the body are evaluated at the reference positions of the nodes, axes of the surface at
+    positions on it.  On a deformable surface, they deform with the body that owns them.
+
+    Args:
+        contact: The contact.
+        friction: Friction whose axes are a field.
+        at: Positions on the surface, ``shape=(n, gdim)``.
+        frame: Local frames, ``shape=(gdim, gdim)`` or ``(n, gdim, gdim)``.
+        points: Contact points in the state of the frames.
 
     Raises:
-        ValueError: values of another shape, or along the normal.  On this rank alone.
+        ValueError: Values have a wrong shape, or are normal to the surface.  Raised on this rank
+            only.
     """
     n, gdim = contact.nodes.size, contact.displacements.dim
     given, owner = friction.given()["axes"], friction.of
@@ -185,7 +203,15 @@ def _values(
     state: dict[str, np.ndarray],
     at: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Values at the nodes, ``shape=(n,)`` or ``(components, n)``; of a callable also ``at`` other positions, ``shape=(n, 3)``."""
+    """Values of a field at the contact nodes, ``shape=(n,)`` or ``(components, n)``.
+
+    Args:
+        contact: The contact.
+        name: Name of the coefficient in error messages.
+        given: A callable or a Function.
+        state: Arrays of the contact passed to a callable, by name.
+        at: Positions at which a callable is evaluated, ``shape=(n, gdim)``; by default the nodes.
+    """
     if hasattr(given, "function_space"):
         return _of_function(contact, name, given)
     n = contact.nodes.size
@@ -193,12 +219,12 @@ def _values(
     _check_call(name, given, state)
     values = given(at.T.copy(), **state)
     finite(f"what {name} gives", rough(values) if name == "mu" else values)
-    values = np.asarray(values, dtype=np.float64)  # infinite ones are for the law
+    values = np.asarray(values, dtype=np.float64)  # ``Friction`` handles infinite values
     return np.zeros((2, 0)) if n == 0 else values
 
 
 def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> None:
-    """Raise a ``ValueError`` if a function has arguments that it is not called with."""
+    """Raise a ``ValueError`` if ``given`` does not accept ``x`` and the arrays in ``state``."""
     try:
         signature(given, follow_wrapped=False).bind(None, **state)
     except TypeError as wrong:
@@ -208,7 +234,7 @@ def _check_call(name: str, given: Callable, state: dict[str, np.ndarray]) -> Non
             else " alone"
         )
         raise ValueError(f"{name} is called with x{also}: {wrong} in {given!r}.") from None
-    except ValueError:  # arguments that Python does not know
+    except ValueError:  # the signature cannot be inspected
         pass
 
 

@@ -1,12 +1,13 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Where contact nodes stand relative to their surface: frames, gaps and slips.
+"""Geometry of contact nodes relative to their surface: frames, gaps and slips.
 
-A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose material point at ``x`` has moved by ``s``,
-in components of its frame ``F``.  On planes gaps are linear in this motion.  On other surfaces frame and gap are taken
-for the surface as it stands in the step and a position of the node, and in the step the surface is its tangent plane
-there.  That position is where the last step has left the node, and then, while it matters, where this one takes it, see
-``lagged/end_geometry.py``.
+A node at ``x + u`` has moved by ``F (u - s)`` relative to a surface whose material point at ``x``
+has moved by ``s``, in components of the node's frame ``F``.  On planes, gaps are linear in this
+motion. On other surfaces, frame and gap are evaluated for the pose of the surface in the step and
+for one position of the node; within the step, the surface is replaced by its tangent plane there.
+That position is first the one at the end of the last step.  As long as the error matters, the step
+is repeated with the position at its own end, see ``lagged/end_geometry.py``.
 """
 
 from __future__ import annotations
@@ -29,45 +30,46 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import ContactPoints
     from dolfinx_contact.contact.state import History
 
-# Gap at least of nodes that cannot touch, over the largest coordinate: any that rounding leaves open.
+# Smallest gap of nodes that cannot touch, relative to the largest coordinate of the mesh: small,
+# but well above rounding, so that these nodes stay open.
 CLEAR_GAP = 1e-9
 
 
 class Frames(NamedTuple):
-    """Frames and gaps of the nodes, and what they were taken for."""
+    """Frames and gaps of the ``n`` nodes, and the positions for which they were evaluated."""
 
     home: np.ndarray  # positions relative to the surface, (n, gdim)
-    rotation: np.ndarray  # of the surface
-    own: np.ndarray  # frames in the surface's axes: (gdim, gdim) for all, or (n, gdim, gdim)
-    frame: np.ndarray  # the same in global components
-    flat: np.ndarray  # gap less the displacement along the normal, (n,)
+    rotation: np.ndarray  # of the surface, radians
+    own: np.ndarray  # frames in axes of the surface: (gdim, gdim) for all, or (n, gdim, gdim)
+    frame: np.ndarray  # frames in global components, same shape
+    flat: np.ndarray  # gap minus the displacement along the normal, (n,)
     points: ContactPoints
-    arms: np.ndarray | None  # of nodes about the surface's point, (n, gdim), if rotations are free
-    way: (
-        np.ndarray | None
-    )  # by what the way along the surface is more than its chord, (n, gdim - 1)
+    # Lever arms about the point of the surface, (n, gdim); None unless a rotation is free:
+    arms: np.ndarray | None
+    # Path along the surface since the last step minus its chord, (n, gdim - 1); None for zero:
+    way: np.ndarray | None
     ended: np.ndarray  # rotation of the surface at the end of the step
     # Of a deformable surface:
-    at: np.ndarray | None = None  # its displacement, owned degrees of freedom
-    start: np.ndarray | None = None  # that at the start of the step
-    left: np.ndarray | None = None  # nodes that do not come back in the step, (n,), booleans
-    renewed: int = -1  # how often rows were renewed in the step
-    leaving: bool = False  # whether nodes of any rank leave the other side in the step
+    at: np.ndarray | None = None  # displacement of the frames, owned degrees of freedom
+    start: np.ndarray | None = None  # displacement at the start of the step
+    left: np.ndarray | None = None  # nodes kept open for the rest of the step, (n,), booleans
+    renewed: int = -1  # evaluations of mortar coefficients in the step, minus one
+    leaving: bool = False  # whether a node of any rank leaves the other side in the step
 
 
 class Geometry(ABC):
-    """In what geometries differ: that of rigid surfaces, ``RigidGeometry``, and of a second body, ``MortarGeometry``.
+    """Base class of contact geometries: ``RigidGeometry`` and ``MortarGeometry`` for a second body.
 
-    Methods get frames, and the ``History`` with those of the last step that converged.
+    Methods receive frames, and the ``History`` with the frames of the last converged step.
     """
 
     @abstractmethod
     def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
-        """Frames and gaps where the undeformed body stands.  Collective.
+        """Return frames and gaps for the undeformed body.  Collective.
 
         Args:
-            wanders: Whether it matters where on the surface nodes are.
-            before: Frames of before, whose rows stay where they are the same.
+            wanders: Whether the geometry depends on the position of nodes on the surface.
+            before: Earlier frames, whose contact points are reused if they are unchanged.
         """
 
     @abstractmethod
@@ -79,85 +81,105 @@ class Geometry(ABC):
         history: History,
         before: Frames | None,
     ) -> Frames:
-        """Frames and gaps for a step, where the surface is at present.  Collective.
+        """Return frames and gaps for a step with the surface in its present pose.  Collective.
 
-        Directions held by supports are not known for the new frames.
+        The constraints of boundary conditions are not yet set in the new frames.
 
         Args:
             start: Displacement of owned degrees of freedom at the start of the step.
-            at: The one with which nodes stand there; None is that at the start.
-            wanders: As in ``standing``.
-            history: Of the steps before.
-            before: Frames with which the same step was solved before; None is none.
+            at: Displacement for which frames are evaluated; None for ``start``.
+            wanders: Whether the geometry depends on the position of nodes on the surface.
+            history: History variables from the last step.
+            before: Frames with which this step was solved before; None if it was not.
         """
 
     @abstractmethod
     def saved_at(self, at: np.ndarray | None, before: Frames) -> Frames:
-        """Frames and gaps at what was saved: positions relative to the surface, or a displacement; None is as before.  Collective."""
+        """Return frames and gaps for a state from a checkpoint.  Collective.
+
+        Args:
+            at: Saved positions relative to the surface, or saved displacement; None if neither was
+                saved.
+            before: Frames before the checkpoint is loaded.
+        """
 
     @abstractmethod
     def changes(self, history: History, textured: bool) -> bool:
-        """Whether distances, normals, arms or a texture may change within a step; the same on all ranks."""
+        """Return whether the contact geometry may change within a step; the same on all ranks.
+
+        The geometry consists of gaps, normals, lever arms and friction axes bound to the surface.
+        """
 
     @abstractmethod
     def follows(self, wanders: bool, history: History) -> bool:
-        """Whether gaps or frames at the start of the next step are not those of the last one; the same on all ranks."""
+        """Return whether the next step needs new gaps or frames at its start.
+
+        The value is the same on all ranks.
+        """
 
     @abstractmethod
     def last_in(self, frames: Frames, history: History) -> State:
-        """The last state in the frames of another step.  Collective between bodies."""
+        """Return the last state in the frames of another step.  Collective between bodies."""
 
     @abstractmethod
     def arms(self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None) -> np.ndarray:
-        """Lever arms of the nodes for ``Contact.moment``, ``shape=(n, gdim)``, global frame.
+        """Return lever arms of the nodes for ``Contact.moment``, ``shape=(n, gdim)``, global frame.
 
         Args:
-            displacement: Relative to the surface, local frame.
-            frames: Those of the step.
-            u: The displacement, owned degrees of freedom, if it is known.
+            displacement: Displacement relative to the surface, local frame.
+            frames: Frames of the step.
+            u: Displacement of owned degrees of freedom; None if it is not known.
         """
 
     @abstractmethod
     def check_start(self, contact: Contact, body: ElasticBody) -> str:
-        """What is to be warned of in the undeformed state, in words.  Collective.
+        """Return a warning about the undeformed state, or an empty string.  Collective.
 
         Raises:
-            ValueError: on all ranks, if the surface makes no sense.
+            ValueError: on all ranks, if the undeformed state makes no sense.
         """
 
     # -- the end of a step ---------------------------------------------------------------------
 
     @abstractmethod
     def missed(self, contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray) -> tuple:
-        """Of gaps, normals with axes, and ways at the end of a step beside those used, as forces on each node.  Collective."""
+        """Return errors of the geometry at the end of a step, as nodal forces.  Collective.
+
+        They are the errors of gaps, of normals with friction axes, and of path lengths along the
+        surface.
+        """
 
     @abstractmethod
     def too_long(
         self, contact: ContactStep, state: State, u: np.ndarray, last: np.ndarray | None
     ) -> tuple[float, str]:
-        """After which part of a step its way cannot be followed, above one if it can, and why in words.  Collective between bodies.
+        """Return the fraction of a step up to which its path can be followed, and the reason.
+        Collective between bodies.
+
+        The fraction exceeds 1 if the whole step can be followed.
 
         Args:
             contact: The contact in the step.
-            state: The state at the end.
-            u: Its displacement, owned degrees of freedom.
-            last: That at the start, of nonlinear bodies alone: others do not turn far.
+            state: State at the end of the step.
+            u: Displacement of owned degrees of freedom at the end.
+            last: Displacement at the start for nonlinear bodies; None for linear ones, which do not
+                rotate far.
         """
 
 
 class NodalGeometry(Geometry):
-    """What makes frames, gaps and motions of ``n`` nodes relative to a surface; nothing in it changes.
+    """Base class for frames, gaps and motions of ``n`` nodes relative to a surface; immutable.
 
     Args:
         surface: The surface.
         x: Reference positions of the nodes, ``shape=(n, gdim)``.
-        dofs: Their degrees of freedom, ``shape=(n, gdim)``.
-        extent: Largest coordinate of the mesh, on any rank.
+        dofs: Degrees of freedom of the nodes, ``shape=(n, gdim)``.
+        extent: Largest coordinate of the mesh on all ranks.
         comm: MPI communicator.
 
     Attributes:
-        renews_rows: Whether rows of the motion are others where a step ends.
-        shares_nodes: Whether nodes may belong to other contacts, too.
+        renews_rows: Whether mortar coefficients are evaluated anew for the end of a step.
+        shares_nodes: Whether nodes may belong to other contacts as well.
     """
 
     renews_rows = False
@@ -170,50 +192,97 @@ class NodalGeometry(Geometry):
         self._dofs, self._extent, self._apart = dofs, extent, CLEAR_GAP * extent
 
     def covered(self, frames: Frames) -> np.ndarray:
-        """Part of each node's area that has a surface opposite."""
+        """Return the fraction of each node's area that faces the surface, ``shape=(n,)``."""
         return np.ones(len(self.x))
 
     @property
     def opposite(self) -> np.ndarray:
-        """This rank's nodes on the other side, local indices."""
+        """Local indices of this rank's nodes on the opposite deformable surface."""
         return np.zeros(0, dtype=int)
 
     def met(self, fixed: np.ndarray, frames: Frames) -> Frames:
-        """Frames that know what supports hold; they are the surface's, whatever that is.  Collective."""
+        """Return frames that take boundary conditions into account.  Collective.
+
+        Only normals that are averaged over facets depend on boundary conditions; here, frames are
+        returned unchanged.
+
+        Args:
+            fixed: Owned degrees of freedom that boundary conditions fix.
+            frames: Present frames.
+        """
         return frames
 
     def everywhere(self, worn: np.ndarray) -> np.ndarray:
-        """Depths of all nodes of a deformable surface, from those of this rank's.  Collective."""
+        """Return the worn depths of all nodes of a deformable surface on every rank.  Collective.
+
+        Args:
+            worn: Worn depths of this rank's nodes.
+        """
         return worn
 
     def opening(
         self, points: ContactPoints, history: History, depth: np.ndarray | None = None
     ) -> np.ndarray:
-        """Depth by which wear of both sides, and what a step wears, open gaps at nodes with some rows, ``shape=(n,)``, length."""
+        """Return the gap that wear of both sides opens at each node, ``shape=(n,)``, length.
+
+        Args:
+            points: Contact points, which map the wear of a deformable surface to the nodes.
+            history: History variables with the depths worn before the step.
+            depth: Depth worn in the step, ``shape=(n,)``; None for zero.
+        """
         own, other = history.sums["wear_depth"], self.opened(points, history.worn)
         worn = own if depth is None else own + depth
         return worn if other is None else worn + other
 
     def opened(self, points: ContactPoints, worn: np.ndarray | None) -> np.ndarray | None:
-        """By what wear of a deformable surface has opened gaps, ``shape=(n,)``, length; None is nothing."""
+        """Return the gap opened by the wear of a deformable surface, ``shape=(n,)``, length.
+
+        None is returned for zero.
+
+        Args:
+            points: Contact points, which map the worn depths to the nodes.
+            worn: Worn depths of all nodes of the deformable surface; None if it does not wear.
+        """
         return None
 
     def taken(
         self, volume: np.ndarray, area: np.ndarray, frames: Frames, history: History
     ) -> np.ndarray:
-        """Depths of the nodes of a deformable surface that have lost the volumes, ``shape=(n,)``, worn off opposite contact nodes."""
+        """Return the depths worn off the nodes of a deformable surface, length.
+
+        Args:
+            volume: Volume worn off the surface opposite each contact node, ``shape=(n,)``.
+            area: Areas of this rank's nodes of the deformable surface.
+            frames: Frames of the step.
+            history: History variables from the last step.
+        """
         raise NotImplementedError
 
     def distances(self, x: np.ndarray) -> np.ndarray:
-        """Of points in space from the surface where it stands, ``shape=(n,)``; infinite where they are not known."""
+        """Return distances of points in space from the surface in its present pose, ``shape=(n,)``.
+
+        They are infinite where they cannot be evaluated.
+        """
         return np.full(len(x), np.inf)
 
     def directions(self, given: np.ndarray, owner: str, points: ContactPoints) -> np.ndarray:
-        """Directions, ``shape=(gdim, n)`` or in frames ``(2, n)``, where they are now."""
+        """Return material directions in their present orientation.
+
+        Args:
+            given: Directions in the undeformed state, ``shape=(gdim, n)``, or ``(2, n)`` in local
+                frames.
+            owner: Body to which the directions are bound.
+            points: Contact points of the present state.
+        """
         return given
 
     def ended(self, frames: Frames, rotation: np.ndarray | None = None) -> Frames:
-        """Frames of a step that ends, and its way, where the surface has turned to at present, or to another rotation."""
+        """Return the frames of a completed step, with the rotation of the surface at its end.
+
+        Args:
+            frames: Frames of the step.
+            rotation: Rotation of the surface; None for its present one.
+        """
         surface = self.surface
         if rotation is None:
             turned = surface.rotation
@@ -221,7 +290,15 @@ class NodalGeometry(Geometry):
         return frames._replace(ended=rotation, way=None)
 
     def turned(self, frames: Frames, history: History, worn: np.ndarray) -> State:
-        """The last state in frames that supports have turned, of the same nodes opposite to the same ones; ``worn`` depths, ``shape=(n,)``."""
+        """Return the last state in frames rotated by the constraints of boundary conditions.
+
+        Every node faces the same part of the surface as before.
+
+        Args:
+            frames: New frames.
+            history: History variables with the last state and its frames.
+            worn: Gap opened by wear, ``shape=(n,)``, length.
+        """
         before, last = history.frames, history.last
         moved = times(frames.own, turned_back(before.own, last.displacement))
         reaction = carried(last.reaction, before.frame, frames.frame)
@@ -231,37 +308,51 @@ class NodalGeometry(Geometry):
     def slip_past_edge(
         self, u: np.ndarray, frames: Frames, history: History
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Nodes that have left what was opposite in the step, ``shape=(n,)``, and their slip, ``shape=(n, gdim - 1)``; None where nothing can be left.  Collective."""
+        """Return the nodes that left the opposite surface in the step, and their slip.  Collective.
+
+        Returns:
+            Booleans, ``shape=(n,)``, and slips, ``shape=(n, gdim - 1)``; None if no node can leave.
+        """
         return None
 
     def of_surface(self, frames: Frames) -> np.ndarray:
-        """Motion of the surface at the nodes, global frame: ``shape=(gdim,)`` if it is the same for all."""
+        """Return the motion of the surface at the nodes, global frame, ``shape=(n, gdim)``.
+
+        The shape is ``(gdim,)`` if the motion is the same for all nodes.
+        """
         motion, spin = self.surface.motion(self.x), self.surface.spin
         return motion if spin is None else motion + cross(spin, frames.arms)
 
     def surface_moved(self, frames: Frames) -> np.ndarray:
-        """The same in the local frame."""
+        """Return the motion of the surface at the nodes, local frame, ``shape=(n, gdim)``.
+
+        The shape is ``(gdim,)`` if the motion is the same for all nodes.
+        """
         motion, frame = self.of_surface(frames), frames.frame
         return frame @ motion if motion.ndim == 1 else times(frame, motion)
 
     def at_rest(self, frames: Frames) -> State:
-        """The state of the undeformed body without reactions."""
+        """Return the state of the undeformed body without reactions."""
         n, gdim = self.x.shape
         moved = np.broadcast_to(self.surface_moved(frames), (n, gdim))
         gap, none = frames.flat - moved[:, -1], np.zeros((n, gdim - 1))
         return State(-moved, np.zeros((n, gdim)), gap, none, np.zeros(n, dtype=np.uint8))
 
     def gap_rounding_of(self, largest: float) -> float:
-        """Bound of the rounding in a gap beside lengths of that size; a rank may have the origin alone."""
+        """Return an upper bound of the rounding error in a gap, length.
+
+        Args:
+            largest: Largest length on this rank that enters the gap.
+        """
         return 16 * np.finfo(float).eps * max(self._extent, largest)
 
     @property
     def clear(self) -> float:
-        """Gap of nodes that cannot touch, at least."""
+        """Smallest gap assigned to nodes that cannot touch, length."""
         return self._apart
 
     def save(self, frames: Frames) -> dict[str, np.ndarray]:
-        """What the frames were taken for, as arrays by name."""
+        """Return positions and rotations for which frames were evaluated, as arrays by name."""
         surface, saved = self.surface, {}
         if surface.varies:
             saved["home"] = frames.home
@@ -273,17 +364,21 @@ class NodalGeometry(Geometry):
 
 
 def times(frame: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Components of ``vectors``, ``shape=(n, gdim)``, in one frame or a frame each."""
+    """Return components of ``vectors``, ``shape=(n, gdim)``, in one frame or one frame per node."""
     return (frame @ vectors[:, :, None])[:, :, 0]
 
 
 def turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
-    """Vectors of these components, ``shape=(n, gdim)``, in one frame or a frame each."""
+    """Return vectors from components in one frame or one frame per node, ``shape=(n, gdim)``."""
     return (components[:, None, :] @ frame)[:, 0]
 
 
 def carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Reactions in other frames: friction keeps its length and, as far as it can, its direction in space."""
+    """Return reactions in new frames, ``shape=(n, gdim)``.
+
+    The normal component and the magnitude of the friction force are kept.  The friction force keeps
+    its direction in space, projected on the new tangent plane.
+    """
     found, tangential = reaction.copy(), reaction.copy()
     tangential[:, -1] = 0.0
     along = times(after, turned_back(before, tangential))[:, :-1]

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What users give to a contact, checked: space, facets, plane, friction and wear."""
+"""Checks of the user's input to a contact: space, facets, surface, friction and wear."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from mpi4py import MPI
     from numpy.typing import ArrayLike
 
-# Coefficients of friction between these are hardly meant.
+# Range of friction coefficients that are probably per cent or degrees by mistake, dimensionless:
+# real coefficients are smaller, and larger ones are used for sticking.
 PER_CENT_RANGE = 10.0, 1000.0
 
 
@@ -44,7 +45,11 @@ def check_space(V: Any) -> None:
 
 
 def given_facets(facets: Any, mesh: Mesh) -> np.ndarray:
-    """Facets as an array, also where ``(facet_tags, tag)`` says which.  Collective."""
+    """Return facets as an array, from an array or from ``(facet_tags, tag)``.  Collective.
+
+    Raises:
+        ValueError: on all ranks, if the tags or their values do not fit the mesh.
+    """
     fdim, found, tags = mesh.topology.dim - 1, None, None
     with raised_together(mesh.comm):
         if isinstance(facets, (tuple, list)) and len(facets) == 2 and hasattr(facets[0], "indices"):
@@ -100,7 +105,15 @@ def checked_facets(facets: ArrayLike, index_map: Any, boundary: np.ndarray) -> n
 def check_law(
     surface: object, friction: Friction | float, gdim: int, directed: bool = False
 ) -> None:
-    """``directed``: directions of friction are given in space."""
+    """Raise a ``ValueError`` if surface, friction and dimension do not fit together.
+
+    Args:
+        surface: The surface.
+        friction: The friction law.
+        gdim: Dimension of the mesh.
+        directed: Whether the friction axes are given as directions in space, so that the surface
+            needs no axis.
+    """
     if not isinstance(surface, Surface):
         raise ValueError(
             f"plane must be a RigidPlane or another rigid surface, got {type(surface).__name__}: {surface!r}."
@@ -112,7 +125,7 @@ def check_law(
     if surface.point.size != gdim:
         raise ValueError(f"{surface} has {surface.point.size} dimensions, the mesh {gdim}.")
     if friction.field:
-        return  # until its values are known
+        return  # the values of the field are checked later
     friction.law(gdim)  # refuses what has no meaning in two dimensions
     if gdim == 3 and surface.axis is None and not friction.isotropic and not directed:
         raise ValueError(
@@ -122,7 +135,7 @@ def check_law(
 
 
 def check_some(nodes: np.ndarray, comm: MPI.Comm) -> None:
-    """Raise a ``ValueError`` on all ranks if none has nodes.  Collective."""
+    """Raise a ``ValueError`` on all ranks if no rank has contact nodes.  Collective."""
     total = comm.allreduce(nodes.size)
     with raised_together(comm):
         if total == 0:
@@ -133,7 +146,10 @@ def check_some(nodes: np.ndarray, comm: MPI.Comm) -> None:
 
 
 def check_opposite(V: Any, surface: Surface) -> None:
-    """A deformable surface lies in the mesh of ``V``: numbers of facets mean nothing in another one."""
+    """Raise a ``ValueError`` if a deformable surface belongs to another mesh than ``V``.
+
+    Facet indices are valid only in one mesh.
+    """
     if surface.deformable and not compat.same_mesh(V, surface.V):
         raise ValueError(
             "V of the DeformableSurface is a space of another mesh than V of the Contact: both bodies have to be parts of one mesh, which "
@@ -142,7 +158,10 @@ def check_opposite(V: Any, surface: Surface) -> None:
 
 
 def warn_of_percent(friction: Friction | float) -> None:
-    """Warn of coefficients that look like per cent or degrees; much larger ones are meant to stick."""
+    """Warn of friction coefficients that look like per cent or degrees.
+
+    Larger coefficients are assumed to mean sticking.
+    """
     largest = friction.mu.max(initial=0.0)
     if PER_CENT_RANGE[0] < largest < PER_CENT_RANGE[1]:
         warnings.warn(

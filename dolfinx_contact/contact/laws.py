@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The laws of a contact: friction and wear, exchanged between steps, compared between ranks and with checkpoints."""
+"""Friction and wear laws of a contact: assignment, evaluation at the nodes, checkpoints."""
 
 from __future__ import annotations
 
@@ -22,21 +22,23 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
 
-def _fields() -> Any:
-    """What evaluates fields, imported where a law has any."""
+def _friction_field() -> Any:
+    """Return the module that evaluates fields, imported only when a law has any."""
     from dolfinx_contact.contact import friction_field
 
     return friction_field
 
 
 class Laws:
-    """Friction and wear of a contact, which methods are given: it has space, surface, frames and nodes.
+    """Friction and wear laws of a contact, evaluated at its nodes.
+
+    Methods receive the contact, which provides space, surface, frames and nodes.
 
     Attributes:
-        friction: The law at the nodes; fields are evaluated.
-        kernel: The kernel's law of this friction.
-        wear: The law of wear, or None.
-        wear_field: Its coefficients at the nodes, if they are a field.
+        friction: Friction law at the nodes, with fields evaluated.
+        kernel: Law of the compiled kernel for this friction.
+        wear: Wear law, or None.
+        wear_field: Wear coefficients at the nodes if they are given by a field, otherwise None.
     """
 
     friction: Friction
@@ -48,31 +50,38 @@ class Laws:
         self._field: Friction | None = None  # the law given, if anything in it is a field
 
     def assign(self, contact: Contact, friction: Friction | float, empty: bool = False) -> None:
-        """Take another law; fields as before anything has touched if ``empty``.  Collective where there are fields."""
+        """Assign another friction law.  Collective where there are fields.
+
+        Args:
+            contact: The contact.
+            friction: The law, or an isotropic coefficient.
+            empty: Whether fields are evaluated for the contact without history, in which pressure,
+                slip path, frictional work and worn depth are zero; otherwise for its present state.
+        """
         friction, field = as_friction(friction), None
         if getattr(friction, "field", False):
             field = friction
-            friction = self._evaluated(contact, field, empty)
+            friction = self._evaluated_friction(contact, field, empty)
         else:
             check_law(contact.surface, friction, contact.V.mesh.geometry.dim)
             friction = at_most_rough(friction)
-        if field is None or not _fields().followed(
+        if field is None or not _friction_field().followed(
             field
-        ):  # what follows the pressure may be large without any
+        ):  # coefficients may be large at zero pressure
             warn_of_percent(friction)
         self._field = field
         self.take(contact, friction)
 
     def assign_wear(self, contact: Contact, wear: Wear | None) -> None:
-        """Take another law of wear, or none.  Collective."""
+        """Assign another wear law, or None for no wear.  Collective."""
         check_wear(wear, contact.surface)
         field = None
         with raised_together(contact.comm):
             if wear is not None:
-                field = _fields().wear_on_nodes(contact, wear)
+                field = _friction_field().wear_on_nodes(contact, wear)
         self.wear, self.wear_field = wear, field
 
-    def _evaluated(
+    def _evaluated_friction(
         self,
         contact: Contact,
         field: Friction,
@@ -81,65 +90,78 @@ class Laws:
         pressure: np.ndarray | None = None,
         frames: Frames | None = None,
     ) -> Friction:
-        """A law of fields at the nodes in some frames: of the present state, or as before anything has touched if ``empty``.  Collective."""
+        """Return a friction law of fields evaluated at the contact nodes.  Collective.
+
+        Args:
+            contact: The contact.
+            field: Friction law with fields.
+            empty: Whether pressure, slip path, frictional work and worn depth are taken as zero;
+                otherwise they are those of the present state.
+            axes: Friction axes at the nodes; None to evaluate them.
+            pressure: Contact pressures, ``shape=(n,)``; None for the present ones.
+            frames: Frames of the nodes; None for those of the last step.
+        """
         frames = contact.history.frames if frames is None else frames
         none, gdim = np.zeros(contact.nodes.size), contact.V.mesh.geometry.dim
-        names = _fields().followed(field)
+        names = _friction_field().followed(field)
         state = {name: none if empty else getattr(contact, name) for name in names}
         if pressure is not None:
             state["pressure"] = pressure
         with raised_together(contact.comm):
-            friction = _fields().on_nodes(contact, field, state, frames, axes)
-            check_law(contact.surface, friction, gdim, _fields().directed(field, gdim))
+            friction = _friction_field().on_nodes(contact, field, state, frames, axes)
+            check_law(contact.surface, friction, gdim, _friction_field().directed(field, gdim))
         return at_most_rough(friction)
 
     @property
     def field(self) -> bool:
-        """Whether anything in the law is a field."""
+        """Whether any part of the friction law is a field."""
         return self._field is not None
 
     def take(self, contact: Contact, friction: Friction) -> None:
-        """These are the numbers at the nodes."""
+        """Set the friction law at the nodes, whose coefficients are numbers."""
         self.friction, self.kernel = friction, friction.law(contact.V.mesh.geometry.dim)
 
     @property
     def textured(self) -> bool:
-        """Whether axes of friction depend on where nodes are on the surface."""
+        """Whether friction axes depend on the position of nodes on the surface."""
         return self._field is not None and self._field.of == "surface"
 
     @property
-    def _axes_vary(self) -> bool:
-        """Whether axes are a field."""
+    def _axes_are_field(self) -> bool:
+        """Whether the friction axes are a field."""
         return self._field is not None and is_field(self._field.given()["axes"])
 
     @property
     def wears_within(self) -> bool:
-        """Whether what a step wears opens gaps in the same step; the same on all ranks."""
+        """Whether wear in a step opens gaps in the same step; the same on all ranks."""
         return self.wear is not None and not self.wear.explicit
 
     @property
     def body_has_axes(self) -> bool:
-        """Whether a field of axes belongs to the body."""
-        return self._axes_vary and self._field.of == "body"
+        """Whether friction axes are a field that is bound to the body."""
+        return self._axes_are_field and self._field.of == "body"
 
     def turned(
         self, used: ContactStep, at: np.ndarray, frame: np.ndarray, points: Any = None
     ) -> np.ndarray | float:
-        """Radians by which axes at other positions differ from those in use, ``shape=(n,)``: of a texture of the surface, or of bodies.
+        """Return angles between present friction axes and those elsewhere, ``shape=(n,)``, radians.
+
+        They are zero unless axes are bound to a rigid surface or the geometry is that of large
+        sliding between two bodies.
 
         Args:
             used: The contact in a step.
             at: Positions relative to the surface, ``shape=(n, gdim)``.
-            frame: Frames there, in its axes.
-            points: Rows there, of a deformable surface.
+            frame: Frames at these positions, in the axes of the surface.
+            points: Contact points at these positions, on a deformable surface.
         """
         contact, friction = used.given, used.friction
         axes, both = friction.axes, contact.geometry.renews_rows
         if not (self.textured or both) or friction.isotropic or used.points.dim == 2:
             return 0.0
         new = axes
-        if self._axes_vary:
-            new = _fields().axes_at(contact, self._field, at, frame, points)
+        if self._axes_are_field:
+            new = _friction_field().axes_at(contact, self._field, at, frame, points)
         if both:  # their frames turn as well
             old = used.frames.frame
             new = np.broadcast_to((1.0, 0.0) if new is None else new, (len(at), 2))
@@ -150,29 +172,43 @@ class Laws:
 
     @property
     def follow_pressure(self) -> bool:
-        """Whether friction follows the pressure at the end of the step."""
-        return self._field is not None and "pressure" in _fields().followed(self._field)
+        """Whether friction depends on the contact pressure at the end of the step."""
+        return self._field is not None and "pressure" in _friction_field().followed(self._field)
 
     def at_start(self, contact: Contact, frames: Frames) -> tuple[Friction, Friction | None]:
-        """The law with which a step begins in some frames, and that itself where it follows the state; else None.  Collective."""
+        """Return the friction law at the start of a step, in given frames.  Collective.
+
+        Returns:
+            The law; and the same law if it depends on the state, otherwise None.
+        """
         if self._field is None:
             return self.friction, None
-        friction = self._evaluated(contact, self._field, frames=frames)
-        friction = self.friction if _same(friction, self.friction) else friction
-        return friction, friction if _fields().followed(self._field) else None
+        friction = self._evaluated_friction(contact, self._field, frames=frames)
+        friction = self.friction if _same_friction(friction, self.friction) else friction
+        return friction, friction if _friction_field().followed(self._field) else None
 
     def under(
         self, contact: Contact, pressure: np.ndarray, before: Friction, frames: Frames
     ) -> Friction:
-        """The law of other pressures, ``shape=(n,)``, with the axes of the one before, or that itself if nothing changes.  Collective."""
+        """Return the friction law for other contact pressures, with unchanged axes.  Collective.
+
+        Args:
+            contact: The contact.
+            pressure: Contact pressures, ``shape=(n,)``, force per area.
+            before: The present law, which is returned if its coefficients do not change.
+            frames: Frames of the nodes.
+        """
         if not self.follow_pressure:
             return before
         given = dict(axes=before.axes, pressure=pressure, frames=frames)
-        friction = self._evaluated(contact, self._field, **given)
-        return before if _same(friction, before) else friction
+        friction = self._evaluated_friction(contact, self._field, **given)
+        return before if _same_friction(friction, before) else friction
 
     def described(self, surface: Surface) -> dict[str, str]:
-        """Surface and laws, but coefficients per node, in words, which have to be the same on all ranks."""
+        """Return descriptions of the surface and the laws, which must be equal on all ranks.
+
+        Coefficients per node are omitted.
+        """
         driven = surface.driver.driven() if surface.free else "by displacement"
         law = "friction per node" if self.friction.mu.ndim == 2 else repr(self.friction)
         moved, turned = (repr(v.tolist()) for v in (surface.displacement, surface.rotation))
@@ -186,22 +222,26 @@ class Laws:
         }
 
     def check(self, contact: Contact) -> None:
-        """Raise a ``ValueError`` on all ranks if a law does not fit the nodes of one, or surface or laws differ.  Collective."""
+        """Raise a ``ValueError`` on all ranks if a law does not fit the contact nodes.  Collective.
+
+        The same error is raised if the surface or the laws differ between ranks.
+        """
         if contact.comm.size > 1:
             agree(contact.comm, **self.described(contact.surface), repeats=contact.repeats)
         with raised_together(contact.comm):
             check_coefficients(self.friction, contact.nodes.size)
 
     def save(self, contact: Contact) -> dict[str, np.ndarray]:
-        """Coefficients, of a law that follows the state those without one, and axes of all nodes; surface and wear.
+        """Return the laws and the parameters of the surface as arrays by name, for a checkpoint.
 
-        Of a field of axes the directions that were given: those in the frames change with the state.
+        Coefficients that depend on the state are those without history.  For a field of axes, its
+        given directions are returned, because axes in the local frames change with the state.
         """
         law, texture = self.friction, {}
         if self._field is not None:
-            law = self._evaluated(contact, self._field, empty=True, axes=law.axes)
-            if self._axes_vary:
-                texture = {"texture": _fields().directions(contact, self._field)}
+            law = self._evaluated_friction(contact, self._field, empty=True, axes=law.axes)
+            if self._axes_are_field:
+                texture = {"texture": _friction_field().directions(contact, self._field)}
                 law = Friction(law.mu, np.where(law.mu > 0, law.p, 1.0))
         wear = np.nan if self.wear is None else np.inf if self.wear.field else self.wear.coefficient
         parts = [contact.surface.described(), np.broadcast_to(wear, 2)]
@@ -213,19 +253,22 @@ class Laws:
         } | texture
 
     def check_saved(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> None:
-        """Raise a ``ValueError`` if another law or surface was saved."""
+        """Raise a ``ValueError`` if a checkpoint was written with another law or surface."""
         named = {"laws": "friction", "texture": "friction", "rigid_plane": "plane or wear"}
         for name, array in self.save(contact).items():
-            if name in saved and not _alike(saved[name], array):
+            if name in saved and not _equal_arrays(saved[name], array):
                 raise ValueError(
                     f"checkpoint: it was written with another {named[name]}: here {self.friction}, {contact.surface}, "
                     f"wear {self.wear}. Set what the run had, then load."
                 )
 
     def load(self, contact: Contact, saved: Mapping[str, np.ndarray]) -> Friction | None:
-        """Let fields have the values of the state that was saved; returns the law by which its last step was settled, None before the first."""
+        """Evaluate fields for a checkpoint's state and return the friction law of its last step.
+
+        Returns None if no step had been completed.
+        """
         if self._field is not None:
-            self.take(contact, self._evaluated(contact, self._field))
+            self.take(contact, self._evaluated_friction(contact, self._field))
         if "law_of_last_step" not in saved:
             return None
         then = saved["law_of_last_step"]
@@ -237,17 +280,17 @@ class Laws:
 
 
 def rows(law: Friction, n: int) -> np.ndarray:
-    """Coefficients of cone and slip rule, and axes, of each of ``n`` nodes, ``shape=(n, 6)``."""
+    """Return the coefficients of cone and slip rule and the axes at ``n`` nodes, ``shape=(n, 6)``."""
     parts = (law.mu, law.p, (1.0, 0.0) if law.axes is None else law.axes)
     return np.concatenate([np.broadcast_to(part, (n, 2)) for part in parts], axis=1)
 
 
-def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+def _equal_arrays(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, 1e-12, 0.0, equal_nan=True)
 
 
-def _same(one: Friction, other: Friction) -> bool:
-    """Whether two laws of nodes have the same coefficients and axes."""
+def _same_friction(one: Friction, other: Friction) -> bool:
+    """Return whether two nodal friction laws have the same coefficients and axes."""
     return all(
         np.array_equal(getattr(one, name), getattr(other, name)) for name in ("mu", "p", "axes")
     )

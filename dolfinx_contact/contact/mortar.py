@@ -1,18 +1,20 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""Two meshes that meet and do not match: which nodes of the one side a node of the other presses on, and how much.
+r"""Dual mortar coefficients between the nodes of two non-matching contact surfaces.
 
-Facets of both sides are projected on the plane of a facet of the first, the slave, and clipped there; on the common part
-stand points of a Gauss rule [Puso, Laursen, CMAME 193, 2004].  From the points of a slave facet ``e`` alone follow
+Each master facet is projected onto the plane of a slave facet and clipped there; a Gauss rule
+integrates over the common part [Puso, Laursen, CMAME 193, 2004].  The integration points of a slave
+facet ``e`` give its dual shape functions
 
 .. math:: M_e = \sum_q w_q N N^T, \quad D_e = diag(\sum_q w_q N), \quad \psi = D_e M_e^{-1} N,
 
-the dual shape functions, which are biorthogonal and sum up to one whatever part of a facet is covered
-[Cichosz, Bischoff, CMAME 200, 2011], and with them the coefficients of the contact operator
+which are biorthogonal and sum up to one even if the facet is only partly covered
+[Cichosz, Bischoff, CMAME 200, 2011].  With them, the coefficients of the contact operator are
 
 .. math:: D_{aa} = \sum_e \int_e N_a, \quad m_{ab} = \int \psi_a N_b / D_{aa}
 
-[Wohlmuth, SIAM J. Numer. Anal. 38, 2000].  Arrays in, arrays out; search, clipping, integrals and sums are in the kernel, ``mortar/rows.h``.
+[Wohlmuth, SIAM J. Numer. Anal. 38, 2000].  Input and output are NumPy arrays.  The compiled kernel
+(``mortar/rows.h``) does the search, clipping, integration and summation.
 """
 
 from __future__ import annotations
@@ -26,38 +28,41 @@ from scipy import sparse
 from dolfinx_contact import _kernel
 from dolfinx_contact.contact.shapes import monomials
 
-# Points of Gauss's rules in each direction of a triangle or interval: as many as integrate products of shape functions exactly, and
-# more where quadrilaterals are no parallelograms, whose inverse maps are no polynomials.
+# Smallest and largest number of Gauss points per direction of a triangle or interval.  The smallest
+# integrates products of linear shape functions exactly.  More are used for quadrilaterals that are
+# not parallelograms, whose inverse maps are not polynomials.
 GAUSS_POINTS = 2
 MORE_GAUSS_POINTS = 10
 
-# Part of a node's area that has to be covered, by the degree: with less, rows sum up to one by terms that are several times larger,
-# up to 3 in first order, 7 in second.
+# Smallest covered fraction of a node's area, by polynomial degree.  With less, coefficients of a
+# row still sum up to one, but single ones are several times larger: up to 3 for degree 1, 7 for 2.
 LEAST_COVERED = {1: 0.05, 2: 0.2}
 
-# Area of a node over the largest that is none: of vertices of triangles of second order.
+# Nodal area, relative to the largest one, that counts as zero.  The vertices of second-order
+# triangles have zero area up to rounding.
 NO_AREA = 1e-9
 
-# Departure from a straight facet, over its size, that is rounding.
+# Deviation from a straight facet, relative to its size, that may be rounding.
 STRAIGHT_FACET = 1e-12
 
-
-# Arrays of a ``Side`` with a row for each facet.
+# Fields of ``Side`` with one row per facet.
 BY_FACET = ("nodes", "x", "outwards", "density")
 
 
 class Side(NamedTuple):
-    """Facets of one shape of one side.
+    """``m`` facets of the same shape, with ``k`` nodes each, on one contact side.
 
     Args:
-        nodes: Numbers, negative is none, ``shape=(m, k)``.
-        x: Where they are, ``shape=(m, k, gdim)``.
-        outwards: Normals, away from the body, ``shape=(m, gdim)``; of facets that have ``moved`` as long as these are large.
-        local: Where the nodes are on the reference facet, ``shape=(k, gdim - 1)``.
-        corners: Which of them are corners, in the order of a unit interval, triangle or square, ``shape=(c,)``.
-        degree: Of the shape functions.
-        inverse: Their coefficients, a row for each monomial, ``shape=(k, k)``.
-        density: Of the surface measure, at the nodes, ``shape=(m, k)``; None is one.
+        nodes: Node numbers, ``shape=(m, k)``; -1 for nodes that are not used.
+        x: Positions of the nodes, ``shape=(m, k, gdim)``.
+        outwards: Outward normals, ``shape=(m, gdim)``: unit vectors, or with the facet area as
+            length after ``moved``.
+        local: Positions of the nodes on the reference facet, ``shape=(k, gdim - 1)``.
+        corners: Indices of the nodes that are corners, in the order of a unit interval, triangle or
+            square, ``shape=(c,)``.
+        degree: Polynomial degree of the shape functions.
+        inverse: Coefficients of the shape functions, one row per monomial, ``shape=(k, k)``.
+        density: Weight of the surface measure at the nodes, ``shape=(m, k)``; None means one.
     """
 
     nodes: np.ndarray
@@ -70,22 +75,27 @@ class Side(NamedTuple):
     density: np.ndarray | None = None
 
     def some(self, which: np.ndarray | slice) -> Side:
-        """Those of the facets that a slice or a mask names."""
+        """The facets selected by a slice, mask or index array."""
         named = {name: getattr(self, name) for name in BY_FACET}
         rows = {name: array[which] for name, array in named.items() if array is not None}
         return self._replace(**rows)
 
     def moved(self, x: np.ndarray, inside_out: np.ndarray) -> Side:
-        """The facets with nodes elsewhere, ``shape=(m, k, gdim)``; the body stays on its side of them, see ``inside_out``."""
+        """The facets at new nodal positions; normals have the facet area as length.
+
+        Args:
+            x: New positions, ``shape=(m, k, gdim)``.
+            inside_out: Orientations of the facets, as the property of this name returns them.
+        """
         return self._replace(x=x, outwards=inside_out * self._areas(x))
 
     @property
     def inside_out(self) -> np.ndarray:
-        """Signs, negative where the corners in their order turn about the inward normal, ``shape=(m, 1)``."""
+        """Facet orientations, ``shape=(m, 1)``: -1 if the corners circle the inward normal."""
         return np.sign((self._areas(self.x) * self.outwards).sum(axis=1, keepdims=True))
 
     def _areas(self, x: np.ndarray) -> np.ndarray:
-        """Areas times normals of facets with these nodes."""
+        """Area times unit normal of facets with nodes at ``x``, ``shape=(m, gdim)``."""
         x = x[:, _cyclic(self.corners)]
         one, other = x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]
         if x.shape[2] == 2:
@@ -96,13 +106,14 @@ class Side(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Coefficients of ``n`` slave nodes.
+    """Mortar coefficients of ``n`` slave nodes.
 
     Args:
-        area: ``D_aa``, of their covered part, ``shape=(n,)``.
-        whole: The same, had they been covered wholly, ``shape=(n,)``.
-        m: Sparse, ``shape=(n, master nodes)``; rows sum up to one, those of nodes hardly covered are empty.
-        covered: Which nodes have a row, ``shape=(n,)``.
+        area: Nodal areas ``D_aa`` of the covered part of the slave facets, ``shape=(n,)``.
+        whole: Nodal areas of the entire slave facets, ``shape=(n,)``.
+        m: Coefficients ``m_ab``, sparse, ``shape=(n, master nodes)``.  Each row sums up to one, or
+            is empty if the node is not covered enough.
+        covered: Whether each node has a row, ``shape=(n,)``, bool.
     """
 
     area: np.ndarray
@@ -112,12 +123,13 @@ class Rows(NamedTuple):
 
 
 def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Rows:
-    """The coefficients ``D_aa`` and ``m_ab``.
+    """Mortar coefficients ``D_aa`` and ``m_ab`` of the slave nodes ``0 ... own - 1``.
 
     Args:
-        slaves: All facets that have any of the nodes whose rows are wanted; others have no number.
-        masters: Those of the other side.
-        own, count: Numbers of all slave nodes, and of all nodes of the other side, are below.
+        slaves: All slave facets with at least one of these nodes; other nodes are numbered -1.
+        masters: All master facets.
+        own: Number of slave nodes.
+        count: Number of master nodes.
     """
     sides = ([_for_kernel(side) for side in body] for body in (slaves, masters))
     area, whole, *csr = _kernel.mortar_rows(*sides, own, _rules())
@@ -132,7 +144,10 @@ def rows_of(slaves: list[Side], masters: list[Side], own: int, count: int) -> Ro
 
 
 def at_nodes(side: Side, count: int) -> sparse.csr_matrix:
-    """Sums at numbered nodes of what the facets that have them carry, ``shape=(count, m)``."""
+    """Incidence matrix that sums facet values at nodes, sparse, ``shape=(count, m)``.
+
+    Entry (a, e) is one if facet e has node a.
+    """
     facet, corner = np.nonzero(side.nodes >= 0)
     return sparse.csr_matrix(
         (np.ones(facet.size), (side.nodes[facet, corner], facet)), (count, len(side.nodes))
@@ -140,7 +155,7 @@ def at_nodes(side: Side, count: int) -> sparse.csr_matrix:
 
 
 def _for_kernel(side: Side) -> tuple:
-    """Facets as the kernel takes them."""
+    """Arguments of the compiled kernel for the facets of ``side``."""
     density = np.zeros(0) if side.density is None else side.density
     return (
         side.x,
@@ -149,14 +164,14 @@ def _for_kernel(side: Side) -> tuple:
         side.inverse,
         density,
         side.nodes,
-        _cuts(side),
+        _straight_parts(side),
         side.degree,
     )
 
 
 @lru_cache
 def _rules() -> list[tuple[np.ndarray, np.ndarray]]:
-    """Points and weights of Gauss's rules on the unit interval."""
+    """Points and weights of all Gauss rules on the unit interval, smallest rule first."""
     rules = [
         np.polynomial.legendre.leggauss(points)
         for points in range(GAUSS_POINTS, MORE_GAUSS_POINTS + 1)
@@ -167,8 +182,11 @@ def _rules() -> list[tuple[np.ndarray, np.ndarray]]:
 # -- pieces of facets --------------------------------------------------------------------------
 
 
-def _cuts(side: Side) -> np.ndarray:
-    """Nodes at the corners of straight pieces, in cyclic order, ``shape=(parts, c)``: facets of second order in quarters where any is curved."""
+def _straight_parts(side: Side) -> np.ndarray:
+    """Node indices at the corners of straight parts of each facet, cyclic, ``shape=(parts, c)``.
+
+    Second-order facets are divided into halves (2-D) or quarters (3-D) if any of them is curved.
+    """
     corners = side.corners
     if side.degree == 1:
         return _cyclic(corners)[None]
@@ -181,12 +199,12 @@ def _cuts(side: Side) -> np.ndarray:
 
 
 def _cyclic(corners: np.ndarray) -> np.ndarray:
-    """Corners of a unit square in cyclic order."""
+    """Corner indices in cyclic order; those of a square are permuted, others unchanged."""
     return corners[[0, 1, 3, 2]] if len(corners) == 4 else corners
 
 
 def _quarters(local: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
-    """Nodes of the halves of an interval, the quarters of a triangle or square, in cyclic order."""
+    """Corner nodes, cyclic, of the halves or quarters of a second-order facet."""
 
     def at(*points: Any) -> np.ndarray:
         return np.array([np.abs(local - point).sum(axis=1).argmin() for point in points])

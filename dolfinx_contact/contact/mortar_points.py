@@ -1,10 +1,12 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Contact points between two deformable surfaces: a slave node against its projection on the opposite mesh.
+"""Mortar contact points between two deformable surfaces: slave nodes against the opposite mesh.
 
-Row a of the contact operator is ``w_a = F_a (u_a - sum_b m_ab u_b)``; its reaction acts with ``r_a`` on a and with ``-m_ab r_a``
-on b, so that forces balance whatever the meshes are.  Coefficients ``m_ab`` are those of ``mortar.py``, the rows those of a
-PETSc matrix: the opposite nodes may belong to other ranks.
+Row a of the contact operator gives the relative motion ``w_a = F_a (u_a - sum_b m_ab u_b)`` of
+slave node a, with its frame ``F_a`` and the mortar coefficients ``m_ab`` of ``mortar.py``.  Its
+reaction acts as ``r_a`` on node a and as ``-m_ab r_a`` on each master node b, so forces balance for
+any pair of meshes.  The rows are stored in a PETSc matrix, since master nodes may belong to other
+ranks.
 """
 
 from __future__ import annotations
@@ -50,16 +52,20 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.displacements import Displacements
 
-STRAYED_PART = 0.5  # part of a facet by which a slave node may slide with the coefficients of the undeformed state
+# Largest slip of a slave node in small sliding, as a fraction of the shortest facet edge.
+STRAYED_PART = 0.5
 
-LEAVING_RENEWALS = 2  # renewals in a step after which nodes that leave the other side do not come back in it, else some go to and fro
+# Updates of the mortar coefficients in a step after which a node that has left the master side
+# stays off it for the rest of the step.  Otherwise some nodes alternate between on and off.
+LEAVING_RENEWALS = 2
 
 
 class MortarGeometry(NodalGeometry):
-    """Frames, gaps and motions of the slave nodes of a contact relative to the opposite mesh.
+    """Frames, gaps and relative motions of the slave nodes of a contact with a deformable surface.
 
-    In a step they are linear in the displacement, with the coefficients of one state: the undeformed one if sliding is small;
-    else the last one for which ``geometry_error`` was too large, see ``lagged/end_geometry.py``.
+    Within a solution they are linear in the displacement, with the mortar coefficients of one
+    state. For small sliding, this is the undeformed state.  For large sliding, it is the state at
+    the start of the step or an estimate of its end, see ``lagged/end_geometry.py``.
     """
 
     shares_nodes = False
@@ -74,10 +80,11 @@ class MortarGeometry(NodalGeometry):
         self._slave.keep(self._mine)
         self._at_nodes = [at_nodes(side, nodes.size) for side in self._slave.sides]
         self._supported = np.zeros((nodes.size, displacements.dim), dtype=bool)
-        # A displacement with the nodes that have left, and what was placed for it; one at the start of a step, and how both sides have turned.
+        # Caches: (displacement with the mask of departed nodes, its frames), and (displacement at
+        # the start of the step, rotations of both sides there).
         self._projected: tuple = (None, None)
         self._began: tuple = (None, None)
-        self._planes: list = []  # directions and places along which supports hold nodes in one plane
+        self._planes: list = []  # symmetry planes: index of the normal axis, coordinate
         self._owned = displacements.owned
 
     @property
@@ -86,13 +93,19 @@ class MortarGeometry(NodalGeometry):
         return self.surface.sliding == "large"
 
     def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
-        """See ``Geometry``: where the undeformed bodies stand.  Collective."""
+        """See ``Geometry``: frames and gaps of the undeformed bodies.  Collective."""
         found = self.projected(np.zeros(self._owned[0]))
         self._undeformed = found.frame
         return found
 
     def projected(self, u: np.ndarray, left: np.ndarray | None = None) -> Frames:
-        """Frames, gaps and rows of the state with a displacement of owned degrees of freedom, without nodes that have left.  Collective."""
+        """Frames, gaps and mortar rows of the slave nodes at a displacement.  Collective.
+
+        Args:
+            u: Displacement, owned degrees of freedom.
+            left: Slave nodes that have left the master side in the step, ``shape=(n,)``, bool; they
+                get no row.  By default, no node has left.
+        """
         left = np.zeros(len(self.x), dtype=bool) if left is None else left
         (known, found), key = self._projected, np.append(u, left)
         if self._comm.allreduce(known is not None and np.array_equal(known, key), op=MPI.LAND):
@@ -103,16 +116,16 @@ class MortarGeometry(NodalGeometry):
         with raised_together(self._comm):
             rows = rows_of(slaves, masters, len(self.x), len(there))
             rows = rows._replace(covered=rows.covered & ~left)
-            normals = _without(self._supported, self._mean_normals(slaves))
+            normals = _unconstrained_normals(self._supported, self._mean_normals(slaves))
             turns = self._turns(moved, there)
             axis = self.surface.axis
             if axis is not None and len(axis) == 3:
                 axis = self._slave.deformed(moved)[self._mine] @ axis
             frames = frames_along(normals, axis, self.x, self.surface)
-        # What presses on a node, in the undeformed state; textures of the other side are asked for there.
+        # Undeformed position of the opposite point: textures of the master side are evaluated there
         home = np.where(rows.covered[:, None], rows.m @ self._master.x, self.x)
         flat = ((self.x - home) * frames[:, -1]).sum(axis=1)
-        flat[~rows.covered] = self._apart  # opposite nothing: closed
+        flat[~rows.covered] = self._apart  # no opposite point: the gap is open
         points = MortarPoints(self._dofs, frames, self._owned, rows, self._master, self._comm)
         points.met, points.turns, points.sides = self._supported, turns, (moved, there)
         still = self.surface.rotation
@@ -124,25 +137,40 @@ class MortarGeometry(NodalGeometry):
         return found
 
     def _mean_normals(self, slaves: list[Side]) -> np.ndarray:
-        """Unit normals at slave nodes, towards their body: means of facets' by area, ``shape=(n, gdim)``."""
+        """Unit normals at the slave nodes, into their own body, ``shape=(n, gdim)``.
+
+        Each one is the area-weighted mean of the normals of the adjacent facets.
+        """
         sums = np.zeros_like(self.x)
         for at, side in zip(self._at_nodes, slaves):
             sums -= at @ side.outwards
         return sums / np.linalg.norm(sums, axis=1, keepdims=True)
 
     def _turns(self, slave: np.ndarray, master: np.ndarray) -> list[np.ndarray]:
-        """Rotations of both sides as a whole, ``shape=(gdim, gdim)``, whose nodes are at these places; all ranks know all nodes."""
+        """Mean rotations of the slave and the master side, ``shape=(gdim, gdim)`` each.
+
+        Args:
+            slave, master: Current positions of all nodes of each side, on all ranks,
+                ``shape=(m, gdim)``.
+        """
         pairs = [(self._slave.x, slave), (self._master.x, master)]
-        for k, plane in self._planes:  # of symmetry: bodies turn as with their other halves
+        for k, plane in self._planes:  # symmetry plane: add the mirror image of each body
             mirror, foot = np.ones(self.x.shape[1]), np.zeros(self.x.shape[1])
             mirror[k], foot[k] = -1.0, 2.0 * plane
             pairs = [[np.concatenate((x, mirror * x + foot)) for x in pair] for pair in pairs]
         return [nearest_rotation((y - y.mean(axis=0)).T @ (x - x.mean(axis=0))) for x, y in pairs]
 
     def directions(self, given: np.ndarray, owner: str, points: MortarPoints) -> np.ndarray:
-        """Directions on the undeformed side that has them, ``shape=(gdim, n)`` or in its frames ``(2, n)``, where these rows are: ``(gdim, n)``.
+        """Material directions in the deformed state, ``shape=(gdim, n)``, global frame.
 
-        They are lines of the material, of the slave at its nodes, of the other side opposite to these.
+        They deform with the side that owns them: with the slave at its nodes, or with the master
+        side at the opposite points.
+
+        Args:
+            given: Directions in the undeformed state, ``shape=(gdim, n)``, global frame, or
+                ``(2, n)``, tangential components in the undeformed local frames.
+            owner: "body" (the slave) or "surface" (the master side).
+            points: Contact points in the deformed state.
         """
         if len(given) == 2:
             given = np.einsum("nij,in->jn", self._undeformed[:, :2], given)
@@ -161,7 +189,7 @@ class MortarGeometry(NodalGeometry):
         """See ``Geometry``.  Collective."""
         turned = 0.0
         if last is not None:
-            turned = _between(*self._since(last, self._turns_at(u)))[2]
+            turned = _between(*self._since(last, self._mean_rotations_at(u)))[2]
         if turned <= LONGEST_TURN:
             return 2.0, ""
         return (
@@ -169,25 +197,36 @@ class MortarGeometry(NodalGeometry):
             f"two bodies turn against each other by {turned:.2g} radians in it, {LONGEST_TURN:g} is the most",
         )
 
-    def _turns_at(self, u: np.ndarray) -> list[np.ndarray]:
-        """Rotations of both sides as a whole at a displacement.  Collective."""
+    def _mean_rotations_at(self, u: np.ndarray) -> list[np.ndarray]:
+        """Mean rotations of the slave and the master side at a displacement ``u``.  Collective."""
         return self._turns(*(side.moved(u)[1] for side in (self._slave, self._master)))
 
     def _since(self, start: np.ndarray, turns: list[np.ndarray]) -> list[np.ndarray]:
-        """Rotations of both sides since a displacement.  Collective."""
+        """Mean rotations of both sides relative to those at displacement ``start``.  Collective.
+
+        Args:
+            start: Displacement at the start of the step, owned degrees of freedom.
+            turns: Present mean rotations of the slave and the master side.
+        """
         known, began = self._began
         if not self._comm.allreduce(
             known is not None and np.array_equal(known, start), op=MPI.LAND
         ):
-            began = self._turns_at(start)
+            began = self._mean_rotations_at(start)
             self._began = start, began
         return [new @ old.T for new, old in zip(turns, began)]
 
-    def _way(self, placed: Frames, start: np.ndarray) -> np.ndarray:
-        """By what slip past what is opposite is more than its chord, ``shape=(n, gdim - 1)``, local frame.  Collective.
+    def _arc_correction(self, placed: Frames, start: np.ndarray) -> np.ndarray:
+        """Slip correction for rotating bodies, ``shape=(n, gdim - 1)``, local frame, length.
 
-        What was apart by ``d`` at the start has slipped by it as both sides see it: turned by the half of what each has, and as long as
-        the arc on which the sides turn against each other.
+        It is the slip along the arc of the relative rotation minus the slip along its chord.  The
+        distance ``d`` at the start between two points that coincide at the end is turned to the
+        mean orientation of both sides, and lengthened from the chord of their relative rotation to
+        the arc.  Collective.
+
+        Args:
+            placed: Frames at the end of the step.
+            start: Displacement at the start of the step, owned degrees of freedom.
         """
         mean, axis, angle = _between(*self._since(start, placed.points.turns))
         apart = self.x - placed.home
@@ -205,7 +244,7 @@ class MortarGeometry(NodalGeometry):
         history: History,
         before: Frames | None,
     ) -> Frames:
-        """See ``Geometry``; rows are those of the last step, or of where the step is likely to end, then of where it has ended."""
+        """See ``Geometry``; mortar rows of the last step, or new ones if ``at`` is given."""
         none = np.zeros(len(self.x), dtype=bool)
         begun = history.frames._replace(start=start, left=none, renewed=-1, leaving=False)
         if at is None:
@@ -217,24 +256,26 @@ class MortarGeometry(NodalGeometry):
             left = left | (alone & ~before.points.alone)
         leaving = (alone & ~history.frames.points.alone).any()
         leaving = bool(self._comm.allreduce(leaving, op=MPI.LOR))
-        way = frozen(self._way(found, start))
+        way = frozen(self._arc_correction(found, start))
         return found._replace(start=start, left=left, renewed=renewed, leaving=leaving, way=way)
 
     def last_in(self, frames: Frames, history: History) -> State:
-        """See ``Geometry``; slip of the step is that of the material points which the new rows name.  Collective."""
+        """See ``Geometry``; slip is measured between the material points paired by the new rows.
+        Collective.
+        """
         before, last = history.frames, history.last
         if frames.points is before.points:
             return last
         moved = frozen(frames.points.motion(frames.start))
         turned = frozen(carried(last.reaction, before.frame, frames.frame))
-        # What comes in from the side does not land.
+        # A node that arrives across the edge of the master side has no gap to close.
         gap = frozen(np.where(before.points.alone, 0.0, last.gap))
         return last._replace(displacement=moved, reaction=turned, gap=gap)
 
     def slip_past_edge(
         self, u: np.ndarray, frames: Frames, history: History
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """See ``Geometry``: by the rows of the start."""
+        """See ``Geometry``; the slip follows from the mortar rows at the start of the step."""
         if not frames.leaving:
             return None
         before, alone = history.frames, frames.points.alone
@@ -245,18 +286,22 @@ class MortarGeometry(NodalGeometry):
         return alone & ~before.points.alone, slip
 
     def saved_at(self, at: np.ndarray | None, before: Frames) -> Frames:
-        """See ``Geometry``: rows of a displacement that was saved."""
+        """See ``Geometry``: frames, gaps and mortar rows at the saved displacement ``at``."""
         return self.projected(np.zeros(self._owned[0]) if at is None else at)
 
     def missed(self, contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray) -> tuple:
-        """See ``Geometry``; forces of the nodes of both sides, too, in the place of normals, with the rows of ``u`` itself."""
+        """See ``Geometry``; the error is measured against the mortar rows at ``u`` itself.
+
+        In place of the errors of the normals, the second entry has the errors of the nodal forces
+        on both sides, and behind these the errors due to turned friction axes.
+        """
         from dolfinx_contact.contact.end import dragged, pressed
 
         frames, given = contact.frames, contact.given
         start, there = frames.start, self.projected(u, frames.left)
         alone = there.points.alone
         slip, used = (placed.points.motion(u - start) for placed in (there, frames))
-        slip[:, :-1] += self._way(there, start)
+        slip[:, :-1] += self._arc_correction(there, start)
         used[:, :-1] += 0.0 if frames.way is None else frames.way
         slip[:, -1] = used[:, -1] = 0.0
         slip = times(frames.frame, turned_back(there.frame, slip)) - used
@@ -272,7 +317,7 @@ class MortarGeometry(NodalGeometry):
             angle = given.laws.turned(contact, there.home, there.frame, there.points)
         turned = np.linalg.norm(state.reaction[:, :-1], axis=1) * angle
         turned[alone] = 0.0
-        came = contact.points.alone & ~alone  # opposite something at the end alone
+        came = contact.points.alone & ~alone  # opposite the master side at the end of the step only
         return (
             pressed(contact, state, gap, contact.points.closed & ~came),
             np.append(forces, turned),
@@ -290,15 +335,20 @@ class MortarGeometry(NodalGeometry):
     def taken(
         self, volume: np.ndarray, area: np.ndarray, frames: Frames, history: History
     ) -> np.ndarray:
-        """See ``Geometry``: node b loses ``sum_a m_ab V_a``, but no negative volume, the sum as it is.  Collective.
+        """See ``Geometry``: worn depths of the master nodes.  Collective.
 
-        Vertices of triangles of second order, which have no area, are worn as the nodes beside them.
+        Node b loses the volume ``sum_a m_ab V_a``.  Negative volumes are set to zero and the others
+        scaled, so that the total is kept.  Vertices of second-order triangles have no area; they
+        get the mean depth of the neighbouring nodes.
 
         Args:
-            volume: ``V_a``.
-            area: Of this rank's nodes of the other side, ``shape=(k,)``.
+            volume: Volume ``V_a`` that slave node a wears off the master side, ``shape=(n,)``.
+            area: Areas of this rank's master nodes, ``shape=(k,)``.
         """
-        now, before = frames.points, history.frames.points  # of what has left in the step, before
+        now, before = (
+            frames.points,
+            history.frames.points,
+        )  # rows at the start: for nodes that have left in the step
         mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
         volumes = self._comm.allreduce(mine)
         area = self._master.everywhere(area[:, None])[:, 0]
@@ -317,13 +367,25 @@ class MortarGeometry(NodalGeometry):
         return np.where(bears, depth, sums[0] / sums[1])[self._master.mine]
 
     def gap_at(self, u: np.ndarray, frames: Frames) -> tuple[np.ndarray, MortarPoints]:
-        """Gaps without wear with the rows of a displacement itself, ``shape=(n,)``, length, and these; what is opposite nothing is open.  Collective."""
+        """Gaps without wear, ``shape=(n,)``, length, and contact points at a displacement.
+
+        Nodes opposite no master facet get an open gap.  Collective.
+
+        Args:
+            u: Displacement, owned degrees of freedom.
+            frames: Frames of the step, with the nodes that have left.
+        """
         there = self.projected(u, frames.left)
         gap = there.flat + there.points.motion(u)[:, -1]
         return np.where(there.points.alone, np.maximum(gap, self._apart), gap), there.points
 
     def check_start(self, contact: Contact, body: ElasticBody) -> str:
-        """See ``Geometry``: two sides of one part of the mesh that would be pressed together through it are refused."""
+        """See ``Geometry``: raise if contact would compress one body between its opposite faces.
+
+        Raises:
+            ValueError: Both sides belong to one connected part of the mesh and overlap by more than
+                the shortest facet edge.
+        """
         part, parts = body.parts
         sides, frames = (contact.nodes, self.opposite), contact.history.frames
         here = body.total([np.bincount(part[nodes], minlength=parts) for nodes in sides])
@@ -350,13 +412,23 @@ class MortarGeometry(NodalGeometry):
         return frames.points.share
 
     def slid(self, motion: np.ndarray, history: History) -> float:
-        """How far a motion of owned degrees of freedom slides nodes that are opposite something, over the smallest facet.  Collective."""
+        """Largest slip of a slave node on the master side, relative to its shortest facet edge.
+        Collective.
+
+        Args:
+            motion: Displacement increment, owned degrees of freedom.
+            history: History with the frames that give the mortar rows.
+        """
         points = history.frames.points
         along = points.motion(motion)[~points.alone, :-1]
         return float(np.linalg.norm(along, axis=1).max(initial=0.0)) / self._master.smallest
 
     def strayed(self, state: State) -> tuple[float, float]:
-        """How far a node has slid from the opposite point of the undeformed state, and how far it may: half of the smallest facet."""
+        """Largest total slip of a node in contact, and the limit for small sliding, both lengths.
+
+        The limit is half of the shortest master facet edge.  For large sliding the slip is zero and
+        the limit infinite.
+        """
         if self.renews_rows:
             return 0.0, np.inf
         slid = np.linalg.norm(state.displacement[:, :-1], axis=1)
@@ -364,9 +436,11 @@ class MortarGeometry(NodalGeometry):
         return float(slid), STRAYED_PART * self._master.smallest
 
     def sides(self, state: State, points: MortarPoints) -> tuple[float, float] | None:
-        """How many times the facets of the slave are as large, and its body as stiff, as those of the other side.  Collective.
+        """Ratios slave to master of facet size and of body stiffness; None without contact.
+        Collective.
 
-        Medians where nodes press; None while none does.  The stiffness of a node is that of the body times its size in three dimensions.
+        Both are medians over the slave nodes in contact.  In three dimensions the nodal stiffness
+        is proportional to modulus times size, so its ratio is divided by the ratio of sizes.
         """
         some = state.reaction[:, -1] > 0.0
         dim = self.x.shape[1]
@@ -379,9 +453,14 @@ class MortarGeometry(NodalGeometry):
         return None if size is None else (float(size), float(stiff))
 
     def clamped(self, fixed: np.ndarray, frames: Frames) -> np.ndarray:
-        """Nodes without friction because supports hold them along the surface, ``shape=(n,)``; ``fixed`` degrees of freedom.  Collective.
+        """Mask of nodes without friction due to tangential supports, ``shape=(n,)``.
 
-        On a plane of symmetry nodes of the other side are held as well: these do not count.
+        Nodes on a symmetry plane, where the master nodes are constrained as well, are not included.
+        Collective.
+
+        Args:
+            fixed: Degrees of freedom with boundary conditions.
+            frames: Frames of the slave nodes.
         """
         master, found = self._master, np.zeros(len(self.x), dtype=bool)
         held = master.everywhere(np.isin(master.own, fixed))
@@ -398,7 +477,7 @@ class MortarGeometry(NodalGeometry):
         return self.renews_rows
 
     def arms(self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None) -> np.ndarray:
-        """See ``Geometry``: about the origin."""
+        """See ``Geometry``: current nodal positions, so moments are about the origin."""
         if u is None:
             raise ValueError(
                 "contact.moment on a deformable surface needs the displacement: contact.moment(problem.u)."
@@ -406,7 +485,14 @@ class MortarGeometry(NodalGeometry):
         return self.x + u[self._dofs]
 
     def met(self, fixed: np.ndarray, frames: Frames) -> Frames:
-        """Frames without what supports hold of normals: those of a symmetry plane lie in it.  Collective."""
+        """Frames whose normals have no component along constrained directions.  Collective.
+
+        So the normal of a node on a symmetry plane lies in that plane.
+
+        Args:
+            fixed: Degrees of freedom with boundary conditions.
+            frames: The present frames.
+        """
         held = np.isin(self._dofs, fixed)
         if not self._comm.allreduce(bool((held != frames.points.met).any())):
             return frames
@@ -420,24 +506,27 @@ class MortarGeometry(NodalGeometry):
 
 
 class Skin:
-    """Facets of one side and their nodes, known to all ranks.
+    """Facets of one contact side and their ``m`` nodes, gathered from all ranks on each rank.
+
+    Nodes are numbered ``0 ... m - 1``, in the order of their global indices ("skin numbers").
 
     Args:
-        displacements: ``Displacements``.
-        facets: Local indices.
+        displacements: Nodes and degrees of freedom of the displacement space.
+        facets: Local facet indices.
         comm: MPI communicator.  Collective.
-        density: Of the surface measure at local nodes, None is one.
+        density: Weight of the surface measure at the local nodes; None means one everywhere.
 
     Attributes:
-        sides: The facets, by shape; nodes in numbers of their own, ``0 ... m - 1``, but see ``keep``.
-        nodes: Local indices of those that this rank owns.
-        mine: Their numbers here.
-        own: Their degrees of freedom, ``shape=(k, gdim)``.
-        smallest: The shortest edge of a facet.
-        size: Length of edges at each node, mean of its facets, ``shape=(m,)``.
-        numbers: Global numbers of the nodes, sorted, ``shape=(m,)``.
-        x: Where they are, ``shape=(m, gdim)``.
-        dofs: Their degrees of freedom in global numbers, ``shape=(m, gdim)``.
+        sides: The facets, grouped by shape, with skin numbers of their nodes until ``keep`` changes
+            these.
+        nodes: Local indices of the ``k`` nodes that this rank owns.
+        mine: Skin numbers of the nodes that this rank owns, ``shape=(k,)``.
+        own: Owned degrees of freedom of these nodes, ``shape=(k, gdim)``.
+        smallest: Length of the shortest facet edge (the first edge of each facet is measured).
+        size: Mean edge length of the facets at each node, ``shape=(m,)``.
+        numbers: Global node indices, sorted, ``shape=(m,)``.
+        x: Undeformed positions of the nodes, ``shape=(m, gdim)``.
+        dofs: Global degrees of freedom of the nodes, ``shape=(m, gdim)``.
     """
 
     def __init__(
@@ -447,7 +536,7 @@ class Skin:
         comm: MPI.Comm,
         density: np.ndarray | None = None,
     ):
-        sides, self._comm = _gathered(displacements, facets, comm, density), comm
+        sides, self._comm = _facets_of_all_ranks(displacements, facets, comm, density), comm
         self.numbers = np.unique(
             np.concatenate([np.zeros(0, int), *(side.nodes.ravel() for side in sides)])
         )
@@ -474,16 +563,27 @@ class Skin:
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
         self.mine = np.searchsorted(self.numbers, given[comm.rank])
         self.dofs = self.everywhere(displacements.owned[1] + self.own)
-        self._compliance: tuple = (None, None, None)  # of which matrix in which state
+        self._compliance: tuple = (None, None, None)  # matrix, its state counter, inverse blocks
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
-        """Rows of this rank's nodes and of all others'.  Collective."""
+        """Nodal values of all ``m`` nodes, gathered from the ``k`` nodes of each rank.  Collective.
+
+        Args:
+            rows: Values at the nodes that this rank owns, ``shape=(k, ...)``.
+
+        Returns:
+            ``shape=(m, ...)``.
+        """
         found = np.zeros((self.numbers.size, *rows.shape[1:]), dtype=rows.dtype)
         found[self._at] = np.concatenate(self._comm.allgather(rows))
         return found
 
     def compliance(self, K: PETSc.Mat) -> np.ndarray:
-        """Inverse nodal blocks of all nodes, ``shape=(m, gdim, gdim)``; zero along fixed directions.  Collective where ``K`` is new."""
+        """Inverse diagonal blocks of ``K``, ``shape=(m, gdim, gdim)``, length per force.
+
+        Entries along constrained directions are zero.  The result is cached; collective if ``K``
+        has changed.
+        """
         matrix, state, C = self._compliance
         if matrix is not K or state != K.stateGet():
             blocks = nodal_blocks(K, self.own)
@@ -496,24 +596,37 @@ class Skin:
         return C
 
     def moved(self, u: np.ndarray) -> tuple[list[Side], np.ndarray]:
-        """The facets with a displacement of owned degrees of freedom, and where their nodes are.  Collective."""
+        """Deformed facets and positions of all nodes, ``shape=(m, gdim)``, at displacement ``u``.
+        Collective.
+        """
         there = self.x + self.everywhere(u[self.own])
         sides = zip(self.sides, self._nodes, self._inside_out)
         return [side.moved(there[nodes], signs) for side, nodes, signs in sides], there
 
     def deformed(self, there: np.ndarray) -> np.ndarray:
-        """What becomes of directions at each node if nodes are ``there``, ``shape=(m, gdim, gdim)``: mean of its facets by area; three dimensions."""
+        """Surface deformation gradient at each node, ``shape=(m, 3, 3)``; in 3-D only.
+
+        It is the area-weighted mean over the adjacent facets, and maps unit normals to unit
+        normals.
+
+        Args:
+            there: Deformed positions of the nodes, ``shape=(m, 3)``.
+        """
         sums, areas = np.zeros((self.numbers.size, 3, 3)), np.zeros((self.numbers.size, 1, 1))
         for side, nodes in zip(self.sides, self._nodes):
             corners = nodes[:, side.corners]
-            (before, area), (after, _) = (_spanned(x[corners]) for x in (self.x, there))
+            (before, area), (after, _) = (_facet_bases(x[corners]) for x in (self.x, there))
             parts = area[:, None, None] * after @ np.linalg.inv(before)
             np.add.at(sums, nodes, parts[:, None])
             np.add.at(areas, nodes, area[:, None, None, None])
         return np.divide(sums, areas, np.zeros_like(sums), where=areas > 0.0)
 
     def keep(self, nodes: np.ndarray) -> None:
-        """Of the facets keep those that have any of these nodes, which are numbered by their places here, others by -1."""
+        """Discard all facets without any of the given nodes, and renumber the nodes of the others.
+
+        Args:
+            nodes: Skin numbers; node ``nodes[i]`` becomes node i, and all others become -1.
+        """
         places = np.full(self.numbers.size, -1)
         places[nodes] = np.arange(nodes.size)
         near = [(places[at] >= 0).any(axis=1) for at in self._nodes]
@@ -524,22 +637,25 @@ class Skin:
 
 
 class MortarPoints(ContactPoints):
-    """Slave nodes, each with the opposite nodes that it presses on; see ``ContactPoints``.
+    """Slave nodes, each coupled to master nodes by mortar coefficients; see ``ContactPoints``.
 
     Args:
-        dofs, frames, owned: As ``ContactPoints`` has them.
-        rows: Coefficients of the opposite nodes.
-        opposite: The ``Skin`` of the other side.
-        comm: MPI communicator.  Everything that asks for motion or forces is collective.
+        dofs, frames, owned: As in ``ContactPoints``.
+        rows: Mortar coefficients of the slave nodes.
+        opposite: The ``Skin`` of the master side.
+        comm: MPI communicator.  All methods that compute motions or forces are collective.
 
     Attributes:
-        alone: Nodes opposite nothing, or next to nothing, which never touch, ``shape=(n,)``.
-        share: Part of each node's area that is opposite the other side, ``shape=(n,)``.
-        turns: Rotations of both sides as a whole, ``shape=(gdim, gdim)`` each.
-        sides: Where the nodes of both are, ``shape=(m, gdim)`` each.
-        met: What supports hold of the nodes for which the frames were taken, ``shape=(n, gdim)``.
-        m: Coefficients of the opposite nodes, sparse, ``shape=(n, m)``.
-        stiffer: Of the last ``stiffness``: that of each node over that of the nodes opposite, along the normal, ``shape=(n,)``.
+        alone: Nodes opposite no master facet (or with too small an overlap), which never touch,
+            ``shape=(n,)``, bool.
+        share: Fraction of each node's area that is opposite the master side, ``shape=(n,)``.
+        turns: Mean rotations of the slave and the master side, ``shape=(gdim, gdim)`` each.
+        sides: Positions of the nodes of the slave and the master side, ``shape=(m, gdim)`` each.
+        met: Constrained degrees of freedom for which the normals were computed
+            (``MortarGeometry.met``), ``shape=(n, gdim)``, bool.
+        m: Mortar coefficients of the master nodes, sparse, ``shape=(n, m)``.
+        stiffer: Normal stiffness of each slave node divided by that of the opposite nodes, set by
+            ``stiffness``, ``shape=(n,)``.
     """
 
     local = False
@@ -595,7 +711,7 @@ class MortarPoints(ContactPoints):
 
     @cached_property
     def _S(self) -> PETSc.Mat:
-        """Local components of forces on the slave nodes.  Collective."""
+        """Matrix that maps forces to their local components at the slave nodes.  Collective."""
         turned = block_diagonal(self.frames)
         return self._petsc(
             turned.indptr, (self.first + self.dofs).ravel()[turned.indices], turned.data
@@ -603,14 +719,15 @@ class MortarPoints(ContactPoints):
 
     @cached_property
     def _sizes(self) -> PETSc.Mat:
-        """Magnitudes of ``B``.  Collective."""
+        """Matrix of the absolute values of the entries of ``B``.  Collective."""
         starts, columns, values = self._B.getValuesCSR()
         return self._petsc(starts, columns, np.abs(values))
 
     def known(self, motion: np.ndarray, terms: Iterable[np.ndarray]) -> None:
-        """See ``ContactPoints``: nodes have no friction along what supports hold, such as across a plane of symmetry.
+        """See ``ContactPoints``: None, as there is no friction along constrained directions.
 
-        There opposite nodes move towards the plane and away from it; their mirror images, which the rows lack, do the contrary.
+        Across a symmetry plane, for example, the motions of opposite nodes and of their mirror
+        images cancel, but the mortar rows do not contain the mirror images.
         """
 
     def motion(self, u: np.ndarray) -> np.ndarray:
@@ -622,7 +739,7 @@ class MortarPoints(ContactPoints):
         return self._rows(self._sizes, np.abs(u))
 
     def reactions(self, forces: np.ndarray) -> np.ndarray:
-        """See ``ContactPoints``: those on the slave node alone."""
+        """See ``ContactPoints``: local components of the forces on the slave nodes."""
         return np.einsum("nij,nj...->ni...", self.frames, forces[self.dofs])
 
     def add_forces(self, reaction: np.ndarray, forces: np.ndarray) -> None:
@@ -654,7 +771,7 @@ class MortarPoints(ContactPoints):
         return self._product(blocks, self._S)
 
     def _product(self, blocks: np.ndarray, by: PETSc.Mat) -> sparse.csr_matrix:
-        """``B^T D by``."""
+        """The matrix product ``B^T D by``, with ``D`` block diagonal.  Collective."""
         D, size = block_diagonal(blocks), (self.dofs.size, None)
         first = self._B.getOwnershipRange()[0]
         csr = (D.indptr.astype(PETSc.IntType), (D.indices + first).astype(PETSc.IntType), D.data)
@@ -672,7 +789,7 @@ class MortarPoints(ContactPoints):
         """See ``ContactPoints``.  Collective."""
         directions = turns @ self.frames
         own = np.linalg.norm(directions * free[self.dofs][:, None, :], axis=2)
-        # Held: then what opposite nodes do is carried.
+        # Constrained slave node: the support carries the motion of the opposite nodes.
         directions[(own < FREE_PART) | self.closed[:, None]] = 0.0
         held = np.concatenate(self._comm.allgather(self.first + np.flatnonzero(~free)))
         values, columns, starts = self._sums
@@ -686,7 +803,11 @@ class MortarPoints(ContactPoints):
         return np.append(super().reach, self._opposite.dofs)
 
     def stiffness(self, K: PETSc.Mat) -> NodalStiffness:
-        """See ``ContactPoints``: of springs in series, ``1/k = 1/k_a + sum_b m_ab^2 / k_b``, as matrices along slip.  Collective."""
+        """See ``ContactPoints``: the nodes of both sides act as springs in series.  Collective.
+
+        The stiffness ``k`` of node a follows from ``1/k = 1/k_a + sum_b m_ab^2 / k_b``;
+        tangentially, this is an equation of matrices.
+        """
         alone = super().stiffness(K)
         C = self._opposite.compliance(K)
         squares = self.m.multiply(self.m).tocsr()
@@ -700,8 +821,15 @@ class MortarPoints(ContactPoints):
         return NodalStiffness(normal, tangential)
 
 
-def _spanned(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two edges of triangles or the diagonals of squares, and their unit normal, ``shape=(m, 3, 3)``, as columns, and the areas that they span."""
+def _facet_bases(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bases of ``m`` facets, ``shape=(m, 3, 3)``, and the areas spanned by their first two columns.
+
+    The columns are two edges of a triangle or the diagonals of a quadrilateral, and the unit
+    normal.
+
+    Args:
+        x: Positions of the corners, ``shape=(m, 3, 3)`` or ``(m, 4, 3)``.
+    """
     one, other = x[:, -1] - x[:, 0], x[:, 1] - x[:, 2 * (x.shape[1] - 3)]
     normal = np.cross(one, other)
     area = np.linalg.norm(normal, axis=1)
@@ -709,7 +837,7 @@ def _spanned(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """The rotation half way between two, the axis from the one to the other, and the angle between them."""
+    """Mean of two rotations, and axis and angle (radians) of their relative rotation."""
     dim = len(slave)
     first, second = np.eye(3), np.eye(3)
     first[:dim, :dim], second[:dim, :dim] = slave, master
@@ -720,10 +848,17 @@ def _between(slave: np.ndarray, master: np.ndarray) -> tuple[np.ndarray, np.ndar
     return mean.as_matrix()[:dim, :dim], axis[:dim], angle
 
 
-def _gathered(
+def _facets_of_all_ranks(
     displacements: Displacements, facets: np.ndarray, comm: MPI.Comm, density: np.ndarray | None
 ) -> list[Side]:
-    """The facets of all ranks by shape, nodes in global numbers; with a density of the measure at local nodes.  Collective."""
+    """Facets of all ranks, grouped by shape, with global node numbers.  Collective.
+
+    Args:
+        displacements: Nodes and degrees of freedom of the displacement space.
+        facets: Local facet indices.
+        comm: MPI communicator.
+        density: Weight of the surface measure at the local nodes; None means one everywhere.
+    """
     mine = []
     for part in facets_of(displacements, facets):
         numbers = _numbers(displacements.V.dofmap.index_map, part.nodes.ravel()).reshape(
@@ -754,12 +889,15 @@ def _gathered(
 
 
 def _numbers(index_map: Any, nodes: np.ndarray) -> np.ndarray:
-    """Global numbers of local nodes."""
+    """Global indices of nodes given by local indices."""
     return index_map.local_to_global(nodes.astype(np.int32)).astype(np.int64)
 
 
-def _without(held: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Unit normals without the components that supports hold, unless these are all of them."""
+def _unconstrained_normals(held: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Unit normals without their components along constrained directions, ``shape=(n, gdim)``.
+
+    A normal with constrained components only is left unchanged.
+    """
     left = np.where(held, 0.0, normals)
     length = np.linalg.norm(left, axis=1, keepdims=True)
     some = length > FREE_PART  # else the support holds the node along its normal

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A contact in a loop of one's own: one predictor and corrector at a time."""
+"""Contact in a user's own solution loop: one predictor and corrector at a time."""
 
 from __future__ import annotations
 
@@ -20,19 +20,23 @@ if TYPE_CHECKING:
 
 
 class OwnLoop:
-    """A contact for which a loop of yours finds the displacement, without ``ContactProblem``.
+    """A contact whose displacement is found by the user's own loop, without ``ContactProblem``.
 
     Args:
-        contact: The contact, whose ``reaction``, ``gap``, ``slip_increment`` and ``status`` are replaced in each iteration.
+        contact: The contact, whose ``reaction``, ``gap``, ``slip_increment`` and ``status`` are
+            replaced in each iteration.
         K: Assembled PETSc stiffness matrix on ``V``.  Collective.
-        map: "bipotential" for the paper's predictor and Euclidean projection [dSFMH07, Section 2], "return" for a predictor
-            without the translated normal term and a projection in the metric of the slip rule.  Both have the same fixed points.
+        map: "bipotential" for the predictor and Euclidean projection of [dSFMH07, Section 2].
+            "return" for a predictor without the additional normal term, and a projection in the
+            metric of the slip rule.  Both maps have the same fixed points.
 
     Raises:
-        ValueError: on all ranks, if a node does not resist being moved along the normal.
+        ValueError: if ``map`` has another value; on all ranks, if a node has no positive stiffness
+            along the normal.
 
     Attributes:
-        rho: Augmentation parameter, the normal diagonal entry of each node in ``K``, ``shape=(n,)``, force per length.
+        rho: Augmentation parameter, the normal diagonal entry of each node in ``K``,
+            ``shape=(n,)``, force per length.
 
     Example:
         >>> loop = dc.OwnLoop(contact, problem.body.K)
@@ -49,10 +53,10 @@ class OwnLoop:
 
     @property
     def springs(self) -> np.ndarray:
-        """Spring stiffnesses that match ``update``, ``shape=(n, gdim)``, local frame, force per length.
+        """Spring stiffnesses for ``update``, ``shape=(n, gdim)``, local frame, force per length.
 
-        ``rho diag(Q^2, 1)`` for the paper's map, ``rho`` in all directions for the return map; zero along the plane without
-        friction.
+        They are ``rho diag(Q^2, 1)`` for the "bipotential" map and ``rho`` in all directions for
+        the "return" map.  Without friction, the tangential stiffnesses are zero.
         """
         return self._map.springs(self.contact.friction, self.contact.points.dim)
 
@@ -62,10 +66,11 @@ class OwnLoop:
         add_to(K, points.matrix(self.springs[:, :, None] * np.eye(points.dim)))
 
     def update(self, u: fem.Function | np.ndarray) -> None:
-        """One predictor and corrector for all nodes.
+        """Apply one predictor and corrector at all contact nodes.
 
-        Takes gaps and slip increments of ``u``, and replaces ``contact.reaction`` by its predictor's projection on the friction
-        cone, and ``contact.status`` by the branch that the projection took.
+        Gaps and slip increments follow from ``u``.  ``contact.reaction`` is replaced by the
+        projection of its predictor on the friction cone, and ``contact.status`` by the branch of
+        the projection.
 
         Args:
             u: Function on ``V``, or the array of its owned degrees of freedom; length units.
@@ -75,5 +80,8 @@ class OwnLoop:
         contact.present = step_of(contact).respond(values, contact.reaction, self._map)
 
     def advance(self) -> None:
-        """Accept the present state as the last converged one, from which the next slip counts.  Collective."""
+        """Accept the present state as the last converged one.  Collective.
+
+        The next slip increments are measured from this state.
+        """
         self.contact.accept(step_of(self.contact).ended(self.contact.present))

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Frames, gaps and ways of contact nodes on a rigid surface."""
+"""Frames, gaps and path lengths of contact nodes on a rigid surface."""
 
 from __future__ import annotations
 
@@ -22,18 +22,23 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.interface import ContactPoints
 
-# Radians up to which a way turns: longer ones are refused.
+# Largest turn in a path length, radians: well below pi, where ``a cot a`` becomes zero.  Longer
+# paths are refused at the end of the step.
 LONGEST_TURN = 2.0
 
-# Part of a body that may lie on the other side of a plane at the start.
+# Largest penetration at the start without a warning, relative to the size of the body.  Also the
+# smallest extent of a body above a plane, relative to its extent below, for a normal that is
+# taken as correct.
 DEEP_START = 0.1
 
 
 class RigidGeometry(NodalGeometry):
-    """That of a plane, which may turn, or of a curved surface.
+    """Geometry of contact nodes on a plane, which may rotate, or on a curved rigid surface.
 
     Args:
-        points_in: Makes the ``ContactPoints`` of frames, ``shape=(n, gdim, gdim)``, see ``Contact.points_in``; others as ``NodalGeometry`` has them.
+        given: Arguments of ``NodalGeometry``.
+        points_in: Function that returns the ``ContactPoints`` for frames,
+            ``shape=(n, gdim, gdim)``, see ``Contact.points_in``.
     """
 
     def __init__(self, *given: Any, points_in: Callable[[np.ndarray], ContactPoints]):
@@ -70,7 +75,13 @@ class RigidGeometry(NodalGeometry):
         return self._placed(before.home if at is None else at, self.x, before)
 
     def _placed(self, home: np.ndarray, there: np.ndarray, before: Frames | None) -> Frames:
-        """Frames and gaps at positions relative to the surface, ``there`` in space, for lever arms.  Collective."""
+        """Return frames and gaps for given positions of the nodes.  Collective.
+
+        Args:
+            home: Positions relative to the surface, ``shape=(n, gdim)``.
+            there: Positions in space for lever arms, ``shape=(n, gdim)``.
+            before: Earlier frames, whose contact points are reused if they are unchanged.
+        """
         surface, x = self.surface, self.x
         with raised_together(self._comm):  # the user's functions
             own = surface.frames(home)
@@ -116,7 +127,7 @@ class RigidGeometry(NodalGeometry):
     def arms(
         self, displacement: np.ndarray, frames: Frames, u: np.ndarray | None = None
     ) -> np.ndarray:
-        """See ``Geometry``: about the surface's point, as the step has them."""
+        """See ``Geometry``: lever arms about the point of the surface, in the step."""
         surface = self.surface
         if frames.arms is not None:
             return frames.arms
@@ -128,7 +139,7 @@ class RigidGeometry(NodalGeometry):
         return self.surface.distances(x)
 
     def check_start(self, contact: Contact, body: ElasticBody) -> str:
-        """See ``Geometry``: planes whose normal shows away from the body, and bodies that start deep inside one."""
+        """See ``Geometry``: a warning of a wrong normal of a plane, or of large penetration."""
         surface, gdim = self.surface, contact.points.dim
         x = body.displacements.x[:, :gdim]
         with raised_together(body.comm):
@@ -144,7 +155,10 @@ class RigidGeometry(NodalGeometry):
     # -- the way of a step ---------------------------------------------------------------------
 
     def turned_to(self, surface: Surface, history: History) -> np.ndarray:
-        """Rotation vector, in 2-D angle, by which a surface has turned since the last step, in its axes."""
+        """Return the rotation of a surface since the last step, in its axes, radians.
+
+        It is a rotation vector, in 2-D an angle.
+        """
         return surface.own_axes(rotation_between(history.frames.ended, surface.rotation))
 
     def way(
@@ -155,17 +169,20 @@ class RigidGeometry(NodalGeometry):
         distance: np.ndarray,
         history: History,
     ) -> np.ndarray:
-        """By what the way along the surface since the last step is more than its chord, ``shape=(n, gdim - 1)``, local frame.
+        """Return path minus chord of each node's motion on the surface since the last step.
 
-        Relative to the surface the nearest point goes round from one normal to the other, and about the normal as the
-        surface turns.  A chord ``c`` of a turn ``psi`` belongs to the way ``(a cot a) c + psi x c / 2``, ``a = |psi| / 2``, in
-        directions of its end, with ``a cot a`` across the axis and 1 along it.
+        The array has ``shape=(n, gdim - 1)``, local frame, length.  Relative to the surface, the
+        nearest point moves on an arc whose normal turns from that at the start to that at the end;
+        a rotation of the surface adds a turn about the normal.  For a chord ``c`` and a total turn
+        ``psi``, the path is ``(a cot a) c + psi x c / 2`` with ``a = |psi| / 2``, in the directions
+        at its end.  The factor ``a cot a`` applies across the axis of ``psi``; along the axis, it
+        is 1.
 
         Args:
-            surface: As it stands at the end.
+            surface: Surface in its pose at the end.
             y: Positions at the end, relative to the surface, in its axes, ``shape=(n, gdim)``.
-            own, distance: Frames and distances there.
-            history: Of the steps before.
+            own, distance: Frames and distances at these positions.
+            history: History variables from the last step.
         """
         began = self.started(history)
         n1, n0 = own[..., -1, :], surface.frames(began)[..., -1, :]
@@ -174,11 +191,18 @@ class RigidGeometry(NodalGeometry):
         return times(own[..., :-1, :], way - (y - began))
 
     def started(self, history: History) -> np.ndarray:
-        """Positions relative to the surface at the end of the last step, in its axes, ``shape=(n, gdim)``."""
+        """Return positions relative to the surface at the start of the step, ``shape=(n, gdim)``.
+
+        They are given in axes that move with the surface.
+        """
         return self.x + turned_back(history.frames.own, history.last.displacement)
 
     def ended_at(self, u: np.ndarray) -> tuple[Surface, np.ndarray]:
-        """The surface with what it turns in the step, and positions in space for a displacement of owned degrees of freedom."""
+        """Return the surface with its rotation at the end of the step, and positions of the nodes.
+
+        Args:
+            u: Displacement of owned degrees of freedom.
+        """
         surface = self.surface
         if surface.spin is not None:
             surface = copy(surface)
@@ -186,7 +210,14 @@ class RigidGeometry(NodalGeometry):
         return surface, self.x + u[self._dofs]
 
     def turned_past(self, displacement: np.ndarray, frames: Frames) -> np.ndarray:
-        """Displacements relative to the surface with what a rotation found in the step is beyond the first order."""
+        """Return displacements relative to the surface, corrected for the step's finite rotation.
+
+        The step itself treats a free rotation to first order.
+
+        Args:
+            displacement: Displacements relative to the surface, ``shape=(n, gdim)``, local frame.
+            frames: Frames of the step.
+        """
         ended = copy(self.surface)
         ended.end_step()
         moved = turned_back(frames.frame, displacement) + self.of_surface(frames)
@@ -208,14 +239,20 @@ class RigidGeometry(NodalGeometry):
 
 
 def _round(chord: np.ndarray, n0: np.ndarray, n1: np.ndarray, turned: np.ndarray) -> np.ndarray:
-    """Ways of these chords, see ``RigidGeometry.way``; ``turned`` is the surface's rotation in its own axes."""
+    """Return the paths of given chords, see ``RigidGeometry.way``, ``shape=(n, gdim)``, length.
+
+    Args:
+        chord: Chords, ``shape=(n, gdim)``, length.
+        n0, n1: Normals at start and end, ``shape=(n, gdim)`` or ``(gdim,)``.
+        turned: Rotation of the surface, in its own axes, radians.
+    """
     n0, n1 = np.broadcast_to(n0, chord.shape), np.broadcast_to(n1, chord.shape)
     if chord.shape[1] == 2:
         across = n0[:, 0] * n1[:, 1] - n0[:, 1] * n1[:, 0]
         psi = np.arctan2(across, (n0 * n1).sum(axis=1))
         psi = np.clip(psi, -LONGEST_TURN, LONGEST_TURN)[:, None]
         turning = psi * np.column_stack((-chord[:, 1], chord[:, 0]))
-        return _cot(np.abs(psi) / 2) * chord + turning / 2
+        return _a_cot_a(np.abs(psi) / 2) * chord + turning / 2
     across = np.cross(n0, n1)
     sine = np.linalg.norm(across, axis=1)
     angle = np.arctan2(sine, (n0 * n1).sum(axis=1))
@@ -225,9 +262,9 @@ def _round(chord: np.ndarray, n0: np.ndarray, n1: np.ndarray, turned: np.ndarray
     axis = np.divide(psi, size, np.zeros_like(psi), where=size > 0)
     size = np.minimum(size, LONGEST_TURN)
     along = (axis * chord).sum(axis=1, keepdims=True) * axis
-    return _cot(size / 2) * (chord - along) + along + size * np.cross(axis, chord) / 2
+    return _a_cot_a(size / 2) * (chord - along) + along + size * np.cross(axis, chord) / 2
 
 
-def _cot(a: np.ndarray) -> np.ndarray:
-    """``a cot a``, 1 at zero."""
+def _a_cot_a(a: np.ndarray) -> np.ndarray:
+    """Return ``a cot a``, which is 1 at zero."""
     return np.divide(a, np.tan(a), np.ones_like(a), where=a > 0)

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What a contact hands from one step to the next, and its laws, as arrays by name; those of this rank's nodes."""
+"""History variables and laws of a contact as arrays by name, for this rank's nodes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ from dolfinx_contact.support.attributes import frozen
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
 
+# Arrays of ``State`` in a checkpoint: all but the prescribed slip ``known``.
 STATE_FIELDS = State._fields[:-1]
 
 
 def saved_of(contact: Contact) -> dict[str, np.ndarray]:
-    """All that the next step starts from, and the laws."""
+    """Return all data from which the next step starts, and the laws, as arrays by name."""
     history, surface = contact.history, contact.surface
-    arrays = _of(history) | contact.laws.save(contact) | {"plane": surface.displacement}
+    arrays = _history_arrays(history) | contact.laws.save(contact) | {"plane": surface.displacement}
     if history.friction is not None:
         arrays["law_of_last_step"] = rows(history.friction, contact.nodes.size)
     if surface.placed.any():
@@ -38,16 +39,20 @@ def saved_of(contact: Contact) -> dict[str, np.ndarray]:
     return arrays | contact.geometry.save(history.frames)
 
 
-def _of(history: History) -> dict[str, np.ndarray]:
+def _history_arrays(history: History) -> dict[str, np.ndarray]:
     sums = {
         name: values for name, values in history.sums.items() if name != OPPOSITE_WEAR
-    }  # of other nodes
+    }  # the omitted array belongs to nodes of the other side
     return {name: getattr(history.last, name) for name in STATE_FIELDS} | sums
 
 
 def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
-    """Raise a ``ValueError`` if an array is missing or of another size, or another law or surface was saved."""
-    for name, array in _of(contact.history).items():
+    """Raise a ``ValueError`` if the arrays of a checkpoint do not fit a contact.
+
+    They do not fit if an array is missing or of another shape, if values are impossible, or if
+    another law or surface was saved.
+    """
+    for name, array in _history_arrays(contact.history).items():
         if name not in arrays or arrays[name].shape != array.shape:
             found = arrays[name].shape if name in arrays else "nothing"
             raise ValueError(
@@ -66,7 +71,10 @@ def check_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
-    """Take back what ``saved_of`` returned, with the same nodes on this rank; see ``check_saved``."""
+    """Restore the data that ``saved_of`` returned, with the same nodes on this rank.
+
+    The arrays must have passed ``check_saved``.
+    """
     surface, geometry, frames = contact.surface, contact.geometry, contact.history.frames
     placed = frozen(np.array(arrays.get("placed_rotation_of_plane", surface.placed)))
     surface.place(arrays.get("rotation_of_plane", np.zeros_like(surface.rotation)), placed)

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Polynomials of facets."""
+"""Monomial bases of the shape functions of facets."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ import numpy as np
 
 
 def monomials(at: np.ndarray, corners: int, degree: int) -> np.ndarray:
-    """Monomials that span the shape functions of intervals, triangles or quadrilaterals, ``shape=(..., k)``."""
+    """Monomials that span the shape functions of an interval, triangle or quadrilateral.
+
+    Args:
+        at: Points, ``shape=(..., dim)``.
+        corners: Number of corners of the facet.
+        degree: Polynomial degree.
+
+    Returns:
+        Values at the points, ``shape=(..., k)``.
+    """
     powers = np.arange(degree + 1)
     if at.shape[-1] == 1:
         return at**powers

@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Nodes that belong to several contacts, as in corners, edges and grooves: the reaction of each contact.
+"""Reactions of each contact at nodes that belong to several contacts, as in corners and grooves.
 
-The body tells of such a node the sum of its reactions alone.  The law tells the rest: reactions of each contact are those
-of the contact problem of the node by itself (``nodal.py``).  In a solution of the step its spring is not stretched, and
-what is left of it is the law of every contact.  With one contact alone it is what the return map does at any node.
+Equilibrium of the body determines only the sum of the reactions at such a node.  The reaction of
+each contact follows from a local contact problem of the node on a spring (``nodal.py``).  At the
+solution of the step the spring is unloaded, and each contact satisfies its own law.  For a node of
+a single contact, the local problem is the usual return map.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.contact.state import State
 
-# By which the product of two unit normals may miss one for them to be the same.
+# Two unit normals count as equal if their scalar product exceeds one minus this tolerance.
 SAME_NORMAL = 1e-12
 
-# By how much what a start leaves may have grown before all others are tried.
+# Growth of a node's error measure, over its smallest value so far, above which all other initial
+# reactions are tried.
 START_GROWTH = 2.0
 
 
 def shared_nodes(contacts: Sequence[ContactStep], fixed: np.ndarray) -> SharedNodes | None:
-    """The nodes of this rank that belong to several contacts, None if there are none.  Collective.
+    """Nodes of this rank that belong to several contacts, or None without such nodes.  Collective.
 
     Args:
         contacts: All contacts of a body.
-        fixed: Owned degrees of freedom that boundary conditions fix.
+        fixed: Owned degrees of freedom with boundary conditions.
     """
     if len(contacts) < 2:
         return None
@@ -45,16 +47,18 @@ def shared_nodes(contacts: Sequence[ContactStep], fixed: np.ndarray) -> SharedNo
 
 
 def shares_of(contacts: Sequence[ContactStep], nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which contacts have the same normal at nodes, and the part of what presses there that each of those carries.  Collective.
+    """Pairs of contacts with the same normal at a node, and the share of the force of each contact.
 
-    Two contacts on one face leave open how the reaction of a node of their common edge is shared; it is by area.
+    If two contacts meet on one face, equilibrium does not determine how they share the reaction of
+    a node on their common edge.  They share it in the ratio of their nodal areas.  Collective.
 
     Args:
         contacts: The contacts.
-        nodes: Sorted, ``shape=(m,)``.
+        nodes: Local node indices, sorted, ``shape=(m,)``.
 
     Returns:
-        ``shape=(m, n, n)``, booleans, false on the diagonal; and ``(m, n)``, one where no other has the same normal.
+        Whether two contacts have the same normal, ``shape=(m, n, n)``, bool, false on the diagonal;
+        and the shares, ``shape=(m, n)``, one where no other contact has the same normal.
     """
     n, dim = len(contacts), contacts[0].points.dim
     normals, area = np.zeros((nodes.size, n, dim)), np.zeros((nodes.size, n))
@@ -72,9 +76,15 @@ def shares_of(contacts: Sequence[ContactStep], nodes: np.ndarray) -> tuple[np.nd
 
 
 def mean_laws(laws: list[Friction], contacts: Sequence[ContactStep]) -> list[Friction]:
-    """Friction of each contact with, at nodes of several contacts with the same normal, the mean of theirs by shares.  Collective.
+    """Friction of each contact, averaged at nodes where several contacts have the same normal.
 
-    That of the node as a whole, for solvers that do not know of shares: exact where it is isotropic, along principal directions else.
+    Coefficients there are means, weighted by the shares of ``shares_of``.  They describe the node
+    as a whole, for solvers that do not split reactions.  The means are exact for isotropic
+    friction, and otherwise along the principal directions.  Collective.
+
+    Args:
+        laws: Friction of each contact.
+        contacts: The contacts.
     """
     if len(contacts) < 2:
         return laws
@@ -112,13 +122,13 @@ def any_shared(contacts: Sequence[ContactStep]) -> bool:
 
 
 class Split(NamedTuple):
-    """How reactions of shared nodes were split in a state.
+    """Solution of the local problems of the shared nodes in one state.
 
     Attributes:
-        problems: Those of all nodes.
-        required: What each contact is asked for, ``shape=(m, n gdim)``.
-        start: Of each node the start that served last, ``shape=(m,)``.
-        least: The least that this start has left, ``shape=(m,)``.
+        problems: Local contact problems of all shared nodes.
+        required: Trial reactions of all contacts, ``shape=(m, n gdim)``, local frames.
+        start: Index of the initial reactions that each node used last, ``shape=(m,)``.
+        least: Smallest error measure found with these initial reactions, ``shape=(m,)``, force.
     """
 
     problems: NodalProblems
@@ -128,12 +138,13 @@ class Split(NamedTuple):
 
 
 class SharedNodes:
-    """``m`` nodes of ``n`` contacts in one step; nothing in it changes.
+    """The ``m`` nodes that belong to several of ``n`` contacts, in one step; immutable.
 
     Args:
-        contacts: ``ContactStep`` of all contacts; the spring of a node is the mean of its normal stiffnesses.
-        fixed: Owned degrees of freedom that boundary conditions fix.
-        nodes: The nodes, sorted, ``shape=(m,)``.
+        contacts: ``ContactStep`` of all contacts.  The spring stiffness of a node is the mean of
+            its normal stiffnesses.
+        fixed: Owned degrees of freedom with boundary conditions.
+        nodes: Local node indices, sorted, ``shape=(m,)``.
         alike, shares: As ``shares_of`` returns them.
     """
 
@@ -172,21 +183,25 @@ class SharedNodes:
         near: Sequence[np.ndarray],
         known: Split | None,
     ) -> tuple[tuple[np.ndarray, ...], Split]:
-        """What the body requires of each contact, with the reactions of shared nodes as they are split; and how they are.
+        """Trial reactions of each contact, split at shared nodes, and the ``Split`` itself.
 
-        With friction a node may have several solutions: that one is taken which moves it least, of equal ones that from
-        the last reactions.  Where none is found so, those near may lead to one: those of a solver that knows them.
-        A node keeps its start while what is left of its problem, and moves it, falls.
+        With friction a local problem may have several solutions.  The one with the smallest error
+        measure is used; solutions that start from the last reactions are preferred.  A node keeps
+        its initial reactions until the error measure grows beyond ``START_GROWTH`` times its
+        smallest value.
 
         Args:
             contacts: All contacts.
-            tol: Largest error of the step.
-            x: Displacement of owned degrees of freedom.
-            c: Motions of surfaces.
+            tol: Tolerance of the step.
+            x: Displacement, owned degrees of freedom.
+            c: Motions of the surfaces driven by forces.
             forces: Forces on the body at the nodes, owned degrees of freedom.
-            alone: Required of each contact as if it were alone.
-            near: Reactions of each contact from which to try, too.
-            known: The split of the state before.
+            alone: Trial reactions of each contact without other contacts, ``shape=(k, gdim)`` each.
+            near: Reactions of each contact that serve as further initial values, same shapes.
+            known: The split of the previous state, if any.
+
+        Returns:
+            Trial reactions of each contact, ``shape=(k, gdim)`` each, local frames; and the split.
         """
         (m, n, dim), every = self._shape, np.arange(self._shape[0])
         force, states = forces[self._dofs], []
@@ -224,7 +239,7 @@ class SharedNodes:
         force: np.ndarray,
         nodes: np.ndarray,
     ) -> NodalProblems:
-        """The problems of some of the nodes, which may be named several times."""
+        """Local contact problems of the shared nodes with indices ``nodes``, which may repeat."""
         parts = []
         for contact, rows, slots, state in zip(contacts, self._rows, self._slots, states):
             mine = np.flatnonzero(np.isin(nodes, slots))
@@ -237,11 +252,15 @@ class SharedNodes:
         return NodalProblems(parts, *(part[nodes] for part in given))
 
     def coupled(self, derivatives: Sequence[tuple], split: Split) -> list[tuple]:
-        """Derivatives of new reactions by the forces on the nodes and by the motion, from those by what each is asked for.
+        """Derivatives of the new reactions by nodal forces and motions, with shared nodes coupled.
 
         Args:
-            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
-            split: Of the state.
+            derivatives: For each contact, derivatives of its return map by the trial reaction
+                (``R_r``) and by the motion (``R_u``), ``shape=(k, gdim, gdim)`` each, local frame.
+            split: The split of the state, as ``split`` returns it.
+
+        Returns:
+            The same pairs, changed at the shared nodes.
         """
         _, by_asked, by_motion = split.problems.linearised(split.required)
         C, F, asks = split.problems.coupling, split.problems.stacked, split.problems.asks

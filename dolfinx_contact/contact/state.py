@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What the nodes of a contact do, did at the end of the last step, and have summed up since the start."""
+"""State and history variables of the nodes of a contact."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Status of a contact node, the branch that the projection took.  After a step, slip below its ``tol`` counts as stick.
+    """Status of a contact node, which is the branch of the projection on the friction cone.
+
+    After a step, a node whose slip is below the step's ``tol`` is reported as sticking.
 
     Example:
-        >>> slipping = contact.x[contact.status == dc.Status.SLIP]  # where the nodes are that slip
+        >>> slipping = contact.x[contact.status == dc.Status.SLIP]  # positions of slipping nodes
     """
 
     OPEN = 0
@@ -30,42 +32,52 @@ class Status(IntEnum):
 
 
 class State(NamedTuple):
-    """A state of ``n`` contact nodes; read-only arrays, local frame."""
+    """State of ``n`` contact nodes at one displacement; read-only arrays, local frame."""
 
-    displacement: np.ndarray  # of the node relative to the surface, (n, gdim)
-    reaction: np.ndarray  # (n, gdim)
-    gap: np.ndarray  # (n,)
-    slip_increment: np.ndarray  # (n, gdim - 1)
-    status: np.ndarray  # (n,)
-    known: np.ndarray | None = (
-        None  # part of the slip that supports prescribe, (n, gdim - 1); None where there is none
-    )
+    displacement: np.ndarray  # relative to the surface, (n, gdim), length
+    reaction: np.ndarray  # force on the node, (n, gdim)
+    gap: np.ndarray  # (n,), length
+    slip_increment: np.ndarray  # in the step, (n, gdim - 1), length
+    status: np.ndarray  # ``Status``, (n,), integers
+    # Slip prescribed by boundary conditions, (n, gdim - 1), length; None for zero:
+    known: np.ndarray | None = None
 
 
 def frozen_state(state: State) -> State:
-    """The state with read-only arrays."""
+    """Return a copy of a state whose arrays are read-only."""
     return State(*(None if array is None else frozen(array) for array in state))
 
 
+# Names of the sums since the start in ``History.sums``, one value per contact node.
 SUM_NAMES = ("dissipation", "slip_path", "wear_depth")
+# Slip of sticking nodes since they last slipped, in ``History.sums``.
 SLIP_KEPT = "slip_kept"
-OPPOSITE_WEAR = "opposite_wear_depth"  # at nodes of a deformable surface that wears
+
+# Worn depth at the nodes of a deformable surface that wears, in ``History.sums``.
+OPPOSITE_WEAR = "opposite_wear_depth"
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """All that a contact hands from one step to the next, ``n`` nodes.  All arrays are read-only.
+    """History variables of a contact with ``n`` nodes between two steps; read-only.
 
     Attributes:
-        last: ``State`` at the end of the last step that converged, in its frames.
-        frames: Those of that step, with the surface where it has ended.
-        sums: Since the start, and slip that sticking nodes have kept, arrays by name.
-        friction: The law of that step; None before the first.
-        worn: Depths of all nodes of a deformable surface that wears, of all ranks; None where none does.
-        bare: Nodes opposite nothing where that step has ended, ``shape=(n,)``; None as the frames say.
-        landed_after: In that step, slip before nodes touched, ``shape=(n, gdim - 1)``; None is none.
-        doubtful_work: Of that step, on this rank: by how much slip that went straight on would have another frictional work; None where it cannot turn.
-        unloads: Depths worn in that step, and the larger normal reaction of its ends, ``shape=(n,)`` each; None before the first.
+        last: ``State`` at the end of the last converged step, in the frames of that step.
+        frames: ``Frames`` of that step, with the pose of the surface at its end.
+        sums: Arrays by name: the sums since the start, and the slip of sticking nodes since they
+            last slipped.
+        friction: Friction law of the last step; None before the first step.
+        worn: Worn depths of all nodes of a deformable surface, on every rank; None if it does not
+            wear.
+        bare: Nodes that face no part of the surface at the end of the last step, ``shape=(n,)``,
+            booleans; None if the flags in ``frames`` apply.
+        landed_after: Tangential motion in the last step before nodes touched,
+            ``shape=(n, gdim - 1)``; None for zero.
+        doubtful_work: Sum over this rank's nodes of the part of the last step's frictional work
+            that is due to a change of slip direction.  None if friction is two-dimensional or the
+            same in all directions.
+        unloads: Depth worn in the last step, and the larger of the normal reactions at its two
+            ends, ``shape=(n,)`` each; None before the first step.
     """
 
     last: State
@@ -80,21 +92,21 @@ class History:
 
     @staticmethod
     def of(state: State, frames: Frames) -> History:
-        """No history: a state, and all sums zero."""
+        """Return the initial history: a given state, with all sums zero."""
         sums = {name: frozen(np.zeros(len(state.gap))) for name in SUM_NAMES}
         sums[SLIP_KEPT] = frozen(np.zeros_like(state.slip_increment))
         return History(frozen_state(state), frames, sums)
 
     @property
     def empty(self) -> bool:
-        """Whether no step was made; the same on all ranks."""
+        """Whether no step has been completed; the same on all ranks."""
         return self.friction is None
 
     @property
     def slip_kept(self) -> np.ndarray:
-        """Slip since nodes that stick have last slipped, ``shape=(n, gdim - 1)``."""
+        """Slip of sticking nodes since they last slipped, ``shape=(n, gdim - 1)``, length."""
         return self.sums[SLIP_KEPT]
 
     def but(self, **parts: Any) -> History:
-        """The same with other parts."""
+        """Return a copy in which the given attributes are replaced."""
         return replace(self, **parts)

@@ -1,6 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What a step wears off the nodes of a contact and off a deformable surface, by Archard's law, see ``law/wear.py``."""
+"""Depths worn in a step off the contact nodes and off a deformable surface, by Archard's law.
+
+See ``law/wear.py``.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,22 @@ if TYPE_CHECKING:
 
 
 def worn_by(step: ContactStep, work: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Depth that gaps open by, ``shape=(n,)``, its part of the contact's own nodes, and that of nodes opposite, ``shape=(k,)``.  Collective.
+    """Return the gap opened by the wear of a step, and the worn depths of both sides.  Collective.
 
     Args:
         step: The contact in the step.
         work: Frictional work of the step along each principal direction, ``shape=(n, gdim - 1)``.
 
     Returns:
-        Lengths; None is the last one where the other side does not wear.
+        The opened gap, ``shape=(n,)``; the part of it that the contact's own nodes lose,
+        ``shape=(n,)``; and the depth that opposite nodes lose, ``shape=(k,)``, None if the other
+            side
+        does not wear.  Lengths.
     """
     contact, wear = step.given, step.given.wear
     depth = step.depth
     if depth is None:
-        depth = _begun(contact, work) * _rate(contact, work)
+        depth = _wearing_fraction(contact, work) * _worn_depth(contact, work)
     if not wear.opposite.any():
         return depth, depth, None
     other = depth * wear.opposite_share(work, contact.laws.wear_field)
@@ -40,14 +46,15 @@ def worn_by(step: ContactStep, work: np.ndarray) -> tuple[np.ndarray, ...]:
 def wear_rates(
     step: ContactStep, state: State, u: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Depth that the slip of a state wears under the force at the start of the step, and that per normal force at its end.
+    """Return depths worn under the force at the start of a step, and per normal force at its end.
 
-    Nodes that stick wear nothing.
+    Nodes that stick do not wear.
 
     Args:
         step: The contact in the step.
-        state: The state.
-        u: Its displacement, owned degrees of freedom; None is the last one.
+        state: State at the end of the step.
+        u: Displacement of owned degrees of freedom of this state; None to keep the slips of
+            ``state``.
 
     Returns:
         Length, and length per force, ``shape=(n,)`` each.
@@ -62,16 +69,19 @@ def wear_rates(
     works = step.works(slip, unit)[:2]
     start, end = (2.0 * contact.repeats * work for work in works)  # a half each
     force = np.maximum(state.reaction[:, -1:], 0.0)
-    begun = _begun(contact, 0.5 * (start + force * end))
-    return begun * _rate(contact, start), begun * _rate(contact, end)
+    begun = _wearing_fraction(contact, 0.5 * (start + force * end))
+    return begun * _worn_depth(contact, start), begun * _worn_depth(contact, end)
 
 
-def _rate(contact: Contact, work: np.ndarray) -> np.ndarray:
+def _worn_depth(contact: Contact, work: np.ndarray) -> np.ndarray:
     return contact.wear.depth(work, contact.whole_area, contact.laws.wear_field)
 
 
-def _begun(contact: Contact, work: np.ndarray) -> np.ndarray | float:
-    """Part of the work of a step that is above the threshold of wear, ``shape=(n,)``."""
+def _wearing_fraction(contact: Contact, work: np.ndarray) -> np.ndarray | float:
+    """Return the fraction of a step's frictional work above the threshold of wear, ``shape=(n,)``.
+
+    It is the number 1 without a threshold.
+    """
     if not contact.wear.threshold:
         return 1.0
     return contact.wear.part(work.sum(axis=1), contact.dissipation, contact.whole_area)

@@ -1,11 +1,13 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The geometry of a step: whether its way can be followed, and how far it is from that with which the step was solved.
+"""Lagged geometry of a step, and the geometry error at its end.
 
-A step is solved with a tangent plane, arms and a way along the surface for each node.  They are exact at one position.
-What is missed at the end counts as force: a length times the stiffness of its node, an angle times the reaction, an arm
-times the reaction over the largest arm.  On deformable surfaces, whose rows are exact for one displacement, it is the forces on both
-bodies that those of the end would make.
+For each node, a step is solved with a fixed tangent plane, lever arm and path along the surface,
+which are exact at one position.  The geometry error at the end of the step is measured as a force:
+an error of length times the stiffness of the node, an error of angle times the reaction, and an
+error of lever arm times the reaction over the largest arm.  On deformable surfaces, whose mortar
+rows are exact for one displacement, it is the difference between the forces on both bodies with the
+rows used and with those of the end.
 """
 
 from __future__ import annotations
@@ -28,21 +30,24 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# How often a step is repeated with the geometry of its end.
+# Largest number of repetitions of a step with the geometry of its end, on rigid surfaces.
 MOST_REPETITIONS = 5
 
-# The same with deformable surfaces, and differences of ends that are mixed.
+# Largest number of repetitions on deformable surfaces, where convergence is slower.
 MOST_RENEWALS = 24
+
+# Number of differences in Anderson's method.
 MIXED_ENDS = 5
 
 
 class EndGeometry(Lagged):
-    """Frames, gaps and ways: those of the displacement at which the step has ended.
+    """Lagged frames, gaps and paths along the surface, evaluated at the end of the step.
 
     Args:
         step: The step.
-        tol: Largest error of the geometry.
-        step_at: The step with frames of a displacement, from the step before.
+        tol: Largest geometry error, relative to the reactions.
+        step_at: Function of the previous version of the step and a displacement; it returns the
+            step with the frames at this displacement.
     """
 
     def __init__(
@@ -73,14 +78,14 @@ class EndGeometry(Lagged):
 
 
 class Ends:
-    """Displacements, and poses of surfaces, whose geometry a step is repeated with: those at which it has ended.
+    """Sequence of displacements and surface poses at which the geometry of a step is evaluated.
 
-    After the first one, they are mixed by Anderson's method where they answer to the geometry: rows on deformable surfaces follow the
-    displacement of facets, which in soft bodies follows the rows nearly as far; a platen that turns freely, and pushes a slender body
-    aside by that, tilts to and fro.
+    The first one is the end of the first solution.  Later ones are accelerated by Anderson's method
+    if the solution depends strongly on the geometry, where a plain fixed-point iteration may
+    oscillate: on deformable surfaces of soft bodies, and with surfaces that rotate freely.
 
     Attributes:
-        most: How often a step is repeated.
+        most: Largest number of repetitions of a step.
     """
 
     def __init__(self, body: ElasticBody, contacts: Sequence[Contact]):
@@ -93,11 +98,17 @@ class Ends:
             self._mix = Anderson(size, MIXED_ENDS, body.total)
 
     def _poses(self) -> list[np.ndarray]:
-        """Displacement and rotation of each surface that turns freely, as lengths."""
+        """Return displacement and rotation of each freely rotating surface, as lengths."""
         return [np.append(s.displacement, self._arm * s.rotation) for s in self._turning]
 
     def after(self, x: np.ndarray) -> np.ndarray:
-        """The next one, after a solution with the last one ended at ``x``, owned degrees of freedom; surfaces take their poses.  Collective."""
+        """Return the next displacement for the geometry of the step.  Collective.
+
+        Freely rotating surfaces are moved to the corresponding poses.
+
+        Args:
+            x: Displacement at the end of the last solution, owned degrees of freedom.
+        """
         at, self._at = self._at, np.concatenate((x, *self._poses()))
         if at is not None and self._mix is not None:
             self._at = self._mix.step(at, self._at - at)[0]
@@ -111,30 +122,33 @@ class Ends:
 
 
 def geometry_error(state: StepState, S: float) -> float:
-    """Forces by which the geometry at the end of a step differs from that used, over the reactions.  Collective.
+    """Return the geometry error at the end of a step, relative to the reactions.  Collective.
 
     Args:
-        state: The state, with surfaces where it has them.
+        state: State at the end, with the surfaces moved to their positions in it.
         S: Norm of the reactions.
     """
     body, squares = state.step.body, np.zeros(3)
-    for contact, nodes in _changing(state):
+    for contact, nodes in _changing_contacts(state):
         missed = contact.given.geometry.missed(contact, nodes, state.x, body.fixed)
         squares += [np.square(force).sum() for force in missed]
-    parts = [*np.sqrt(body.total(squares)), *_moments(state)]
+    parts = [*np.sqrt(body.total(squares)), *_moment_errors(state)]
     left = float(max(parts))
     return left / S if S > 0.0 else (np.inf if left > 0.0 else 0.0)
 
 
-def _changing(state: StepState) -> list[tuple[ContactStep, State]]:
-    """Contacts whose geometry changes in the step, with their nodes."""
+def _changing_contacts(state: StepState) -> list[tuple[ContactStep, State]]:
+    """Return the contacts whose geometry changes in the step, with their nodal states."""
     both = zip(state.step.contacts, state.nodes)
     return [(contact, nodes) for contact, nodes in both if contact.given.changes]
 
 
-def _moments(state: StepState) -> list[float]:
-    """Of moments about the points of surfaces that turn, over their largest arm.  Collective."""
-    missed, body, changing = [], state.step.body, _changing(state)
+def _moment_errors(state: StepState) -> list[float]:
+    """Return errors of moments on freely rotating surfaces, as forces.  Collective.
+
+    Each is the error of the moment about the surface's point, divided by its largest lever arm.
+    """
+    missed, body, changing = [], state.step.body, _changing_contacts(state)
     for surface in surfaces_of(contact for contact, _ in changing if contact.surface.spins):
         sums, arms = np.zeros(surface.rotation.size), [np.zeros(1)]
         for contact, nodes in changing:
@@ -153,10 +167,10 @@ def _moments(state: StepState) -> list[float]:
 
 
 def too_long(state: StepState) -> str:
-    """Where the way of a step cannot be followed, in words; empty where it can.  Collective."""
+    """Return a message if a node moves too far along its surface, else "".  Collective."""
     step, lost = state.step, [(2.0, "")]
     at = state.x, step.last if step.body.nonlinear else None
-    lost += [c.given.geometry.too_long(c, nodes, *at) for c, nodes in _changing(state)]
+    lost += [c.given.geometry.too_long(c, nodes, *at) for c, nodes in _changing_contacts(state)]
     part, message = min(step.body.comm.allgather(min(lost)))
     if part > 1.0:
         return ""
@@ -164,7 +178,13 @@ def too_long(state: StepState) -> str:
 
 
 def undivided(missed: float, tol: float, repeated: int) -> str:
-    """What to say of a step whose geometry stays different, in words."""
+    """Return the error message for a step whose geometry has not converged.
+
+    Args:
+        missed: Geometry error, relative to the reactions.
+        tol: Its tolerance.
+        repeated: Number of repetitions of the step.
+    """
     other = "; if that does not help, let the other body carry the unknowns" * (
         repeated == MOST_RENEWALS
     )

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Friction that follows the state at the end of a step."""
+"""Friction laws that depend on the state at the end of a step, as lagged quantities."""
 
 from __future__ import annotations
 
@@ -19,16 +19,21 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# The largest factor by which changes of the reactions are taken to fall from one solution to the next.
+# Largest assumed convergence rate, for the estimate of the forward error.
 SLOWEST_RATE = 0.9
 
-# Tolerance of a solution on the way: at most this one, and this part of the last change of the reactions.
+# Largest tolerance of intermediate solutions.
 ROUGH_TOL = 1e-3
+
+# Tolerance of intermediate solutions, relative to the last change of the reactions.
 PART_OF_CHANGE = 0.03
 
 
 class LaggedFriction(Lagged):
-    """Laws that follow the state: the errors by which a step is judged are measured with those of the state found."""
+    """Base class of friction laws that depend on the state.
+
+    The final errors of a step are measured with the laws evaluated at its solution.
+    """
 
     limit, first_tol = 50, ROUGH_TOL
 
@@ -36,7 +41,7 @@ class LaggedFriction(Lagged):
         self._last = np.inf
 
     def friction(self, contact: ContactStep, state: State) -> Friction:
-        """The law of a contact in a state; ``contact.friction`` itself where it stays.  Collective."""
+        """Return the friction law at a state; ``contact.friction`` if unchanged.  Collective."""
         raise NotImplementedError
 
     def restarted(self, step: LoadStep) -> LoadStep:
@@ -60,7 +65,7 @@ class LaggedFriction(Lagged):
         return step.but(starts=(state.x,), motions=state.c)
 
     def _with_laws_of(self, state: StepState) -> LoadStep:
-        """The step with the laws of a state.  Collective."""
+        """Return the step with the friction laws evaluated at a state.  Collective."""
         step = state.step
         laws = [self.friction(*both) for both in zip(step.contacts, state.nodes)]
         changed = any(law is not k.friction for law, k in zip(laws, step.contacts))
@@ -70,7 +75,7 @@ class LaggedFriction(Lagged):
 
 
 class PressureFriction(LaggedFriction):
-    """Friction that follows the pressure."""
+    """Friction coefficients that depend on the contact pressure."""
 
     def friction(self, contact: ContactStep, state: State) -> Friction:
         given = contact.given

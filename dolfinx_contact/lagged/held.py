@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Whether planes that force drives are held by contact nodes which supports hold."""
+"""Surfaces driven by force and held by contact nodes with prescribed displacements."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ if TYPE_CHECKING:
 
 
 class HeldPlanes(Lagged):
-    """Planes that held nodes hold: those that they cannot hold slide, in the next solution and all later ones.
+    """Lagged status, held or sliding, of the surfaces that nodes held by supports may hold.
+
+    After the first solution, surfaces on which the friction of these nodes is exceeded slide, in
+    all later solutions of the step.
 
     Args:
-        step_again: The step anew, with planes held as they are given.
+        step_again: Function of the step and ``HeldSurfaces``; it returns the step with this status.
     """
 
     limit = 1

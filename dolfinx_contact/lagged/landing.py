@@ -1,11 +1,13 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Slip of nodes that touch during a part of a step alone: from where they land, or to where they open.
+"""Slip of nodes that close or open within a step.
 
-In the state in which nodes that land carry nothing, and all others what they carry at the end, such a node has the gap ``g < 0``.  On
-the way there from its gap ``g0`` at the start it touches at the part ``g0 / (g0 - g)`` of the step, and slip counts from there on.  A
-node that opens has the gap ``g < 0`` at the start without the reactions of those that open, and slips until the part
-``-g / (g1 - g)``, ``g1`` its gap at the end.
+Only slip while a node touches counts.  Consider a node that closes, with the gap ``g0 > 0`` at the
+start.  Without the reactions of all closing nodes, and with the final reactions of the others, its
+gap at the end is ``g < 0``.  By linear interpolation, it touches after the fraction
+``g0 / (g0 - g)`` of the step, and slip counts from there on.  Similarly, a node that opens has the
+gap ``g < 0`` at the start without the reactions of all opening nodes, and the gap ``g1`` at the
+end.  It slips up to the fraction ``-g / (g1 - g)`` of the step.
 """
 
 from __future__ import annotations
@@ -26,22 +28,23 @@ if TYPE_CHECKING:
 
 
 class SlipBeforeLanding(Lagged):
-    """Slip of nodes that land, which counts from where they touch; renewed together with the geometry.
+    """Lagged slip of closing nodes before they touch, which does not count as slip.
 
-    An estimate that is made stays for the step: friction, which answers to it, would move the next one to and fro.
+    It is updated together with the geometry.  Once estimated, the slip of a node before touching is
+    kept for the step, since friction depends on it and further estimates might oscillate.
 
     Args:
-        tol: Part of the reactions which does not matter.
+        tol: Negligible change of forces, relative to the reactions.
     """
 
     def __init__(self, tol: float):
         self._tol = tol
-        self._more: list[np.ndarray] | None = None  # slip that has turned out not to count
+        self._more: list[np.ndarray] | None = None  # additional slip before touching
 
     def change(self, found: SolverResult, goal: float) -> Change:
         state, step, self._more = found.state, found.state.step, None
         lands = [
-            _opened(k, state.x) & (s.reaction[:, -1] > 0.0)
+            _open_at_start(k, state.x) & (s.reaction[:, -1] > 0.0)
             for k, s in zip(step.contacts, state.nodes)
         ]
         new = [
@@ -49,14 +52,14 @@ class SlipBeforeLanding(Lagged):
             for k, at in zip(step.contacts, lands)
         ]
         slips = [nodes.slip_increment for nodes in state.nodes]
-        if _felt(state, slips, new, self._tol) <= self._tol:
+        if _friction_change(state, slips, new, self._tol) <= self._tol:
             return Change(True, state)
-        without = _without(state, lands)
+        without = _without_reactions(state, lands)
         if without is None:
             return Change(True, state)
         both = zip(step.contacts, new)
         before = [_before_touching(contact, without, state.c, at) for contact, at in both]
-        late = _felt(state, before, new, self._tol)
+        late = _friction_change(state, before, new, self._tol)
         self._more = before if late > self._tol else None
         return Change(late <= self._tol, state, late)
 
@@ -73,8 +76,11 @@ class SlipBeforeLanding(Lagged):
         return step.with_contacts(contacts)
 
 
-def _opened(contact: ContactStep, x: np.ndarray) -> np.ndarray:
-    """Nodes that were open at the start of a step, ``shape=(n,)``, booleans: what is left of gaps under reactions is none."""
+def _open_at_start(contact: ContactStep, x: np.ndarray) -> np.ndarray:
+    """Return whether each node was open at the start of a step, ``shape=(n,)``, booleans.
+
+    The gap must exceed rounding, and the last normal reaction must be zero.
+    """
     last = contact.last
     return (last.gap > contact.gap_rounding(x)) & (last.reaction[:, -1] == 0.0)
 
@@ -82,7 +88,15 @@ def _opened(contact: ContactStep, x: np.ndarray) -> np.ndarray:
 def _before_touching(
     contact: ContactStep, u: np.ndarray, c: np.ndarray, at: np.ndarray
 ) -> np.ndarray:
-    """Slips of some nodes up to where gaps close on the straight way to a displacement, ``shape=(n, gdim - 1)``, local frame."""
+    """Return the slip of nodes before they touch, ``shape=(n, gdim - 1)``, local frame, length.
+
+    Args:
+        contact: The contact.
+        u: Displacement at the end without reactions of closing nodes, owned degrees of freedom.
+            Gaps vary linearly up to this displacement.
+        c: Motions of surfaces driven by force, ``shape=(m,)``.
+        at: Nodes to consider, ``shape=(n,)``, booleans; the slip of others is zero.
+    """
     state = contact.at(u, c)
     slip = state.slip_increment + (0.0 if contact.before is None else contact.before)
     start, gap = np.maximum(contact.last.gap, 0.0), np.minimum(state.gap, 0.0)
@@ -90,10 +104,20 @@ def _before_touching(
     return np.where(at[:, None], part[:, None] * slip, 0.0)
 
 
-def _felt(
+def _friction_change(
     state: StepState, slips: Sequence[np.ndarray], at: Sequence[np.ndarray], tol: float
 ) -> float:
-    """How much friction changes with slips at most, over the reactions: by what they make, and twice what friction carries.  Collective."""
+    """Return a bound of the relative change of friction due to slips.  Collective.
+
+    The change is relative to the reactions.  The change at a node is at most the force due to the
+    slip, and at most twice the friction limit.
+
+    Args:
+        state: The state.
+        slips: Slip of the nodes of each contact, ``shape=(n, gdim - 1)``, length.
+        at: Nodes to consider, ``shape=(n,)``, booleans, for each contact.
+        tol: Negligible change of forces, relative to the reactions.
+    """
     step, squares = state.step, 0.0
     for contact, nodes, slip, here in zip(step.contacts, state.nodes, slips, at):
         slip = np.where(here[:, None], slip, 0.0)
@@ -105,10 +129,15 @@ def _felt(
     return size / step.reaction_scale(state, tol) if size > 0.0 else 0.0
 
 
-def _without(state: StepState, nodes: Sequence[np.ndarray]) -> np.ndarray | None:
-    """The displacement with which some nodes carry nothing, and all others what they carry.  Collective.
+def _without_reactions(state: StepState, nodes: Sequence[np.ndarray]) -> np.ndarray | None:
+    """Return the displacement of a state without the reactions of some nodes.  Collective.
 
-    A loose body would fall: it is left where it was placed if it touched nowhere, else nothing is known.
+    Other reactions are kept.  A body held by contact alone would not be in equilibrium: the result
+    is its initial position if it was open at all nodes at the start of the step, else None.
+
+    Args:
+        state: The state.
+        nodes: Nodes without reactions, ``shape=(n,)``, booleans, for each contact.
     """
     step, x = state.step, state.x
     if step.statics is not None:
@@ -123,12 +152,12 @@ def _without(state: StepState, nodes: Sequence[np.ndarray]) -> np.ndarray | None
 
 
 def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> Sequence[State]:
-    """States whose nodes that have opened in the step have slipped until they did.  Collective.
+    """Return nodal states in which the slip of opened nodes ends when they open.  Collective.
 
     Args:
-        state: The state at the end.
-        nodes: Those of its contacts, with their final gaps.
-        tol: Part of the reactions which does not matter.
+        state: The state at the end of the step.
+        nodes: State of each contact, with final gaps.
+        tol: Negligible force of the opened nodes, relative to the reactions.
     """
     step = state.step
     opens = [contact.opened(one) for contact, one in zip(step.contacts, nodes)]
@@ -143,14 +172,15 @@ def slip_up_to_opening(state: StepState, nodes: Sequence[State], tol: float) -> 
     for point_set, reaction in zip(points, before):
         point_set.add_forces(reaction, forces)
     forces[step.body.fixed] = 0.0
-    # Of a loose body each node alone: without reactions it would fall.
+    # For a body held by contact alone, which has no equilibrium without reactions, each node by
+    # itself.
     moved, found = step.body.solve(forces) if step.statics is None else None, []
     for k, (contact, point_set, one) in enumerate(zip(step.contacts, points, nodes)):
         alone = before[k][:, -1] / contact.stiffness.normal
         pressed = np.maximum(alone if moved is None else point_set.motion(moved)[:, -1], 0.0)
         beside = (
             contact.given.geometry.covered(contact.frames) == 0.0
-        )  # left the other side along the surface: that is no gap
+        )  # past an edge of the opposite surface: its gap is meaningless
         way = pressed + np.where(beside, 0.0, np.maximum(one.gap, 0.0))
         part = np.divide(pressed, way, np.ones_like(way), where=way > 0.0)
         part = np.where(opens[k], part, 1.0)

@@ -1,18 +1,23 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Depth that a step wears, as part of its equations.
+"""Wear depth within a step, as a lagged quantity.
 
-A node that slips by ``s`` wears by ``d = (1 - theta) c0 N0 + theta c r_n``, with the normal forces N0 at the start of the step and r_n at its end, and
-``c = k m s / A``, friction m per normal force, wear coefficient k, area A.  With ``theta = 1/2`` the volume is k times the frictional
-work (``law/dissipation.py``); that is taken where wear is gentle.  Where ``c kappa``, with a stiffness ``kappa`` of the node, is
-large, ``1 - theta = START / (c kappa)``: what is worn under the force at the start takes at most the part START of it from the node, and
-the step is one of backward Euler, which does not alternate.  How gentle a cycle is that counts many times (``contact.repeats``) one alone decides.
+A node that slips by ``s`` wears by the depth ``d = (1 - theta) c0 N0 + theta c r_n``.  Here, N0 and
+r_n are the normal forces at the start and end of the step, ``c0`` and ``c`` are the wear rates
+``k m s / A`` there, m is the friction per normal force, k the wear coefficient and A the area.
+With ``theta = 1/2``, the worn volume is k times the frictional work (``law/dissipation.py``); this
+is used if wear is slow.  If ``c kappa`` is large, with a stiffness ``kappa`` of the node,
+``1 - theta = START_SHARE / (c kappa)``.  Then wear due to the force at the start reduces the force
+on the node by at most the fraction START_SHARE of N0, and the step is nearly a backward Euler step,
+which does not oscillate.  For a cycle that counts many times (``contact.repeats``), ``c`` of one
+cycle decides.
 
-For given slip the second term is a spring in series with the surface.  The step is solved for given depths ``d``, and others follow
-from what is found: a node at another depth ``d'`` has the force ``r_n - kappa (d' - d)``, an open one
-``-kappa x_n - kappa (d' - d)``, none below zero.  The ``d'`` that this gives neither unloads the node nor is negative, whatever
-``c`` is.  Nodes move each other, which Anderson's method learns; ``kappa`` is twice the node's own stiffness, so that neighbours
-that give way together do not overshoot.
+For given slip, the second term acts as a spring in series with the surface.  The step is solved for
+given depths ``d``, which are then corrected.  At another depth ``d'``, a closed node has the force
+``r_n - kappa (d' - d)`` and an open node ``-kappa x_n - kappa (d' - d)``, at least zero.  The
+resulting ``d'`` does not unload the node and is not negative, for any ``c``.  Anderson's method
+accounts for the coupling of nodes; ``kappa`` is twice the diagonal stiffness of the node, so that
+neighbours that move together do not overshoot.
 """
 
 from __future__ import annotations
@@ -34,37 +39,42 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.base import SolverResult
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# Stiffness with which depths follow, over the node's own.
+# Factor between the diagonal stiffness of a node and ``kappa`` in the correction of depths.
 STIFFNESS_FACTOR = 2.0
 
-# Differences that Anderson's method keeps.
+# Number of differences in Anderson's method.
 MIXED_DEPTHS = 20
 
-# What is off has to fall to this part in so many rounds: else differences mislead, as where nodes open, close and stick, and twice
-# as many rounds do without.
+# The residual of the depths must fall to this fraction within FALL_ROUNDS iterations.  Otherwise,
+# Anderson's method is suspended for twice as many iterations, as when nodes change status.
 LEAST_FALL = 0.7
 FALL_ROUNDS = 10
 
-# In these rounds depths go this part of the way: the whole one may lead to and fro for ever.
+# Relaxation factor of the iterations without Anderson's method, which prevents oscillation.
 CAUTIOUS_PART = 0.5
 
-# Part of its force that what a step wears under the force at its start takes from a node, at most.
+# Largest fraction of the force on a node that wear due to the force at the start of the step
+# removes.
 START_SHARE = 0.01
 
-# In a jump of many cycles ``1 - theta`` is at most this, where one cycle is gentle: with far less, or with less the longer the jump,
-# a jump would go by another rule than the cycles that it stands for.  What alternates falls to 2/3 in a step.
+# Largest ``1 - theta`` in a jump of many cycles if one cycle wears slowly.  It is close to the 1/2
+# of single cycles, so that the jump follows nearly the same rule; oscillations still fall to 2/3 in
+# a step.
 JUMP_SHARE = 0.4
 
-# Part of ``geometry_tol`` that depths may be off.
+# Tolerance of the depths, relative to ``geometry_tol``.
 DEPTH_TOLERANCE = 0.1
 
 
 class WearOfStep(Lagged):
-    """Depths that a step wears at the nodes of its contacts; begins with the slip of the last step under its pressure.
+    """Lagged wear depths of a step at the nodes of its contacts.
+
+    The initial depths follow from the slip of the last step and the normal forces at its end.
 
     Args:
         step: The step.
-        tol: By how much forces may differ for depths that are off, over the reactions: a part of the geometry's.
+        tol: ``geometry_tol``.  The force due to the error of the depths, relative to the reactions,
+            must fall below the fraction ``DEPTH_TOLERANCE`` of it.
     """
 
     limit = 200
@@ -72,7 +82,7 @@ class WearOfStep(Lagged):
     def __init__(self, step: LoadStep, tol: float):
         self._body, self._tol, self._geometry_tol = step.body, DEPTH_TOLERANCE * tol, tol
         contacts = _wearing(step)
-        self._share = STIFFNESS_FACTOR * _shares([contact.given for contact in contacts])
+        self._share = STIFFNESS_FACTOR * _area_fractions([contact.given for contact in contacts])
         self._anderson = Anderson(self._share.size, MIXED_DEPTHS, step.body.total)
         self._best, self._stale = np.inf, 0
         forces = [contact.last.reaction[:, -1] for contact in contacts]
@@ -80,7 +90,7 @@ class WearOfStep(Lagged):
         self._depth = self._worn(contacts, kappa, nodes, None, forces)[0]
 
     def _stiffness(self, contacts: Sequence[ContactStep]) -> np.ndarray:
-        """With which nodes resist to depths: between bodies it follows the rows."""
+        """Return ``kappa`` of each node, ``shape=(n,)``, force per length."""
         return self._share * np.concatenate([k.stiffness.normal for k in contacts])
 
     def restarted(self, step: LoadStep) -> LoadStep:
@@ -89,7 +99,10 @@ class WearOfStep(Lagged):
         return self._with_depths(step)
 
     def change(self, found: SolverResult, goal: float) -> Change:
-        """Whether the depths are those that the state found wears; if not, finds others to solve the step with.  Collective."""
+        """Return whether the depths agree with the wear of the state found.  Collective.
+
+        If they do not agree, new depths are computed for the next solution.
+        """
         state = found.state
         scale = state.step.reaction_scale(state, self._geometry_tol)
         settled = self._settled(state, scale)
@@ -130,7 +143,7 @@ class WearOfStep(Lagged):
             following = np.maximum(mixed, 0.0) / kappa
         else:
             following = depth + CAUTIOUS_PART * (following - depth)
-        if self._stale >= 3 * FALL_ROUNDS:  # some rounds without differences are over
+        if self._stale >= 3 * FALL_ROUNDS:  # after the iterations without Anderson's method
             self._anderson.restart()
             self._best, self._stale = off, 0
         self._depth = following
@@ -144,7 +157,19 @@ class WearOfStep(Lagged):
         x: np.ndarray | None,
         forces: Sequence[np.ndarray],
     ) -> tuple[np.ndarray, ...]:
-        """Depth that the slip of a state wears under forces at the end, the part of it due to the start, and that per force at the end."""
+        """Return wear depths for the slip of given nodal states.
+
+        Args:
+            contacts: The contacts.
+            kappa: Stiffness of the nodes, ``shape=(n,)``, force per length.
+            nodes: State of each contact.
+            x: Displacement, owned degrees of freedom, or None.
+            forces: Normal forces at the end of the step at the nodes of each contact.
+
+        Returns:
+            Depth; depth due to the forces at the start; depth per force at the end; ``shape=(n,)``
+            each.
+        """
         both = zip(contacts, nodes)
         rates = [wear_rates(contact, state, x) for contact, state in both]
         start, c = map(np.concatenate, zip(*rates))
@@ -156,7 +181,7 @@ class WearOfStep(Lagged):
         return start + c * np.concatenate(forces), start, c
 
     def _with_depths(self, step: LoadStep) -> LoadStep:
-        """The step that wears by the depths."""
+        """Return the step with the present wear depths."""
         contacts, first = list(step.contacts), 0
         for k, contact in enumerate(contacts):
             if contact.given.laws.wears_within:
@@ -167,12 +192,16 @@ class WearOfStep(Lagged):
 
 
 def _wearing(step: LoadStep) -> list[ContactStep]:
-    """Contacts that wear within the step."""
+    """Return the contacts whose wear depth is part of the equations of the step."""
     return [contact for contact in step.contacts if contact.given.laws.wears_within]
 
 
-def _shares(contacts: Sequence[Contact]) -> np.ndarray:
-    """Part of its node that each node of each contact has, by area, ``shape=(n,)``: contacts of one face share their common edge.  Collective."""
+def _area_fractions(contacts: Sequence[Contact]) -> np.ndarray:
+    """Return the fraction of each node's area that belongs to each contact.  Collective.
+
+    It is below one where contacts share nodes, as at a common edge; ``shape=(n,)`` for all
+    contacts.
+    """
     nodes, area = (
         np.concatenate([getattr(c, name) for c in contacts]) for name in ("nodes", "area")
     )

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The friction law: coefficients, cone, maps, frictional work and wear; arrays alone, without DOLFINx."""
+"""Friction law on NumPy arrays, without DOLFINx: coefficients, cone, maps, dissipation and wear."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The gap of the bi-potential on NumPy arrays: a certificate for any approximate solution.
+"""Bi-potential gap on NumPy arrays: an error measure for any approximate solution.
 
 [dSFMH07]: see :mod:`dolfinx_contact.law.friction`. Needs NumPy alone, no DOLFINx.
 """
@@ -17,10 +17,11 @@ from dolfinx_contact.law.friction_cone import as_nodes
 def bipotential_gap(
     r: ArrayLike, gap: ArrayLike, slip_increment: ArrayLike, friction: Friction | float
 ) -> np.ndarray:
-    """Gap ``b_c(-du, r) + du . r`` of the bi-potential [dSFMH07, Section 1], zero exactly where the law holds.
+    """Bi-potential gap ``b_c(-du, r) + du . r`` [dSFMH07, Section 1], zero if the law holds.
 
-    For a reaction in the friction cone and no penetration, it is ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, computed as
-    a sum of non-negative terms. Elsewhere it is infinite. To certify an approximate solution, first project reactions on the
+    For a reaction in the friction cone and no penetration, it is
+    ``r_n (x_n + |M Q^2 du_t|) + r_t . Q^2 du_t >= 0``, computed as a sum of non-negative terms.
+    Elsewhere it is infinite. To certify an approximate solution, first project reactions onto the
     cone and clip gaps at zero, and report these changes separately.
 
     Args:
@@ -30,11 +31,11 @@ def bipotential_gap(
         friction: A ``Friction``, or a number, the isotropic coefficient.
 
     Returns:
-        ``shape=(n,)``, force times length; ``inf`` where ``r`` is outside the cone by more than rounding (16 machine epsilons
-        of ``r_n``) or ``gap`` is negative.
+        ``shape=(n,)``, force times length; ``inf`` where ``r`` is outside the cone by more than
+        rounding (16 machine epsilons of ``r_n``) or ``gap`` is negative.
 
     Raises:
-        ValueError: Wrong shape or type.
+        ValueError: An argument has the wrong shape or type.
 
     Example:
         >>> slip = [[-0.01, 0]]  # mm; the reaction is on the cone and against it: the law holds

@@ -2,17 +2,20 @@
 # SPDX-License-Identifier: MIT
 r"""Frictional work of a load step at each node: never negative, exact for rigid sliding.
 
-A node that slips along the unit vector ``e`` under the normal force N dissipates ``N m(e)`` per length of slip, with
+A node that slips along the unit vector ``e`` under the normal force N dissipates ``N m(e)`` per
+length of slip, with
 
 .. math:: m(e) = \frac{e \cdot P^2 e}{|M^{-1} P^2 e|} = \sum_i \mu_i e_i s_i, \qquad
           s = \frac{M^{-1} P^2 e}{|M^{-1} P^2 e|},
 
-because its friction force is ``-N M s``.  The rule takes the mean of this at both ends of the step, times the slip:
+because its friction force is ``-N M s``.  The work of a step is the slip times the mean of ``N m``
+at both ends of the step:
 
     D = |du| (N0 m0 + N1 m(e1)) / 2,    e1 = du / |du|,    m0 = c m(e0) + (1 - c) m(e1).
 
-e0 is the direction of slip at the end of the last step, which follows from the force then, and ``c = max(e0.e1, 0)``; c = 0
-if the node did not slip and had no force on the cone.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
+Here e0 is the direction of slip at the end of the last step, which follows from the friction
+force at that time, and ``c = max(e0.e1, 0)``.  If the node did not slip and its force was not on
+the cone, c = 0.  Derivation, orders and limits: docs/dissipation.md.  Needs NumPy alone.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ import numpy as np
 
 from dolfinx_contact.law.friction import Friction, split
 
-# A sticking force this near its cone still points along the previous slip: after a pause it is on the cone but for rounding.
+# Relative distance from the friction cone within which the force of a sticking node still gives the
+# direction of its previous slip.  After a pause, the force is on the cone up to rounding.
 PAUSED_FORCE = 1e-3
 
 
@@ -33,45 +37,56 @@ def work_of_friction(
     slip_increment: np.ndarray,
     law_before: Friction | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Frictional work of one step along the principal friction directions, and the part of it that is due to a turn of slip.
+    """Frictional work of a step, and its part due to a change of the slip direction.
 
     Args:
         friction: The friction law of the step.
         before: Reactions at the end of the last step, ``shape=(n, gdim)``, local frame, force.
         slipped: Nodes that slipped in the last step, ``shape=(n,)``, bool.
-        reaction: Reactions at the end of this step, ``shape=(n, gdim)``; only normal components are used.
+        reaction: Reactions at the end of this step, ``shape=(n, gdim)``; only normal components are
+            used.
         slip_increment: Slip during this step, ``shape=(n, gdim - 1)``, local frame, length.
-        law_before: The law of the last step, if friction was exchanged or its axes have turned since.  It determines the
-            direction of slip then; if only axes have turned, the work at the start of the step is taken with the old axes.
+        law_before: Friction of the last step, if friction was replaced or its axes have turned
+            since then.  It determines the direction of slip at the end of the last step.  If only
+            the axes have turned, the work at the start of the step is computed with the old axes.
 
     Returns:
-        The work, all entries >= 0, ``shape=(n, gdim - 1)``, force times length (that of a node is the sum of its row); and by how
-        much it exceeds the work of slip along ``e1`` alone, the same shape.  Negative normal forces, which only states that are not
-        solutions have, count as zero.
+        The work by principal direction, all entries >= 0, ``shape=(n, gdim - 1)``, force times
+        length; a node dissipates the sum of its row.  And its excess over the work of slip along
+        ``e1`` alone, same shape and unit.  Negative normal forces, which occur only before
+        convergence, count as zero.
     """
     tangents = np.shape(slip_increment)[1]
     mu, Q = friction.mu[..., :tangents], friction.Q[..., :tangents]
-    way, e1 = split(friction.along_axes(slip_increment))
-    per_way = _per_way(mu, Q, e1)
+    slip_length, e1 = split(friction.along_axes(slip_increment))
+    per_slip = _work_per_slip(mu, Q, e1)
 
     if law_before in (None, friction):
-        s0, e0 = _of_force(mu, Q, friction.along_axes(before[:, :-1]))
-        start, straight = mu * e0 * s0, per_way
+        s0, e0 = _directions_of_force(mu, Q, friction.along_axes(before[:, :-1]))
+        start, straight = mu * e0 * s0, per_slip
     else:
         back = -law_before.against_slip(before[:, :-1])
-        # If only the axes have turned, take the grooves as they stood.
+        # If only the axes have turned, use the old axes.
         then = law_before if _same_coefficients(friction, law_before) else friction
         e0, both = friction.along_axes(back), (then.along_axes(a) for a in (back, slip_increment))
-        start, straight = (_per_way(mu, Q, split(along)[1]) for along in both)
+        start, straight = (_work_per_slip(mu, Q, split(along)[1]) for along in both)
     c = np.maximum((e0 * e1).sum(axis=1, keepdims=True), 0.0) * np.reshape(slipped, (-1, 1))
-    per_way_before = c * start + np.maximum(1.0 - c, 0.0) * straight
+    per_slip_before = c * start + np.maximum(1.0 - c, 0.0) * straight
     N0, N1 = (np.maximum(r[:, -1:], 0.0) for r in (before, reaction))
-    work = 0.5 * way * (N0 * per_way_before + N1 * per_way)
-    return work, 0.5 * way * N0 * (per_way_before - straight)
+    work = 0.5 * slip_length * (N0 * per_slip_before + N1 * per_slip)
+    return work, 0.5 * slip_length * N0 * (per_slip_before - straight)
 
 
-def _per_way(mu: np.ndarray, Q: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Work per slip length and normal force along unit vectors ``e``, by principal directions."""
+def _work_per_slip(mu: np.ndarray, Q: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Frictional work per normal force and slip length, by principal direction.
+
+    Args:
+        mu, Q: Coefficients, ``shape=(gdim - 1,)`` or ``(n, gdim - 1)``, dimensionless.
+        e: Unit vectors along the principal directions, ``shape=(n, gdim - 1)``.
+
+    Returns:
+        ``shape=(n, gdim - 1)``, dimensionless.
+    """
     _, s = split(Q**2 * mu * e)  # M^-1 P^2 e
     return mu * e * s
 
@@ -82,8 +97,15 @@ def _same_coefficients(one: Friction, other: Friction) -> bool:
     return all(bool(np.all(a == b)) for a, b in pairs)
 
 
-def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors ``s`` along ``-M^-1 r_t`` and ``e`` along ``-P^-2 r_t`` of tangential forces r_t."""
+def _directions_of_force(
+    mu: np.ndarray, Q: np.ndarray, force: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors ``s`` along ``-M^-1 r_t`` and ``e`` (slip) along ``-P^-2 r_t``.
+
+    Args:
+        mu, Q: Coefficients, ``shape=(gdim - 1,)`` or ``(n, gdim - 1)``, dimensionless.
+        force: Tangential forces ``r_t`` along the principal directions, ``shape=(n, gdim - 1)``.
+    """
     slippery = mu == 0
     M, P = (np.where(slippery, 1.0, a) for a in (mu, Q * mu))
     M, P = (a / a.min(axis=-1, keepdims=True) for a in (M, P))  # directions only: no overflow
@@ -93,7 +115,9 @@ def _of_force(mu: np.ndarray, Q: np.ndarray, force: np.ndarray) -> tuple[np.ndar
 
 
 def slipped_last(friction: Friction, reaction: np.ndarray, slipped: np.ndarray) -> np.ndarray:
-    """Nodes whose force gives the direction of their last slip: those that slip, or stick with a force on the cone; ``shape=(n,)``, bool.
+    """Nodes whose friction force gives the direction of their last slip, ``shape=(n,)``, bool.
+
+    These are nodes that slip, and nodes that stick with a force on the friction cone.
 
     Args:
         friction: The friction law.

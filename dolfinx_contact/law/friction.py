@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Coefficients of dry friction.
+"""Coefficients of orthotropic dry friction.
 
 [dSFMH07]: G. de Saxcé, Z.-Q. Feng, Z. Mróz, M. Hjiaj, "Comportement hystérétique du frottement
 anisotrope", 18e Congrès Français de Mécanique, 2007.
@@ -22,7 +22,7 @@ from dolfinx_contact.support.checks import finite, number, valued
 
 Field = Callable[..., Any]  # or a DOLFINx Function, which this module does not import
 
-TEXTURE_OWNERS = ("body", "surface")  # of a texture
+TEXTURE_OWNERS = ("body", "surface")  # owners of friction axes that are a field
 
 _SMALLEST_COEFFICIENT = 1e-50
 _LARGEST_COEFFICIENT = 1e50
@@ -32,16 +32,17 @@ ARRAY_REMEDY = (
     "has shape (n, 2)."
 )
 
-# Replaces infinite coefficients. A node then slides only where its normal reaction is below a thousandth of the tangential one. The error
-# at nodes about to open falls with 1 / ROUGH_COEFFICIENT; with larger values, solvers do not converge reliably.
+# Replaces infinite coefficients. A node then slides only if its normal reaction is below a
+# thousandth of the tangential one. The error at nodes about to open is proportional to
+# 1 / ROUGH_COEFFICIENT; with larger values, solvers do not converge reliably.
 ROUGH_COEFFICIENT = 1e3
 
 
 def rough(mu: Any):
-    """Coefficients with ``ROUGH`` in place of infinite ones; all others as given."""
+    """Coefficients of friction with infinite values replaced by ``ROUGH_COEFFICIENT``."""
     try:
         infinite = np.isposinf(mu)
-    except (TypeError, ValueError):  # not real numbers: checked elsewhere
+    except (TypeError, ValueError):  # not real numbers: the caller's checks raise
         return mu
     return (
         mu
@@ -51,7 +52,11 @@ def rough(mu: Any):
 
 
 def _cone(given: ArrayLike) -> np.ndarray:
-    """``mu``, checked, ``shape=(2,)`` or ``(n, 2)``."""
+    """Validated coefficients ``mu``, ``shape=(2,)`` or ``(n, 2)``.
+
+    Raises:
+        ValueError: A value is negative, out of range, or zero or infinite in one direction only.
+    """
     mu = _coefficients("mu", rough(given))
     if mu.ndim and (one := np.isposinf(given)).any(axis=-1).sum() != one.all(axis=-1).sum():
         raise ValueError(f"mu must be infinite in both directions or in none, not {given!r}")
@@ -72,7 +77,11 @@ def _cone(given: ArrayLike) -> np.ndarray:
 
 
 def _coefficients(name: str, value: ArrayLike | Callable | Any) -> np.ndarray:
-    """``value`` as a finite float64 array of shape (), (2,) or (n, 2), or a ``ValueError``."""
+    """``value`` as a finite float64 array of shape (), (2,) or (n, 2).
+
+    Raises:
+        ValueError: ``value`` has another shape or type, or is not finite.
+    """
     array = finite(name, value)
     if array.size < 4 and any(isinstance(i, bool) for i in np.ravel(np.array(value, object))):
         raise ValueError(f"{name} must be real numbers, not {value!r}")
@@ -85,45 +94,55 @@ def _coefficients(name: str, value: ArrayLike | Callable | Any) -> np.ndarray:
 
 
 class Friction(Guarded):
-    """Orthotropic dry friction with a slip rule that need not be associated; immutable.
+    """Orthotropic dry friction with an associated or non-associated slip rule; immutable.
 
-    The friction cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip rule
-    ``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` with ``P = diag(p)`` [dSFMH07, Section 1]. ``r`` is the reaction on the body,
-    ``du_t`` the slip increment; x and y are the principal friction directions. Only the ratio of the two ``p`` matters.
+    The friction cone is ``|M^-1 r_t| <= r_n`` with ``M = diag(mu)`` [dSFMH07, Eq. (1)], the slip
+    rule ``-du_t = dlambda P^-2 r_t / |P^-1 r_t|`` with ``P = diag(p)`` [dSFMH07, Section 1]. ``r``
+    is the reaction on the body, ``du_t`` the slip increment; x and y are the principal friction
+    directions. Only the ratio of the two ``p`` matters.
 
     Args:
-        mu: Coefficients of friction: a number (isotropic), a pair ``(mu_x, mu_y)``, an array ``shape=(n, 2)`` with a pair for
-            each of this rank's contact nodes, or a field, see below. Zero is frictionless; infinity is perfectly rough, so
-            touching nodes stick. A contact replaces values above 1e3 by 1e3.
-        p: Coefficients of the slip rule, positive, in the same forms. By default ``p = mu``, the associated rule.
+        mu: Coefficients of friction: a number (isotropic), a pair ``(mu_x, mu_y)``, an array
+            ``shape=(n, 2)`` with a pair for each of this rank's contact nodes, or a field, see
+            below. Zero is frictionless; infinity is perfectly rough, so touching nodes stick. A
+            contact replaces values above 1e3 by 1e3.
+        p: Coefficients of the slip rule, positive, in the same forms. By default ``p = mu``, the
+            associated rule.
         k: Instead of ``p``: ``p_y / p_x = (mu_y / mu_x)**k`` [dSFMH07, Section 1]; 1 is associated.
-        axes: Principal friction direction x at each node, for example along grooves: unit vectors ``(cos, sin)`` in the
-            tangential axes of the local frame, ``shape=(n, 2)``, which rotate with it. By default, the first axis of the frame. A
-            field may also return directions in space, ``shape=(3, n)``, of any length, which are projected on the surface.
-        of: Owner of ``axes`` given as a field. "body": evaluated at reference positions; surfaces that rotate do not turn the
-            directions. "surface": a callable of positions on the surface; directions move and rotate with the surface. ``mu``,
-            ``p`` and wear always belong to the body. On a deformable surface, directions are lines of the owner's material. On a
-            rigid one, those of a body that turns stay as they are in space, with a warning.
+        axes: Principal friction direction x at each node, for example along grooves: unit vectors
+            ``(cos, sin)`` in the tangential axes of the local frame, ``shape=(n, 2)``, which rotate
+            with it. By default, the first axis of the frame. A field may also return directions in
+            space, ``shape=(3, n)``, of any length, which are projected on the surface.
+        of: Owner of ``axes`` given as a field. "body": evaluated at reference positions; surfaces
+            that rotate do not turn the directions. "surface": a callable of positions on the
+            surface; directions move and rotate with the surface. ``mu``, ``p`` and wear always
+            belong to the body. On a deformable surface, directions are lines of the owner's
+            material. On a rigid one, those of a body that turns stay as they are in space, with a
+            warning.
 
-    ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as for DOLFINx's ``interpolate``, that return
-    values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in continuous Lagrange spaces. A ``Contact`` evaluates them at
-    its nodes when the friction is assigned and at the start of each step; ``contact.friction`` has the values. A callable for
-    ``mu`` or ``p`` may have further arguments named ``pressure``, ``slip_path``, ``dissipation`` or ``wear_depth``. It then gets
-    that array of the contact, ``shape=(n,)``: the pressure at the end of the step, the others at its start, see
-    docs/howto/fields.md.
+    ``mu``, ``p`` and ``axes`` may be fields: callables of ``x``, ``shape=(3, n)``, as for DOLFINx's
+    ``interpolate``, that return values of shape ``(n,)`` or ``(2, n)``, or DOLFINx Functions in
+    continuous Lagrange spaces. A ``Contact`` evaluates them at its nodes when the friction is
+    assigned and at the start of each step; ``contact.friction`` has the values. A callable for
+    ``mu`` or ``p`` may have further arguments named ``pressure``, ``slip_path``, ``dissipation`` or
+    ``wear_depth``. It then gets that array of the contact, ``shape=(n,)``: the pressure at the end
+    of the step, the others at its start, see docs/howto/fields.md.
 
     Raises:
-        ValueError: A coefficient is negative, NaN, not real, an expression of UFL or of the wrong shape; exactly one of a
-            pair ``mu`` is zero or infinite; ``p`` is not positive and finite; ``p`` and ``k`` are both given; ``of`` does not fit ``axes``.
+        ValueError: A coefficient is negative, NaN, not real, an expression of UFL or of the wrong
+            shape; exactly one of a pair ``mu`` is zero or infinite; ``p`` is not positive and
+            finite; ``p`` and ``k`` are both given; ``of`` does not fit ``axes``.
 
     Attributes:
-        mu: ``shape=(2,)`` or ``(n, 2)``.
-        p: Normalised to ``max(p / mu) = 1``, same shape as ``mu``; zero where ``mu`` is.
-        axes: ``shape=(n, 2)`` or None.
+        mu: Coefficients of friction, ``shape=(2,)`` or ``(n, 2)``.
+        p: Coefficients of the slip rule, normalised to ``max(p / mu) = 1``, same shape as ``mu``;
+            zero where ``mu`` is zero.
+        axes: First principal friction directions, unit vectors, ``shape=(n, 2)``, or None.
         frictionless: Whether all ``mu`` are zero.
         isotropic: Whether both directions have the same ``mu`` and ``p`` everywhere.
         associated: Whether ``p`` is proportional to ``mu`` everywhere.
-        field: Whether ``mu``, ``p`` or ``axes`` is a field; the attributes above are then available only in ``contact.friction``.
+        field: Whether ``mu``, ``p`` or ``axes`` is a field; the attributes above are then available
+            only in ``contact.friction``.
         exponent: ``k``, if it was given; otherwise None.
 
     Example:
@@ -168,29 +187,32 @@ class Friction(Guarded):
         self._soft: dict[int, np.ndarray] = {}
         self.field = any(map(is_field, self._given.values()))
         if not self.field:
-            self._take(mu, p, k, axes)
+            self._set_coefficients(mu, p, k, axes)
         self._made = True
 
     @staticmethod
     def of_pair(first: Friction | float, second: Friction | float, angle: float = 0.0) -> Friction:
-        """Friction between two textured sides: the mean of both, such that the frictional work is the mean of theirs; see ``law/pair.py``.
+        """Friction of a pair of textured sides; its work is the mean of both sides' work.
 
-        If both sides have the same principal directions, ``mu`` is the mean of both and the frictional work is exact.  In other
-        directions the work is at most the mean: in the worst direction, 5 % less for ``mu`` 2 : 1 across 1 : 2, and 11 % less for
-        3 : 1 across 1 : 3.  No orthotropic law is exact there.  For another rule, write a function of two ``Friction`` that returns
-        one.
+        If both sides have the same principal directions, ``mu`` is the mean of both and the
+        frictional work is exact.  Otherwise no orthotropic law is exact, and the work is at most
+        the mean: in the worst direction, 5 % less for ``mu`` 2 : 1 across 1 : 2, and 11 % less for
+        3 : 1 across 1 : 3; see ``law/pair.py``.  For another rule, write a function of two
+        ``Friction`` objects that returns one.
 
         Args:
-            first, second: Friction of each side, given by numbers or by arrays per node, not by fields; a number is isotropic
-                friction.  Instead of a field, pass the ``contact.friction`` of a contact that has it.
-            angle: Angle from the first principal direction of the first side to that of the second, radians about the normal.  If
-                the bodies turn relative to each other, assign a new pair between steps.
+            first, second: Friction of each side, given by numbers or by arrays per node, not by
+                fields; a number is isotropic friction.  Instead of a field, pass the
+                ``contact.friction`` of a contact with this field.
+            angle: Angle about the normal, radians, from the first principal direction of the first
+                side to the first principal direction of the second.  If the bodies turn relative to
+                each other, assign a new pair between steps.
 
         Returns:
             A ``Friction`` in the local frame of the first side.
 
         Raises:
-            ValueError: a law is a field, or the angle is not one finite number.
+            ValueError: One of the two is a field, or the angle is not one finite number.
 
         Example:
             >>> crossed = dc.Friction.of_pair(dc.Friction((0.3, 0.1)), dc.Friction((0.3, 0.1)), angle=np.pi / 2)
@@ -218,7 +240,7 @@ class Friction(Guarded):
             )
         return Friction(mu, p, axes=None if straight else _Direction(axes))
 
-    def _take(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
+    def _set_coefficients(self, mu: Any, p: Any, k: Any, axes: Any) -> None:
         given, mu = (mu, p, k), _cone(mu)
         if k is not None:
             q = _q_from_exponent(mu, k)
@@ -279,11 +301,18 @@ class Friction(Guarded):
 
     @property
     def Q(self) -> np.ndarray:
-        """Diagonal of ``Q = P M^-1`` [dSFMH07, Section 1], scaled to a largest entry of 1; same shape as ``mu``, dimensionless, zero where ``mu`` is."""
+        """Diagonal of ``Q = P M^-1`` [dSFMH07, Section 1], with 1 as its largest entry.
+
+        It has the same shape as ``mu`` and is zero where ``mu`` is zero.
+        """
         return np.divide(self.p, self.mu, out=np.zeros_like(self.mu), where=self.mu > 0)
 
     def at(self, nodes: np.ndarray) -> Friction:
-        """The friction of some of the nodes, given by their indices, ``shape=(k,)``; coefficients common to all nodes do not change."""
+        """Friction of a subset of the nodes; coefficients common to all nodes are unchanged.
+
+        Args:
+            nodes: Indices of the nodes, ``shape=(k,)``.
+        """
         if self.mu.ndim == 1 and self.axes is None:
             return self
         mu, p = (rows if rows.ndim == 1 else rows[nodes] for rows in (self.mu, self.p))
@@ -291,20 +320,28 @@ class Friction(Guarded):
         return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
 
     def along_axes(self, t: np.ndarray) -> np.ndarray:
-        """Components of tangential vectors (local frame) along the principal friction directions, ``shape=(n, 2)`` or ``(n, 1)``."""
+        """Components along the principal friction directions of tangential vectors.
+
+        Args:
+            t: Vectors in the local frame, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions.
+
+        Returns:
+            The same shape.
+        """
         if self.axes is None:
             return t
         (x, y), (cos, sin) = t.T, self.axes.T
         return np.column_stack((cos * x + sin * y, cos * y - sin * x))
 
     def against_slip(self, r_t: np.ndarray) -> np.ndarray:
-        """Unit vectors along ``P^-2 r_t``, opposite to the slip at a reaction on the cone [dSFMH07, Section 1].
+        """Unit vectors along ``P^-2 r_t``, opposite to the slip [dSFMH07, Section 1].
 
         Args:
-            r_t: Tangential reactions, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions, local frame.
+            r_t: Tangential reactions, ``shape=(n, 2)``, or ``(n, 1)`` in two dimensions, local
+                frame.
 
         Returns:
-            The same shape, dimensionless; zero where ``r_t`` or ``mu`` is.
+            The same shape, dimensionless; zero where ``r_t`` or ``mu`` is zero.
         """
         p = self.p[..., : r_t.shape[1]]
         smallest = p.min(axis=-1, keepdims=True)
@@ -314,19 +351,26 @@ class Friction(Guarded):
         return self._from_axes(against)
 
     def drag(self, slip: np.ndarray) -> np.ndarray:
-        """``d(s) = P^2 s / |M^-1 P^2 s|``, the friction per unit normal reaction that opposes a slip ``s``: ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
+        """Friction per normal reaction that opposes a slip, ``d(s) = P^2 s / |M^-1 P^2 s|``.
+
+        The friction force is ``r_t = -r_n d(s)`` [dSFMH07, Section 1].
 
         Args:
-            slip: ``shape=(n, T)``, local frame, ``T = gdim - 1``; only directions matter.
+            slip: Slip ``s``, ``shape=(n, T)``, local frame, ``T = gdim - 1``; only its direction
+                matters.
 
         Returns:
-            The same shape, local frame, dimensionless; zero where ``slip`` or ``mu`` is.
+            The same shape, local frame, dimensionless; zero where ``slip`` or ``mu`` is zero.
         """
         unit, _ = self._resisted(slip)
         return self._from_axes(self.mu[..., : slip.shape[1]] * unit)
 
     def drag_with_slope(self, slip: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``drag(slip)``, and the derivative of ``drag(slip + w along)`` with respect to w at 0, the same shape, in the inverse unit of ``slip``."""
+        """``drag(slip)`` and its derivative along ``along``, ``shape=(n, T)`` each, local frame.
+
+        The derivative of ``drag(slip + w along)`` with respect to w at 0 has the inverse unit of
+        ``slip``.
+        """
         (unit, length), along = self._resisted(slip), self.along_axes(along)
         mu, T = self.mu[..., : slip.shape[1]], slip.shape[1]
         rate = np.divide(
@@ -336,22 +380,33 @@ class Friction(Guarded):
         return self._from_axes(mu * unit), self._from_axes(mu * turning)
 
     def over_radii(self, t: np.ndarray) -> np.ndarray:
-        """``M^-1 t`` along the principal directions, ``shape=(n, T)``; zero without friction."""
+        """``M^-1 t`` along the principal directions, ``shape=(n, T)``; zero without friction.
+
+        Args:
+            t: Tangential vectors, ``shape=(n, T)``, local frame.
+        """
         mu = np.broadcast_to(self.mu[..., : t.shape[1]], t.shape)
         return np.divide(self.along_axes(t), mu, out=np.zeros_like(t), where=mu > 0)
 
     def along_radii(self, t: np.ndarray) -> np.ndarray:
-        """``M t`` in the local frame, ``shape=(n, T)``."""
+        """``M t`` for tangential vectors ``t`` in the local frame, ``shape=(n, T)``, same frame."""
         return self._from_axes(self.mu[..., : t.shape[1]] * self.along_axes(t))
 
     def _resisted(self, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit vector and length (up to a constant factor) of ``M^-1 P^2 slip``, along the principal directions."""
+        """Unit vectors along ``M^-1 P^2 slip``, and lengths up to a constant factor.
+
+        Components are along the principal directions, ``shape=(n, T)``; lengths have
+        ``shape=(n, 1)``.
+        """
         length, unit = split(slip)
         factor, resisted = split(self._softness(slip.shape[1]) * self.along_axes(unit))
         return resisted, length * factor
 
     def _softness(self, T: int) -> np.ndarray:
-        """Diagonal of ``M^-1 P^2``, largest entry 1, ``shape=(T,)`` or ``(n, T)``; zero without friction."""
+        """Diagonal of ``M^-1 P^2``, scaled to a largest entry of 1, ``shape=(T,)`` or ``(n, T)``.
+
+        It is zero without friction.
+        """
         if T not in self._soft:
             weight = self.Q[..., :T] ** 2 * self.mu[..., :T]
             largest = weight.max(axis=-1, keepdims=True)
@@ -359,18 +414,21 @@ class Friction(Guarded):
         return self._soft[T]
 
     def _from_axes(self, t: np.ndarray) -> np.ndarray:
-        """Tangential vectors in the local frame, from components along the principal friction directions."""
+        """Vectors in the local frame with given components along the principal directions."""
         if self.axes is None:
             return t
         (x, y), (cos, sin) = t.T, self.axes.T
         return np.column_stack((cos * x - sin * y, sin * x + cos * y))
 
     def law(self, dim: int):
-        """The compiled law in ``dim`` = 2 or 3 dimensions, a ``ContactLaw``, see ``law/maps.py``.
+        """Compiled friction law in 2 or 3 dimensions, a ``ContactLaw`` of ``law/maps.py``.
+
+        Args:
+            dim: Number of dimensions, 2 or 3.
 
         Raises:
-            ValueError: Friction is not isotropic and ``dim`` is 2, where there is only one
-                tangential direction.
+            ValueError: In two dimensions, friction is not isotropic or has axes, but there is only
+                one tangential direction.
         """
         if dim == 2 and not self.isotropic:
             raise ValueError(
@@ -387,7 +445,11 @@ class Friction(Guarded):
 
 
 class _Direction:
-    """A constant direction in the local frames of all nodes, as a field."""
+    """Field of a constant direction in the local frames of all nodes.
+
+    Args:
+        axis: Unit vector, ``shape=(2,)``.
+    """
 
     def __init__(self, axis: np.ndarray):
         self._axis = axis
@@ -401,7 +463,10 @@ def _angle(axes: np.ndarray | None) -> Any:
 
 
 def at_most_rough(friction: Friction) -> Friction:
-    """The friction with coefficients limited to ``ROUGH``: larger ones act alike, but amplify rounding errors of slip."""
+    """Friction with coefficients of at most ``ROUGH_COEFFICIENT``.
+
+    Larger coefficients have almost the same effect, but amplify rounding errors of slip.
+    """
     if not (friction.mu > ROUGH_COEFFICIENT).any():
         return friction
     mu = np.minimum(friction.mu, ROUGH_COEFFICIENT)
@@ -410,7 +475,10 @@ def at_most_rough(friction: Friction) -> Friction:
 
 
 def _q_from_exponent(mu: np.ndarray, k: float | str) -> np.ndarray:
-    """``Q = P M^-1``, up to a factor, for ``p_y / p_x = (mu_y / mu_x)**k``; logarithms avoid overflow."""
+    """Diagonal of ``Q = P M^-1``, up to a factor, for ``p_y / p_x = (mu_y / mu_x)**k``.
+
+    Logarithms avoid overflow.
+    """
     exponent = finite("k", k)
     if exponent.shape != ():
         raise ValueError(f"k must be one real number, not {k!r}")
@@ -438,7 +506,7 @@ def _unit_vectors(axes: ArrayLike, mu: np.ndarray) -> np.ndarray:
 
 
 def as_friction(friction: Any) -> Any:
-    """Isotropic friction for a number; anything else unchanged."""
+    """A ``Friction`` for a number (isotropic coefficient); any other value unchanged."""
     number = isinstance(friction, Real) or (isinstance(friction, np.ndarray) and friction.ndim == 0)
     return Friction(friction) if number and not isinstance(friction, (bool, np.bool_)) else friction
 
@@ -449,13 +517,13 @@ def is_field(value: object) -> bool:
 
 
 def split(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths, ``shape=(n, 1)``, and unit vectors of tangential vectors; zero vectors stay zero."""
+    """Lengths, ``shape=(n, 1)``, and unit vectors, ``shape=(n, T)``; zero vectors stay zero."""
     length = np.hypot.reduce(np.abs(t), axis=1, keepdims=True)  # abs: one column is only copied
     return length, np.divide(t, length, out=np.zeros_like(t), where=length > 0)
 
 
 def principal_axes(friction: Friction, nodes: int, dim: int) -> np.ndarray:
-    """Rotations from local frames to principal friction directions, ``shape=(nodes, dim, dim)``."""
+    """Rotations from local frames to principal axes, ``shape=(nodes, dim, dim)``."""
     turns = np.tile(np.eye(dim), (nodes, 1, 1))
     if friction.axes is not None:
         cos, sin = friction.axes.T

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The elliptic friction cone on NumPy arrays: load function and Euclidean projection.
+"""Load function of, and Euclidean projection onto, the elliptic friction cone; on NumPy arrays.
 
 [dSFMH07]: see :mod:`dolfinx_contact.law.friction`. Needs NumPy alone, no DOLFINx.
 """
@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction
 
-# Points with larger components are scaled before projection, so that no sum overflows.
+# Points with larger components are divided by ``HUGE_UNIT`` before projection, so that no sum
+# overflows.
 HUGE_COMPONENT = 1e300
 HUGE_UNIT = 2.0**20
 
@@ -20,11 +21,17 @@ HUGE_UNIT = 2.0**20
 def as_nodes(
     name: str, value: ArrayLike, components: int | None, nodes: int | None = None
 ) -> np.ndarray:
-    """``value`` as a float64 array with one row per node, without a copy where it is one already.
+    """``value`` as a float64 array with one row per node, copied only if needed.
+
+    Args:
+        name: Name of the argument in error messages.
+        value: The values.
+        components: Required number of columns; None for a one-dimensional array.
+        nodes: Required number of rows; None for any.
 
     Raises:
-        ValueError: The shape is not ``(n, components)`` (``(n,)`` for None), or the type is not
-            real or has more digits than float64.
+        ValueError: The array has another shape, has masked entries, or is not real with at most 64
+            bits.
     """
     if np.ma.is_masked(value):
         raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...)")
@@ -46,21 +53,24 @@ def as_nodes(
 
 
 def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
-    """Euclidean projection on the friction cone ``|M^-1 r_t| <= r_n``, the corrector of
-    [dSFMH07, Section 2].
+    """Euclidean projection onto the friction cone ``|M^-1 r_t| <= r_n``.
+
+    It is the corrector of [dSFMH07, Section 2].
 
     Args:
         tau: Points in the local frame ``(t1, t2, n)``, ``shape=(n, 3)``, any unit.
-        mu: Coefficients of friction: a number, ``shape=(2,)`` or ``(n, 2)``. With zero, the cone is the half line
-            ``r_t = 0, r_n >= 0``.
+        mu: Coefficients of friction: a number, ``shape=(2,)`` or ``(n, 2)``. For zero, the cone is
+            the half line ``r_t = 0, r_n >= 0``.
 
     Returns:
-        The projected points, ``shape=(n, 3)``, in the unit of ``tau``. A row of ``tau`` with an infinite or NaN entry gives a row
-        of NaN (for a frictionless cone only if it is ``tau_n``); a projection beyond the range of double precision gives infinity.
-        Other rows are not affected.
+        The projected points, ``shape=(n, 3)``, in the unit of ``tau``. A row of ``tau`` with an
+        infinite or NaN entry gives a row of NaN (for a frictionless cone only if it is ``tau_n``);
+        a projection beyond the range of double precision gives infinity. Other rows are not
+        affected.
 
     Raises:
-        ValueError: ``tau`` has another shape or type; ``mu`` is negative, NaN, or zero in exactly one direction.
+        ValueError: ``tau`` has a wrong shape or type; ``mu`` is negative, NaN, or zero in exactly
+            one direction.
 
     Example:
         >>> dc.law.project_cone([[0.1, 0, 1], [0.1, 0, -1]], (0.30, 0.15))
@@ -78,18 +88,19 @@ def project_cone(tau: ArrayLike, mu: ArrayLike) -> np.ndarray:
 
 
 def load_function(r: ArrayLike, mu: ArrayLike) -> np.ndarray:
-    """Load function ``f = |M^-1 r_t| - r_n`` of [dSFMH07, Eq. (1)]: negative inside the friction
-    cone, zero on its boundary.
+    """Load function ``f = |M^-1 r_t| - r_n`` of [dSFMH07, Eq. (1)].
+
+    It is negative inside the friction cone and zero on its boundary.
 
     Args:
         r: Reactions in the local frame ``(t1, t2, n)``, ``shape=(n, 3)``, any unit.
-        mu: As in :func:`project_cone`. Where it is zero everywhere, ``f = -r_n``.
+        mu: As in :func:`project_cone`. If it is zero everywhere, ``f = -r_n``.
 
     Returns:
         ``shape=(n,)``, in the unit of ``r``.
 
     Raises:
-        ValueError: As :func:`project_cone`.
+        ValueError: As in :func:`project_cone`.
 
     Example:
         >>> dc.law.load_function([[0.1, 0, 1]], (0.30, 0.15)).round(3)  # negative: sticks

@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Nodal maps, predictor and corrector with their augmentation parameters, and the laws that they call.
+"""Predictor-corrector maps of the friction law at the nodes, and the interfaces of the laws.
 
-The fixed points of a map are the solutions of its law.  A map takes a law, reactions, gaps and slip increments,
-``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, and returns new reactions and statuses; ``linearised`` also
-returns their (Clarke) derivatives.  ``springs`` are stiffnesses at the nodes for a preconditioner, ``shape=(n, gdim)``, force per
+The fixed points of a map are the solutions of its law.  A map gets a law, reactions, gaps and
+slip increments, ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, and returns
+new reactions and statuses.  Its method ``linearised`` also returns their (Clarke) derivatives,
+and ``springs`` returns nodal stiffnesses for a preconditioner, ``shape=(n, gdim)``, force per
 length.
 """
 
@@ -20,7 +21,12 @@ if TYPE_CHECKING:
 
 
 class NodalLaw(Protocol):
-    """The law at ``n`` nodes as maps call it: new reactions and statuses, and with a Jacobian their derivatives by ``r`` and (slip, gap)."""
+    """Interface of a law at ``n`` nodes, as the maps call it.
+
+    All methods return new reactions, ``shape=(n, gdim)``, and statuses, ``shape=(n,)``.  The
+    Jacobians also return the derivatives of the reactions by ``r`` and by (slip, gap),
+    ``shape=(n, gdim, gdim)`` each.
+    """
 
     def return_map(
         self,
@@ -49,7 +55,10 @@ class NodalLaw(Protocol):
 
 
 class ContactLaw(NodalLaw, Protocol):
-    """The law of a contact, ``Friction.law(dim)``: also what errors and records need; see docs/extending.md."""
+    """Interface of the law that ``Friction.law(dim)`` returns; see docs/extending.md.
+
+    In addition to the maps, it has error measures and the load function, ``shape=(n,)`` each.
+    """
 
     def slip_defect(self, r: np.ndarray, slip: np.ndarray, status: np.ndarray, /) -> np.ndarray: ...
     def bipotential_gap(
@@ -59,7 +68,10 @@ class ContactLaw(NodalLaw, Protocol):
 
 
 class NodalMap(Protocol):
-    """A nodal map: a call returns new reactions and statuses, ``linearised`` also their derivatives."""
+    """Interface of a nodal map.
+
+    A call returns new reactions and statuses, and ``linearised`` also their derivatives.
+    """
 
     @property
     def normal(self) -> np.ndarray:
@@ -76,7 +88,7 @@ class NodalMap(Protocol):
 
 @dataclass(frozen=True)
 class BipotentialMap:
-    """The paper's predictor and Euclidean projection on the friction cone [dSFMH07, Section 2].
+    """Bi-potential map: predictor and Euclidean projection onto the cone [dSFMH07, Section 2].
 
     Args:
         rho: Augmentation parameter, ``shape=(n,)``, force per length.
@@ -86,7 +98,7 @@ class BipotentialMap:
 
     @property
     def normal(self) -> np.ndarray:
-        """Augmentation parameter along the normal, ``shape=(n,)``, force per length; as in the return map."""
+        """Augmentation parameter along the normal, ``shape=(n,)``, force per length."""
         return self.rho
 
     def __call__(self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
@@ -96,7 +108,7 @@ class BipotentialMap:
         return law.bipotential_jacobian(reaction, gap, slip, self.rho)
 
     def springs(self, friction: Friction, dim: int) -> np.ndarray:
-        """``rho diag(Q^2, 1)``."""
+        """Diagonal of ``rho diag(Q^2, 1)`` per node, ``shape=(n, dim)``, force per length."""
         springs = np.ones((len(self.rho), dim))
         springs[:, :-1] = friction.Q[..., : dim - 1] ** 2
         return springs * self.rho[:, None]
@@ -104,7 +116,10 @@ class BipotentialMap:
 
 @dataclass(frozen=True)
 class ReturnMap:
-    """The predictor without the shift along the normal, and a projection in the metric in which the slip rule is normal to the cone.
+    """Return map: elastic predictor and projection onto the friction cone along the slip rule.
+
+    The predictor has no bi-potential shift along the normal.  The projection uses the metric in
+    which the slip rule is normal to the cone.
 
     Args:
         normal: Augmentation parameter along the normal, ``shape=(n,)``, force per length.
@@ -121,7 +136,10 @@ class ReturnMap:
         return law.return_jacobian(reaction, gap, slip, self.normal, self.tangential)
 
     def springs(self, friction: Friction, dim: int) -> np.ndarray:
-        """The parameters themselves; zero along the surface at frictionless nodes."""
+        """Augmentation parameters as nodal stiffnesses, ``shape=(n, dim)``, force per length.
+
+        Tangential entries are zero at frictionless nodes.
+        """
         springs = np.empty((len(self.normal), dim))
         springs[:, -1] = self.normal
         springs[:, :-1] = (friction.Q[..., : dim - 1] > 0) * self.tangential[:, None]

@@ -1,34 +1,41 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""The friction law of two textured sides: an orthotropic law whose frictional work is the mean of theirs, or a little less.
+r"""Orthotropic friction of two textured sides, with the mean of their frictional work.
 
-An associated law that slides along a unit vector ``e`` dissipates ``h(e) = |M e| = sqrt(e . A e)`` per normal force and length of slip, with
-``A = M^2`` in common axes.  The mean ``(h_1 + h_2) / 2`` of two sides is the support function of the Minkowski mean of their ellipses, which is
-an ellipse only if their axes and ``mu_y / mu_x`` are the same.  Its square is ``(e . A_1 e + e . A_2 e + 2 h_1 h_2) / 4``; the quadratic form
+An associated law dissipates ``h(e) = |M e| = sqrt(e . A e)`` per normal force and slip length along
+a unit vector ``e``, with ``A = M^2`` in common axes.  The mean ``(h_1 + h_2) / 2`` of two sides is
+the support function of the Minkowski mean of their ellipses, which is an ellipse only if their axes
+and ``mu_y / mu_x`` are the same.  Its square is ``(e . A_1 e + e . A_2 e + 2 h_1 h_2) / 4``.  The
+quadratic form
 
 .. math:: A = (A_1 + A_2 + 2 A_1 \# A_2) / 4,
 
-in which the geometric mean ``#`` of matrices replaces the product, is never above it [Kubo, Ando, Math. Ann. 246, 1980: ``x . (A # B) x``
-is at most ``sqrt(x . A x  x . B x)``].  Along common axes both are equal, and ``M = (M_1 + M_2) / 2``.
+in which the geometric mean ``#`` of matrices replaces the product, never exceeds this square [Kubo,
+Ando, Math. Ann. 246, 1980: ``x . (A # B) x`` is at most ``sqrt(x . A x  x . B x)``].  For common
+axes both are equal, and ``M = (M_1 + M_2) / 2``.
 
-The slip rule follows from the mean of ``ln Q``, projected on the axes of ``A``.  So two sides with the same ``Q`` and axes keep that ``Q``, and two
-associated sides make an associated law.
+The slip rule follows from the mean of ``ln Q``, projected onto the axes of ``A``.  So two sides
+with the same ``Q`` and axes keep that ``Q``, and two associated sides give an associated law.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-# A matrix whose anisotropic part is below this has no axes.
+# A tensor whose deviator is below this fraction of half its trace counts as isotropic.
 ISOTROPIC_PART = 1e-12
 
 
 def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
-    """Coefficients ``mu`` and ``p``, and unit vectors along the first principal direction, of the pair, ``shape=(n, 2)`` each.
+    """Coefficients ``mu`` and ``p`` of a pair, and its first principal directions (unit vectors).
 
     Args:
-        first, second: ``mu``, ``Q`` and the angle of the first principal direction (radians) of each side, ``shape=(n, 2)``, ``(n, 2)`` and
-            ``(n,)``, or shapes that broadcast to these; zero ``mu`` is frictionless.
+        first, second: ``mu``, ``Q`` and the angle of the first principal direction (radians) of
+            each side, ``shape=(n, 2)``, ``(n, 2)`` and ``(n,)``, or shapes that broadcast to these;
+            zero ``mu`` is frictionless.
+
+    Returns:
+        Three arrays, ``shape=(n, 2)`` each.
     """
     A, B = (_tensor(mu**2, angle) for mu, _, angle in (first, second))
     a, b = (np.prod(mu, axis=-1) for mu, *_ in (first, second))  # roots of the determinants
@@ -54,6 +61,11 @@ def mean(first: tuple, second: tuple) -> tuple[np.ndarray, ...]:
 
 
 def _tensor(values: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Half the trace of tensors with these principal values, and their deviators as components along doubled angles."""
+    """Half the trace and the two deviator components, in double angles, of symmetric 2 x 2 tensors.
+
+    Args:
+        values: Principal values, ``shape=(n, 2)``.
+        angle: Angle of the first principal direction, radians, ``shape=(n,)``.
+    """
     iso, rest = (values[..., 0] + values[..., 1]) / 2, (values[..., 0] - values[..., 1]) / 2
     return iso + 0.0 * angle, rest * np.cos(2 * angle), rest * np.sin(2 * angle)

@@ -1,18 +1,22 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""The law at nodes whose motion along the surface is prescribed by supports, entirely or except along one direction ``f``.
+r"""Friction law at nodes with prescribed tangential motion, in all directions or all but one.
 
-A reaction along a prescribed direction moves nothing: the support carries the rest of the force there.  So the reaction is a
-function of the normal reaction R and of the slip, not an unknown.  With the friction per unit normal reaction against a slip s,
+In a prescribed direction, the reaction does not affect the motion, as the support balances it.  So
+it is not an unknown, but a function of the normal reaction R and of the slip.  With the friction
+per normal reaction against a slip s,
 
 .. math:: d(s) = \frac{P^2 s}{|M^{-1} P^2 s|},
 
-- a node that the support moves along ``k`` slips by ``s = k + w f`` and has ``r_t = -R d(s)``.  The only unknown is the slip ``w`` along
-  ``f``; it follows from ``r_f = tau_f + rho w``, with the predictor ``tau``;
-- a node that the support does not move, ``k = 0``, slips along ``f`` alone: ``|r_f| <= R f.d(f)``, and the component across has the ratio
-  of ``d(f)``.  Until it slips, it keeps the friction of the last step, cut back to the cone.
+- a node with prescribed slip ``k`` slips by ``s = k + w f`` and has ``r_t = -R d(s)``.  The only
+  unknown is the slip ``w`` along ``f``; it follows from ``r_f = tau_f + rho w``, with the predictor
+  ``tau``;
+- a node with zero prescribed slip, ``k = 0``, slips along ``f`` only: ``|r_f| <= R f.d(f)``, and
+  the other component has the ratio of ``d(f)``.  While it sticks, it keeps the friction of the last
+  step, reduced to the cone if necessary.
 
-This is the law of [dSFMH07, Section 1] for all components together.  Needs NumPy alone.
+In both cases, this is the law of [dSFMH07, Section 1] for all components together.  Needs NumPy
+alone.
 """
 
 from __future__ import annotations
@@ -29,10 +33,10 @@ from dolfinx_contact.law.friction import Friction
 if TYPE_CHECKING:
     from dolfinx_contact.law.maps import NodalLaw
 
-# Relative rounding of directions and of kept friction.
+# Relative bound of rounding errors in directions and in the friction kept from the last step.
 RELATIVE_ROUNDING = 32 * np.finfo(float).eps
 
-# Iteration limit for the slip along a free direction: Newton steps and bisections.
+# Iteration limit for the slip along the free direction; Newton steps and bisections count.
 MOST_STEPS = 100
 
 IS_OPEN = 0
@@ -41,7 +45,15 @@ IS_SLIPPING = 2
 
 
 def across(friction: Friction, along: np.ndarray) -> np.ndarray:
-    """``d(f) / f.d(f)``, friction relative to its component along ``f`` for slip along ``f``, ``shape=(n, T)``; zero where ``f`` is."""
+    """Friction for slip along ``f``, relative to its component along ``f``: ``d(f) / f.d(f)``.
+
+    Args:
+        friction: Coefficients of the n nodes.
+        along: Direction ``f`` of each node, ``shape=(n, T)``, unit vectors or zero, local frame.
+
+    Returns:
+        ``shape=(n, T)``, local frame, dimensionless; zero where ``f`` is zero.
+    """
     ratio = friction.drag(along)
     forward = _dot(ratio, along)[:, None]
     ratio = np.divide(ratio, forward, out=along.copy(), where=forward > 0)
@@ -57,15 +69,19 @@ def supported(
     known: np.ndarray,
     last: np.ndarray,
 ) -> NodalLaw:
-    """The compiled law, or, if supports move, guide, or have moved a node, a ``SupportedLaw`` in its place.
+    """Friction law with tangential supports: ``law``, or a ``SupportedLaw`` if needed.
+
+    A support affects friction if it prescribes slip, leaves a free direction that is not a
+    principal one, or if friction from a prescribed slip remains from the last step.
 
     Args:
-        law: The compiled law of ``n`` nodes.
-        friction: Its coefficients.
-        nodes: Indices of the nodes that supports hold in a tangential direction, ``shape=(k,)``.
-        along: Free tangential direction ``f`` of these nodes, unit vectors, zero where none is free, ``shape=(k, T)``, local frame.
-        known: Slip along the held directions, ``shape=(n, T)``; zero where it is no more than rounding.
-        last: Tangential reactions of the last step, ``shape=(n, T)``.
+        law: Compiled law of ``n`` nodes.
+        friction: Coefficients of the compiled law.
+        nodes: Indices of nodes with a constrained tangential direction, ``shape=(k,)``.
+        along: Free tangential direction ``f`` of these nodes, unit vectors, zero where none is
+            free, ``shape=(k, T)``, local frame.
+        known: Prescribed slip, ``shape=(n, T)``, local frame, length; zero within rounding.
+        last: Tangential reactions of the last step, ``shape=(n, T)``, local frame.
     """
     coefficients = friction.at(nodes)
     rough = np.broadcast_to(coefficients.mu[..., 0] > 0.0, nodes.shape)
@@ -81,14 +97,18 @@ def supported(
 
 @dataclass(frozen=True)
 class SupportedLaw:
-    """The compiled law with other maps at ``k`` supported nodes; see ``supported``.
+    """Compiled law with separate maps at ``k`` nodes with tangential supports; see ``supported``.
 
     Args:
-        law: The compiled law of ``n`` nodes.
+        law: Compiled law of ``n`` nodes.
         friction: Coefficients of the ``k`` nodes.
-        known: Slip along held directions, ``shape=(n, T)``; the slip passed to the maps contains it.
-        nodes, along, ratio, moved, kept: For the ``k`` nodes: indices, ``f``, ``d(f) / f.d(f)``, ``known``, and the part of the
-            last step's friction that is not along the ratio.
+        known: Prescribed slip, ``shape=(n, T)``, local frame; the slip passed to the maps includes
+            it.
+        nodes: Indices of the ``k`` nodes.
+        along: Free direction ``f`` of each of them, zero if there is none, ``shape=(k, T)``.
+        ratio: Friction ``d(f) / f.d(f)`` for slip along ``f``, ``shape=(k, T)``.
+        moved: Prescribed slip of these nodes, ``shape=(k, T)``.
+        kept: Friction of the last step without its part along ``ratio``, ``shape=(k, T)``.
     """
 
     law: NodalLaw
@@ -102,7 +122,12 @@ class SupportedLaw:
 
     @cached_property
     def kinds(self) -> tuple:
-        """Masks of moved and of guided nodes, indices of those that are both; and ``d(known)``, ``f.d(f)``, the friction of those that are both."""
+        """Classification of the ``k`` nodes, and quantities that depend on it.
+
+        Returns:
+            Mask of nodes with prescribed slip, mask of nodes with a free direction, indices of
+            nodes in both; ``d(known)``, ``f.d(f)``, and the coefficients of the nodes in both.
+        """
         moved, guided = self.moved.any(axis=1), self.along.any(axis=1)
         both = np.flatnonzero(moved & guided)
         most = _dot(self.friction.drag(self.along), self.along)
@@ -146,13 +171,19 @@ class SupportedLaw:
         slip: np.ndarray,
         *rho: np.ndarray,
     ) -> tuple:
-        """The compiled map's results, replaced at the ``k`` nodes; ``rho`` is one of all directions, or normal and tangential."""
+        """Results of the compiled map, replaced at the ``k`` nodes.
+
+        Args:
+            kernels: Method of the compiled law.
+            reaction, gap, slip: Arguments of the map, as in ``NodalLaw``.
+            rho: One augmentation parameter for all directions, or a normal and a tangential one.
+        """
         made, status, *derivatives = kernels(reaction, gap, slip - self.known, *rho)
         normal, tangential = rho[0], rho[-1]
         nodes, f = self.nodes, self.along
         R = np.maximum(reaction[nodes, -1] - normal[nodes] * gap[nodes], 0.0)
         tau = _dot(reaction[nodes, :-1] - tangential[nodes, None] * slip[nodes], f)
-        answer = _Answer(self, tangential[nodes], R, tau)
+        answer = _SupportedFriction(self, tangential[nodes], R, tau)
         made, status = made.copy(), status.copy()
         made[nodes] = np.column_stack((answer.friction, R))
         status[nodes] = np.where(R > 0.0, np.where(answer.slips, IS_SLIPPING, IS_STICKING), IS_OPEN)
@@ -161,8 +192,17 @@ class SupportedLaw:
         return made, status, *answer.derivatives(derivatives, nodes, R > 0.0, normal[nodes])
 
 
-class _Answer:
-    """Friction of ``k`` supported nodes, and its derivatives with respect to R and to the predictor along ``f``."""
+class _SupportedFriction:
+    """Friction at ``k`` nodes with tangential supports, and its derivatives.
+
+    The derivatives are with respect to the normal reaction R and to the predictor along ``f``.
+
+    Args:
+        supported: The law with its supports.
+        rho: Tangential augmentation parameters, ``shape=(k,)``, force per length.
+        R: Normal reactions, ``shape=(k,)``.
+        tau: Predictor along ``f``, ``shape=(k,)``.
+    """
 
     def __init__(self, supported: SupportedLaw, rho: np.ndarray, R: np.ndarray, tau: np.ndarray):
         self._law, self._f, self._rho = supported.friction, supported.along, rho
@@ -180,7 +220,8 @@ class _Answer:
         along = np.clip(tau, -most * R, most * R)
         stuck = along[:, None] * supported.ratio
         stuck += (
-            self._room(stuck, np.where(slips[:, None], 0.0, supported.kept), R) * supported.kept
+            self._largest_factor(stuck, np.where(slips[:, None], 0.0, supported.kept), R)
+            * supported.kept
         )
         made = moved[:, None]
         self.friction = np.where(made, -R[:, None] * d, stuck)
@@ -190,8 +231,8 @@ class _Answer:
         self.by_R = np.where(made, by_R, (slips * np.sign(tau) * most)[:, None] * supported.ratio)
         self.slips = moved | (guided & slips)
 
-    def _room(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Largest factor <= 1 of ``kept`` that, added to ``friction``, stays in the cone, ``shape=(k, 1)``."""
+    def _largest_factor(self, friction: np.ndarray, kept: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Largest a in [0, 1] with ``friction + a kept`` in the friction cone, ``shape=(k, 1)``."""
         a, b = (self._law.over_radii(part) for part in (friction, kept))
         A, B, C = _dot(b, b), _dot(a, b), np.minimum(_dot(a, a) - R**2, 0.0)
         root = np.sqrt(B**2 - A * C) - B
@@ -205,7 +246,14 @@ class _Answer:
         touches: np.ndarray,
         normal: np.ndarray,
     ) -> list:
-        """Derivatives with respect to the previous reaction and to the motion, those of the compiled map replaced at these nodes."""
+        """Derivatives with respect to the previous reaction and to the motion, for all nodes.
+
+        Args:
+            found: Both derivatives of the compiled map, ``shape=(n, T + 1, T + 1)`` each.
+            nodes: Indices of the ``k`` nodes at which they are replaced.
+            touches: Whether these nodes are in contact, ``shape=(k,)``, bool.
+            normal: Normal augmentation parameters of these nodes, ``shape=(k,)``.
+        """
         f, T = self._f, self._f.shape[1]
         by_reaction = np.zeros((len(nodes), T + 1, T + 1))
         by_reaction[:, :T, :T] = self.by_predictor[:, :, None] * f[:, None, :]
@@ -229,9 +277,16 @@ def _slipped(
     tau: np.ndarray,
     known: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``d(known + w f)`` and its derivative with respect to w at the root w of ``rho w + R f.d + tau = 0``.
+    """Friction ``d(known + w f)`` and its derivative with respect to w, at the slip w along ``f``.
 
-    The left side increases with w, so Newton's method, safeguarded by bisection, finds the root.
+    The slip w is the root of ``rho w + R f.d + tau = 0``.  The left side increases with w, so
+    Newton's method, safeguarded by bisection, finds it.
+
+    Args:
+        friction: Coefficients of the k nodes.
+        f: Free directions, ``shape=(k, T)``.
+        rho, R, tau: As in ``_SupportedFriction``.
+        known: Prescribed slip, ``shape=(k, T)``.
     """
     most = R * np.linalg.norm(friction.mu[..., : known.shape[1]], axis=-1)
     low, high = (-tau - most) / rho, (-tau + most) / rho

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Archard's wear law: worn depth from the frictional work per area."""
+"""Archard's wear law: worn depth from frictional work per area."""
 
 from __future__ import annotations
 
@@ -13,36 +13,45 @@ from dolfinx_contact.support.checks import finite, number, valued
 
 
 class Wear(Guarded):
-    """Archard wear, in which the worn depth opens the gap: ``k`` is volume per frictional work; immutable.
+    """Archard wear with a worn depth that opens the gap; immutable.
 
-    A specific wear rate, volume per normal force and sliding distance, is ``mu`` times as large, in the same unit mm³/(N mm): ``k = rate / mu``.
+    The coefficient ``k`` is worn volume per frictional work.  A specific wear rate, volume per
+    normal force and sliding distance, is ``mu`` times as large, in the same unit mm³/(N mm):
+    ``k = rate / mu``.
 
-    In a step, the depth of a node grows by ``sum_i k_i w_i / A``, with the frictional work ``w_i >= 0`` along principal
-    direction i (``dissipation.py``) and the nodal area ``A``.  So the worn volume, the sum of depth times area, grows by ``sum_i
-    k_i w_i``.  With one coefficient and isotropic friction, ``k = K / (mu H)`` is Archard's law, with his coefficient K and the
+    In a step, the depth of a node grows by ``sum_i k_i w_i / A``, with the frictional work
+    ``w_i >= 0`` along principal direction i (``dissipation.py``) and the nodal area ``A``.  So the
+    worn volume, the sum of depth times area, grows by ``sum_i k_i w_i``.  For one coefficient and
+    isotropic friction, this is Archard's law with ``k = K / (mu H)``, his coefficient K and the
     hardness H [J. F. Archard, J. Appl. Phys. 24 (1953) 981].
 
-    By default wear is implicit: the depth worn in a step is an unknown of the step, so a node never wears out of contact, whatever
-    the coefficient.  If wear in the step reduces a node's force by less than a fiftieth, the work is that of ``contact.dissipation``,
-    with the mean of the forces at both ends of the step.  Beyond that, the force at the end has a larger weight, up to one (backward
-    Euler).  The step is solved repeatedly until the error of the depths changes reactions by at most a tenth of ``geometry_tol``;
-    for gentle wear, one repetition suffices.
+    By default wear is implicit: the depth worn in a step is an unknown of the step, so wear never
+    opens the contact at a node, for any coefficient.  If wear in the step reduces a node's force by
+    less than a fiftieth, the work is ``contact.dissipation``, with the mean of the forces at both
+    ends of the step.  Otherwise, the force at the end has a larger weight, up to one (backward
+    Euler).  The step is solved repeatedly until the error of the depths changes reactions by at
+    most a tenth of ``geometry_tol``; for mild wear, one repetition suffices.
 
-    Explicit wear opens the gap of the next step, and the work is always that of ``contact.dissipation``.  If the depth worn in a
-    step, times the node's stiffness, exceeds the node's reaction, the step is too large: a warning says into how many steps
-    to divide it.
+    Explicit wear opens the gap of the next step, and the work is always ``contact.dissipation``.
+    If the depth worn in a step, times the node's stiffness, exceeds the node's reaction, the step
+    is too large: a warning recommends the number of smaller steps.
 
     Args:
-        coefficient: k >= 0, a number, or a pair for the two principal directions; volume per work, the inverse of a stress.  Or a
-            field: a callable of ``x``, ``shape=(3, n)``, that returns ``shape=(n,)`` or ``(2, n)``, or a DOLFINx Function in a
-            continuous Lagrange space.  A field is evaluated at the contact nodes when ``contact.wear`` is assigned.
+        coefficient: Wear coefficient k >= 0, a number, or a pair for the two principal directions;
+            volume per work, the inverse of a stress.  Or a field: a callable of ``x``,
+            ``shape=(3, n)``, that returns ``shape=(n,)`` or ``(2, n)``, or a DOLFINx Function in a
+            continuous Lagrange space.  A field is evaluated at the contact nodes when
+            ``contact.wear`` is assigned.
         explicit: Whether the depth worn in a step opens only the gap of the next step.
-        threshold: Frictional work per area that a node dissipates before it begins to wear, force per length.
-        opposite: k of the other side, a ``DeformableSurface``; a number or a pair, not a field.  The gap opens by the depths of both
-            sides, and each depth stays with its own body.  A rigid surface does not wear.
+        threshold: Frictional work per area that a node dissipates before it begins to wear, force
+            per length.
+        opposite: Wear coefficient of the master side, a ``DeformableSurface``; a number or a pair,
+            not a field.  The gap opens by the depths of both sides, and each depth stays with its
+            own body.  A rigid surface does not wear.
 
     Raises:
-        ValueError: a coefficient or the threshold is negative, not finite or not real, or there are more than two coefficients.
+        ValueError: A coefficient or the threshold is negative, not finite or not real, or there are
+            more than two coefficients.
 
     Example:
         >>> contact.wear = dc.Wear(1e-6)  # mm³ per N mm
@@ -70,12 +79,14 @@ class Wear(Guarded):
     def depth(
         self, work: np.ndarray, area: np.ndarray, coefficient: np.ndarray | None = None
     ) -> np.ndarray:
-        """Depth that frictional work wears off both sides together: ``sum_i k_i w_i / A``, with the sum of both sides' k.
+        """Worn depth of both sides together, ``sum_i k_i w_i / A`` with the sum of both sides' k.
 
         Args:
-            work: Frictional work along the principal directions, ``shape=(n, gdim - 1)``, force times length.
+            work: Frictional work along the principal directions, ``shape=(n, gdim - 1)``, force
+                times length.
             area: Nodal areas, ``shape=(n,)``.
-            coefficient: Values of a field at the nodes, ``shape=(n, 2)``; None takes the law's own coefficient.
+            coefficient: Values of a field at the nodes, ``shape=(n, 2)``; by default the
+                coefficient of this object.
 
         Returns:
             ``shape=(n,)``, length; zero where the area is zero.
@@ -85,17 +96,21 @@ class Wear(Guarded):
         return np.divide(volume, area, out=np.zeros_like(volume), where=area > 0.0)
 
     def opposite_share(self, work: np.ndarray, coefficient: np.ndarray | None = None) -> np.ndarray:
-        """Fraction of ``depth`` that the other side loses, ``shape=(n,)``, between 0 and 1; arguments as for ``depth``."""
+        """Fraction of the worn depth that the master side loses, ``shape=(n,)``, between 0 and 1.
+
+        Args:
+            work, coefficient: As in ``depth``.
+        """
         k = self.coefficient if coefficient is None else coefficient
         both, other = _volume(k + self.opposite, work), _volume(self.opposite, work)
         return np.divide(other, both, out=np.zeros_like(both), where=both > 0.0)
 
     def part(self, work: np.ndarray, before: np.ndarray, area: np.ndarray) -> np.ndarray:
-        """Fraction of the step's work that wears, being above the threshold, ``shape=(n,)``, between 0 and 1.
+        """Fraction of a step's work above the wear threshold, ``shape=(n,)``, from 0 to 1.
 
         Args:
             work: Frictional work of the step, ``shape=(n,)``, force times length.
-            before: Frictional work before the step, ``shape=(n,)``.
+            before: Total frictional work of all earlier steps, ``shape=(n,)``.
             area: Nodal areas, ``shape=(n,)``.
         """
         beyond = before + work - self.threshold * area

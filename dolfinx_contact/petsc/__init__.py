@@ -1,3 +1,3 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Linear solvers: PETSc behind a few verbs."""
+"""Linear solvers and preconditioners of PETSc."""

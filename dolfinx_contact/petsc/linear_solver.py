@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""PETSc behind two verbs: solve a linear system, and apply its preconditioner once."""
+"""PETSc's linear solvers: solve a linear system, or apply its preconditioner once."""
 
 from __future__ import annotations
 
@@ -19,22 +19,25 @@ if TYPE_CHECKING:
 
 DIRECT_OPTIONS = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
-# Of symmetric matrices half of the factors; the ordering, PORD, leaves up to a third fewer entries than METIS, never more
-# (notes/2026-11-22-condensed-speed.md).
+# For symmetric matrices: half the factors. The ordering PORD leaves up to a third fewer entries
+# than METIS, never more (notes/2026-11-22-condensed-speed.md).
 SYMMETRIC_OPTIONS = DIRECT_OPTIONS | {"pc_type": "cholesky", "mat_mumps_icntl_7": 4}
 
-# Of matrices that are small, or all but full, all orderings are as good, and PORD, which may find no separator in them, ends
-# the process. AMD does not.
+# For symmetric matrices that are small or almost dense: PORD may find no separator in them and then
+# ends the process. AMD does not, and no ordering is better for them. SMALL_SIZE is a number of
+# unknowns, DENSE_PART a fraction of nonzero entries.
 FULL_OPTIONS = SYMMETRIC_OPTIONS | {"mat_mumps_icntl_7": 0}
 SMALL_SIZE = 100
 DENSE_PART = 0.5
 
-# Not PETSc's, of a matrix that is symmetric: sweeps over its lower half smooth the finest level, see ``Multigrid``.
+# Option of this package, unknown to PETSc: symmetric Gauss-Seidel smooths the finest level of a
+# symmetric matrix, see ``Multigrid``.
 GAUSS_SEIDEL = "mg_finest_gauss_seidel"
 
-# Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest level, Chebyshev's polynomial
-# with Jacobi the others, whose matrices may have rows of zeros (notes/2026-11-27-multigrid.md). Every solve starts from zero, so
-# that a run continued from a checkpoint has the same bits.
+# Conjugate gradients with smoothed aggregation. A symmetric Gauss-Seidel sweep smooths the finest
+# level. Chebyshev iteration with Jacobi smooths the other levels, whose matrices may have zero rows
+# (notes/2026-11-27-multigrid.md). Every solve starts from zero, so that a run continued from a
+# checkpoint is identical bit by bit.
 MULTIGRID_OPTIONS = {
     "ksp_type": "cg",
     "ksp_rtol": 1e-12,
@@ -48,30 +51,33 @@ MULTIGRID_OPTIONS = {
     GAUSS_SEIDEL: True,
 }
 
-# Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), by itself 20), once that was too little, and what it answers
-# then (INFOG(1)) [MUMPS users' guide, error codes].  On several ranks the estimate does not know which of them is busy, of
-# matrices that are not definite it does not know the pivots.
+# Workspace of MUMPS beyond its estimate, in per cent (ICNTL(14), 20 by default), tried after a
+# failure for lack of workspace; and the status INFOG(1) of such a failure [MUMPS users' guide,
+# error codes]. The estimate neglects load balancing between ranks, and pivoting in indefinite
+# matrices.
 _MUMPS_WORKSPACES = (50, 100, 200, 400, 800)
 _SHORT_OF_WORKSPACE = (-8, -9, -17, -20)
 
-# Of a rough solve: enough to see that a body is pressed on a plane, and how hard.
+# Relative tolerance of a rough solve: enough to estimate contact pressure.
 ROUGH_TOLERANCE = 1e-3
 
-# Over the largest sum of a row, an entry's difference from the one across the diagonal that is none.
+# Difference of an entry from its transposed entry, over the matrix's infinity norm, up to which the
+# matrix counts as symmetric.
 _SYMMETRY_ROUNDING = 1e-14
 
-# Unknowns beyond which multigrid is the default, by the block size of the matrix, which is the dimension; of two, factors of
-# 500,000 unknowns have some 120 entries a row, and no grading of the mesh slows them down
-# (notes/2026-11-27-multigrid.md).
+# Number of unknowns above which multigrid is the default, by block size of the matrix, which is the
+# dimension. In 2-D, factors of 500,000 unknowns have about 120 entries per row, independent of the
+# grading of the mesh (notes/2026-11-27-multigrid.md).
 LARGE_SIZES = {2: 500_000, 3: 50_000}
 
-# The same of solid bodies with so many contact nodes that the fixed point is tried first, see docs/howto/large_meshes.md.
+# Number of unknowns above which multigrid is the default for a 3-D body with so many contact nodes
+# that the fixed-point solver is tried first, see docs/howto/large_meshes.md.
 CROWDED_SIZE = 20_000
 
 
 @contextmanager
 def stage(name: str):
-    """A stage of PETSc's ``-log_view``."""
+    """Context manager of a named stage of PETSc's ``-log_view``."""
     log = PETSc.Log.Stage(name)
     log.push()
     try:
@@ -81,13 +87,13 @@ def stage(name: str):
 
 
 def preconditioner(A: PETSc.Mat, options: dict[str, Any] | None, prefix: str) -> str:
-    """PETSc's type of the preconditioner that a ``LinearSolver`` with these arguments has."""
+    """Return PETSc's type of the preconditioner of a ``LinearSolver`` with these arguments."""
     default = _options(A, options).get("pc_type", "")
     return PETSc.Options(prefix).getString("pc_type", default)
 
 
 def _options(A: PETSc.Mat, options: dict[str, Any] | None) -> dict:
-    """The options, or the default for a matrix of that size and dimension."""
+    """Return the user's options, or defaults for the size and block size of the matrix."""
     if options is not None:
         return options
     return (
@@ -98,9 +104,10 @@ def _options(A: PETSc.Mat, options: dict[str, Any] | None) -> dict:
 
 
 def _to_factorise(A: PETSc.Mat):
-    """A matrix without its zeros, which factors would fill, and the options for it.  Collective.
+    """Return a copy of the matrix without zero entries, and the options to factorise it.
+    Collective.
 
-    Zeros are, among others, all couplings of fixed degrees of freedom.
+    Factors would fill zero entries.  Among them are all couplings of fixed degrees of freedom.
     """
     symmetric = A.isSymmetric(_SYMMETRY_ROUNDING * A.norm(PETSc.NormType.INFINITY))
     starts, columns, values = A.getValuesCSR()
@@ -116,10 +123,11 @@ def _to_factorise(A: PETSc.Mat):
 
 @contextmanager
 def options_given(prefix: str, options: dict):
-    """PETSc's database with options; a list that afterwards has the names of those that PETSc did not ask for.
+    """Context manager that sets PETSc options and yields a list for the names of unread ones.
 
-    They are deleted again at the end: PETSc 3.18 has room for 512.  What stands there already (PETSC_OPTIONS, the command
-    line) goes before them.
+    The list is filled at the end of the block.  The options are then deleted, because PETSc 3.18
+    has room for 512.  Options already in the database (PETSC_OPTIONS, the command line) have
+    precedence.
     """
     database, unread = PETSc.Options(prefix), []
     ours = {key: value for key, value in options.items() if not database.hasName(key)}
@@ -133,13 +141,16 @@ def options_given(prefix: str, options: dict):
             del database[key]
 
 
-def _petscs(options: dict) -> dict:
-    """Those that are PETSc's."""
+def _petsc_options(options: dict) -> dict:
+    """Return the options that PETSc itself knows."""
     return {key: value for key, value in options.items() if key != GAUSS_SEIDEL}
 
 
-def _sweeps(options: dict, prefix: str) -> bool:
-    """Whether Gauss-Seidel smooths the finest level: the options say so, and the user says nothing of smoothers."""
+def _uses_gauss_seidel(options: dict, prefix: str) -> bool:
+    """Whether Gauss-Seidel smooths the finest level.
+
+    The options must request it, and the user must not set other smoothers.
+    """
     database = PETSc.Options(prefix)
     of_levels = {key for key in options if key.startswith("mg_levels_")}
     message = any(
@@ -148,12 +159,15 @@ def _sweeps(options: dict, prefix: str) -> bool:
     return bool(options.get(GAUSS_SEIDEL)) and not message
 
 
-def _heed_signals(*_: object) -> None:
-    """A monitor of every iteration: Python answers Ctrl-C only while it runs itself."""
+def _process_signals(*_: object) -> None:
+    """KSP monitor without effect: while Python runs it, Ctrl-C is processed."""
 
 
 def raise_interrupt(failure: BaseException) -> None:
-    """Raise Ctrl-C from an error that PETSc made of it: since 3.25 what a callback raises is hidden behind one."""
+    """Raise the ``KeyboardInterrupt`` that PETSc has converted to an error, if there is one.
+
+    Since PETSc 3.25, an exception in a callback is the cause of a PETSc error.
+    """
     cause = failure.__cause__ if isinstance(failure, PETSc.Error) else None
     if isinstance(cause, KeyboardInterrupt):
         raise cause
@@ -171,15 +185,18 @@ class LinearSolverError(RuntimeError):
 
 
 def mumps_factors(ksp: PETSc.KSP):
-    """The factors of a solver set up with MUMPS, a PETSc matrix that tells of them; None of any other solver."""
+    """Return the MUMPS factors of a solver, a PETSc matrix, or None for any other solver."""
     pc = ksp.getPC()
     if pc.getType() not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
         return None
     return pc.getFactorMatrix()
 
 
-def _mumps_answer(ksp: PETSc.KSP) -> int | None:
-    """INFOG(1) of a factorisation by MUMPS, negative if it failed; None of any other solver."""
+def _mumps_status(ksp: PETSc.KSP) -> int | None:
+    """Return the status INFOG(1) of a MUMPS factorisation, or None for any other solver.
+
+    A negative status means failure.
+    """
     factors = mumps_factors(ksp)
     return None if factors is None else factors.getMumpsInfog(1)
 
@@ -188,7 +205,7 @@ def check_solved(ksp: PETSc.KSP, options: dict[str, Any] | None = None) -> None:
     """Raise ``LinearSolverError`` if the last solve of a ``PETSc.KSP`` did not converge."""
     if ksp.getConvergedReason() >= 0:
         return
-    answer = _mumps_answer(ksp)
+    answer = _mumps_status(ksp)
     mumps = "" if answer is None else f", MUMPS with INFOG(1) = {answer}"
     given = "" if options is None else f"; options {options}"
     direct = ksp.getType() == "preonly"
@@ -204,19 +221,23 @@ def check_solved(ksp: PETSc.KSP, options: dict[str, Any] | None = None) -> None:
 
 
 class LinearSolver:
-    """A matrix and the PETSc solver that its user's options describe.
+    """A matrix and its PETSc solver.
 
     Args:
         A: Assembled PETSc matrix.
-        options: PETSc options without prefix; None takes ``SYMMETRIC`` or ``DIRECT``, or ``MULTIGRID`` if ``A`` is large.
+        options: PETSc options without prefix.  None means ``SYMMETRIC_OPTIONS``, ``FULL_OPTIONS``
+            or ``DIRECT_OPTIONS``, or ``MULTIGRID_OPTIONS`` if ``A`` is large.
         prefix: Prefix of the options.
-        near_nullspace: Function that returns the rigid motions, ``shape=(n, 6 or 3)``, orthonormal, zero
-            at fixed degrees of freedom; called only where the preconditioner is no factorisation.
+        near_nullspace: Function that returns the rigid-body modes, ``shape=(n, 6 or 3)``,
+            orthonormal, zero at fixed degrees of freedom.  It is called only if the preconditioner
+            is not a factorisation.
 
     Attributes:
-        unread: Names of options that PETSc did not ask for.
-        levels: PETSc's preconditioner; ``ksp`` has a ``Multigrid`` on its levels instead where Gauss-Seidel smooths the finest.
-        halved: The matrix there, by its lower half; else None.
+        unread: Names of options that PETSc did not read.
+        levels: PETSc's preconditioner.  If Gauss-Seidel smooths the finest level, ``ksp`` uses a
+            ``Multigrid`` with the levels of this preconditioner instead.
+        halved: The matrix stored by its lower half if Gauss-Seidel smooths the finest level; else
+            None.
     """
 
     def __init__(
@@ -240,13 +261,13 @@ class LinearSolver:
             A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
         self.unread = self._set_up(A, prefix, options)
         for workspace in _MUMPS_WORKSPACES:
-            if _mumps_answer(self.ksp) not in _SHORT_OF_WORKSPACE:
+            if _mumps_status(self.ksp) not in _SHORT_OF_WORKSPACE:
                 break
-            self.ksp.reset()  # what MUMPS has analysed cannot be factorised after a failure
+            self.ksp.reset()  # after a failure, MUMPS cannot reuse its analysis
             self._set_up(A, prefix, options | {"mat_mumps_icntl_14": workspace})
         self.levels, self.halved, self._multigrid = self.ksp.getPC(), None, None
         gamg = self.levels.getType() == "gamg" and self.levels.getMGLevels() > 1
-        if gamg and _sweeps(options, prefix):
+        if gamg and _uses_gauss_seidel(options, prefix):
             from dolfinx_contact.petsc.symmetric_matrix import halved
 
             self.halved = halved(A)
@@ -256,23 +277,27 @@ class LinearSolver:
             self._multigrid = Multigrid(self.levels, self.halved)
             self.ksp.setPC(self._multigrid.pc)
         if not self.exact:
-            self.ksp.setMonitor(_heed_signals)
+            self.ksp.setMonitor(_process_signals)
         self._right, self._left = A.createVecs()
 
     def _set_up(self, A: PETSc.Mat, prefix: str, options: dict) -> list[str]:
-        """Factorise, or set up the levels; the options that PETSc did not ask for."""
+        """Factorise or set up multigrid levels, and return names of options unread by PETSc."""
         self.ksp.setOperators(A)
-        with options_given(prefix, _petscs(options)) as unread:
+        with options_given(prefix, _petsc_options(options)) as unread:
             self.ksp.setFromOptions()
             self.ksp.setUp()  # reads the options of the levels, which must still be there
         return unread
 
     def stiffened(self, S: PETSc.Mat, how: PETSc.Mat.Structure) -> tuple[PETSc.Mat, Multigrid]:
-        """The matrix plus springs, and multigrid for it on the levels of this solver, whose preconditioner is GAMG.
+        """Return the matrix plus springs, and multigrid for the sum on the levels of this solver.
+        Collective.
+
+        The preconditioner of this solver must be GAMG.
 
         Args:
-            S: The springs alone.
-            how: How their entries lie to those of the matrix.  Collective.
+            S: Matrix of the springs.
+            how: PETSc ``Mat.Structure``: relation of the nonzero pattern of ``S`` to the pattern of
+                the matrix.
         """
         from dolfinx_contact.petsc.multigrid import Multigrid
         from dolfinx_contact.petsc.symmetric_matrix import halved, plus
@@ -286,28 +311,31 @@ class LinearSolver:
                 A.destroy()
                 A = half
         prefix = self.ksp.getOptionsPrefix()
-        with options_given(prefix, _petscs(self._options)):  # smoothers read them once more
+        with options_given(prefix, _petsc_options(self._options)):  # smoothers read them again
             return A, Multigrid(self.levels, A, S, how)
 
     def destroy(self) -> None:
-        """Free the factors or levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
+        """Free the factors or multigrid levels.  Collective.
+
+        Python's garbage collector does not free them (PETSc 3.18).
+        """
         for part in filter(None, (self.ksp, self.levels, self._multigrid, self.halved)):
             part.destroy()
 
     @property
     def exact(self) -> bool:
-        """Whether every solve is, as with a factorisation."""
+        """Whether the solver is direct, a factorisation."""
         return self.ksp.getType() == "preonly"
 
     def solve(
         self, b: np.ndarray, rough: bool = False, start: np.ndarray | None = None
     ) -> np.ndarray:
-        """A^-1 b to the tolerance of the options; arrays of owned degrees of freedom.
+        """Return ``A^-1 b`` to the tolerance of the options; arrays of owned degrees of freedom.
 
         Args:
             b: Right-hand side.
-            rough: ``ROUGH`` is enough.
-            start: Where to start; None is zero.
+            rough: Whether the relative tolerance ``ROUGH_TOLERANCE`` is enough.
+            start: Initial guess; None means zero.
 
         Raises:
             LinearSolverError: PETSc did not converge.
@@ -320,14 +348,14 @@ class LinearSolver:
         self.ksp.setTolerances(rtol=max(rtol, ROUGH_TOLERANCE) if rough else rtol)
         try:
             self.ksp.solve(self._left, self._right)
-        finally:  # others use the KSP, too, also after a solve that was interrupted
+        finally:  # other code uses this KSP too, even after an interrupted solve
             self.ksp.setTolerances(rtol=rtol)
             self.ksp.setInitialGuessNonzero(False)
         check_solved(self.ksp, self._options)
         return self._right.array_r.copy()
 
     def apply(self, b: np.ndarray) -> np.ndarray:
-        """The preconditioner applied once: a back-solve, or one multigrid cycle."""
+        """Return the preconditioner applied once to ``b``: a back-solve or a multigrid cycle."""
         self._left.array_w[:] = b
         self.ksp.getPC().apply(self._left, self._right)
         return self._right.array_r.copy()

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Multigrid on the levels of a matrix, for that matrix or for it plus springs at a few nodes."""
+"""Multigrid for a matrix with springs added at a few nodes, on the levels of the matrix alone."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from dolfinx_contact.petsc.symmetric_matrix import GaussSeidel
 class Multigrid:
     """PETSc's multigrid for ``A = K + S``, with the interpolations and smoothers of GAMG for ``K``.
 
-    On every level the matrix is that of ``K`` plus ``P^T S P``, whose cost is that of the few nodes with springs:
-    nothing of the body is coarsened a second time.
+    On every level, the matrix of ``K`` is reused and ``P^T S P`` is added, which is cheap because
+    few nodes have springs.  The body is not coarsened a second time.
 
     Args:
-        levels: The set-up preconditioner of ``K``, a PETSc PC of type GAMG.
-        A: The matrix plus springs.  If it is a ``halved`` one, Gauss-Seidel sweeps smooth the finest level.
-        S: The springs alone; None without springs.
-        how: How their entries lie to those of ``K``, a PETSc ``Mat.Structure``.  Collective.
+        levels: Preconditioner of ``K``, set up, a PETSc PC of type GAMG.
+        A: The matrix plus springs.  If ``halved`` returned it, Gauss-Seidel smooths the finest
+            level.
+        S: Matrix of the springs; None without springs.
+        how: PETSc ``Mat.Structure``: relation of the nonzero pattern of ``S`` to the pattern of
+            ``K``.  Collective.
 
     Attributes:
         pc: The PETSc PC.
@@ -42,9 +44,9 @@ class Multigrid:
         pc.getMGSmoother(finest).setOperators(A, A)
         for level in range(finest, 0, -1):
             if A.getType() == "python":
-                _sweeps(pc.getMGSmoother(level))
+                _set_gauss_seidel(pc.getMGSmoother(level))
             else:
-                _as(levels.getMGSmoother(level), pc.getMGSmoother(level))
+                _copy_smoother(levels.getMGSmoother(level), pc.getMGSmoother(level))
             P = levels.getMGInterpolation(level)
             pc.setMGInterpolation(level, P)
             A = levels.getMGSmoother(level - 1).getOperators()[1]
@@ -59,26 +61,29 @@ class Multigrid:
         self._right, self._left = pc.getOperators()[1].createVecs()
 
     def destroy(self) -> None:
-        """Free the levels: Python's collector does not reach them (PETSc 3.18).  Collective."""
+        """Free the levels.  Collective.
+
+        Python's garbage collector does not free them (PETSc 3.18).
+        """
         self.pc.destroy()
 
     def apply(self, b: np.ndarray) -> np.ndarray:
-        """One cycle for ``A x = b``; arrays of owned degrees of freedom."""
+        """Return one multigrid cycle from zero for ``A x = b``; owned degrees of freedom."""
         self._left.array_w[:] = b
         self.pc.apply(self._left, self._right)
         return self._right.array_r.copy()
 
 
-def _as(known: PETSc.KSP, smoother: PETSc.KSP) -> None:
-    """Give a smoother the type, steps and preconditioner of another one, and what options say of it."""
+def _copy_smoother(known: PETSc.KSP, smoother: PETSc.KSP) -> None:
+    """Copy type, number of iterations and preconditioner of a smoother, and set its options."""
     smoother.setType(known.getType())
     smoother.setTolerances(max_it=known.getTolerances()[3])
     smoother.getPC().setType(known.getPC().getType())
     smoother.setFromOptions()
 
 
-def _sweeps(smoother: PETSc.KSP) -> None:
-    """Let a smoother be one symmetric Gauss-Seidel sweep, whatever options say of all levels."""
+def _set_gauss_seidel(smoother: PETSc.KSP) -> None:
+    """Make a smoother one symmetric Gauss-Seidel sweep, regardless of options for levels."""
     smoother.setOptionsPrefix(f"{smoother.getOptionsPrefix()}sweep_")
     smoother.setType("richardson")
     smoother.setTolerances(max_it=1)

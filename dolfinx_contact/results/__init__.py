@@ -1,3 +1,3 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What a run leaves behind: tables and checkpoints."""
+"""Results of a run: step records, tables, profiles, VTK files, pictures and checkpoints."""

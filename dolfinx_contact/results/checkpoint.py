@@ -1,9 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Checkpoints: everything that the next step starts from, in one file.
+"""Checkpoints: the complete state from which the next load step starts, in one file.
 
-Rows are identified by the index of their node in the mesh as it was read or made.  So a checkpoint can be read with another
-partition and another number of ranks.
+Rows of arrays are identified by the original index of their node in the mesh.  A checkpoint can
+therefore be loaded with another partition and another number of ranks.
 """
 
 from __future__ import annotations
@@ -31,16 +31,23 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
 
-FILE_VERSION = 3  # of what is written; files of others are refused
+# Version of the file format.  Files of other versions are rejected.
+FILE_VERSION = 3
 
-# Ends of the names of arrays that not every history has.
-MAY_LACK = ("law_of_last_step", "home", "rotation_of_plane")
+# Last parts of the names of arrays that exist only for some contacts and may be missing in a file.
+OPTIONAL_ARRAYS = ("law_of_last_step", "home", "rotation_of_plane")
 
+# Last sentence of error messages about invalid files.
 WRITE_ANEW = "Take another one, or write it anew with problem.save."
 
 
 def save(path: str | PathLike[str], problem: ContactProblem) -> None:
-    """Write the accepted state of a problem.  Collective."""
+    """Write the last converged state of a problem to a checkpoint file.  Collective.
+
+    Raises:
+        ValueError: ``path`` is not a file name.
+        OSError: on all ranks, if the file cannot be written.
+    """
     body, contacts, accepted = problem.body, problem.contacts, problem.accepted
     comm, nodes = body.comm, _nodes(body, contacts)
     with raised_together(comm):
@@ -71,13 +78,19 @@ def save(path: str | PathLike[str], problem: ContactProblem) -> None:
 
 
 def _arrays(problem: ContactProblem, accepted: Accepted | None = None) -> dict[str, np.ndarray]:
-    """Displacements, histories and internal variables by name, this rank's rows; without a state those of any.  Collective."""
+    """Return this rank's rows of displacements and history variables by name.  Collective.
+
+    Args:
+        problem: The ContactProblem.
+        accepted: Last converged state.  If None, displacements are zero, and the arrays serve only
+            to check the names, shapes and types in a file.
+    """
     body, contacts = problem.body, problem.contacts
     x, before = 2 * [np.zeros(body.size)] if accepted is None else (accepted.x, accepted.x_before)
     mine = {"x": body.displacements.rows(x), "x_before": body.displacements.rows(before)}
-    mine["fixed"] = _fixed(body)
+    mine["fixed"] = _fixed_rows(body)
     if body.displacements.mixed:
-        mine |= {"mixed_x": _by_cells(body, x), "mixed_x_before": _by_cells(body, before)}
+        mine |= {"mixed_x": _cell_rows(body, x), "mixed_x_before": _cell_rows(body, before)}
     with raised_together(body.comm):  # the user's functions
         saved = [saved_of(contact) for contact in contacts]
     for k, (contact, of_contact) in enumerate(zip(contacts, saved)):
@@ -90,15 +103,18 @@ def _arrays(problem: ContactProblem, accepted: Accepted | None = None) -> dict[s
     return mine | (problem.internal.save() if problem.internal else {})
 
 
-def _fixed(body: ElasticBody) -> np.ndarray:
-    """1 where displacements are given, else 0, ``shape=(nodes, dim)``."""
+def _fixed_rows(body: ElasticBody) -> np.ndarray:
+    """Return 1 for prescribed degrees of freedom and 0 for others, ``shape=(nodes, dim)``."""
     fixed = np.zeros(body.size, dtype=np.uint8)
     fixed[body.fixed] = 1
     return body.displacements.rows(fixed)
 
 
 def _write(path: str | PathLike[str], file: dict[str, np.ndarray]) -> None:
-    """Replace a file in one go: whenever the machine stops, the old one or the new one is whole."""
+    """Write a file and replace an older one only when it is complete.
+
+    If the computer stops at any time, either the older or the new file is complete.
+    """
     unfinished = f"{path}.unfinished"
     try:
         with open(unfinished, "wb") as stream:
@@ -119,10 +135,13 @@ def _write(path: str | PathLike[str], file: dict[str, np.ndarray]) -> None:
 
 
 def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
-    """The state in a file; contacts and internal variables have it.  Collective.
+    """Load a checkpoint file and return its state.  Collective.
+
+    The contacts and the internal variables of the problem are set to this state.
 
     Raises:
-        ValueError: the file is no checkpoint of this problem.
+        ValueError: the file is not a checkpoint of this problem.
+        OSError: on all ranks, if the file cannot be read.
     """
     body, contacts, internal = problem.body, problem.contacts, problem.internal
     comm = body.comm
@@ -136,11 +155,13 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
     parts, starts = None, ()
     with raised_together(comm):
         if comm.rank == 0:
-            file = _opened(path)
+            file = _read(path)
             _check_file(path, file, asked)
             _check_arrays(path, file, like)
             orders = {name: np.argsort(file[name]) for name in asked[0]}  # once for all ranks
-            parts = [_part(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)]
+            parts = [
+                _rows_of_rank(file, orders, nodes, k, len(asked)) for k, nodes in enumerate(asked)
+            ]
             if "starts" in file:
                 names = [f"contact{k}_nodes" for k in range(len(contacts))]
                 order = np.concatenate([nodes[name] for nodes in asked for name in names])
@@ -156,7 +177,7 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
         for prefix in (f"contact{k}_" for k in range(len(contacts)))
     ]
     for k, saved in enumerate(own):
-        saved |= _of_body(mine, body, k, contacts[k])
+        saved |= _opposite_history(mine, body, k, contacts[k])
     with raised_together(comm):
         for contact, saved in zip(contacts, own):
             check_saved(contact, saved)
@@ -164,7 +185,9 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
         load_saved(contact, saved)
     names = ("x", "x_before")
     mixed = body.displacements.mixed
-    x, before = (_of_cells(body, mine[f"mixed_{n}"]) if mixed else mine[n].ravel() for n in names)
+    x, before = (
+        _from_cell_rows(body, mine[f"mixed_{n}"]) if mixed else mine[n].ravel() for n in names
+    )
     return problem.accepted.but(
         x=x,
         x_before=before,
@@ -176,8 +199,20 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
     )
 
 
-def _of_body(mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Contact) -> dict:
-    """What a contact with a deformable surface has of other nodes than its own."""
+def _opposite_history(
+    mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Contact
+) -> dict:
+    """Return the history variables of a deformable surface at nodes other than the contact nodes.
+
+    Args:
+        mine: This rank's rows of all arrays, by name.
+        body: The body.
+        k: Index of the contact.
+        contact: The contact.
+
+    Returns:
+        Positions ``at`` and wear depth of the opposite side, if they are in the file.
+    """
     found = {}
     if f"{k}_placed" in mine:
         found["at"] = body.displacements.vectors(mine[f"{k}_placed"][:, :, None])[:, 0]
@@ -187,7 +222,7 @@ def _of_body(mine: dict[str, np.ndarray], body: ElasticBody, k: int, contact: Co
 
 
 def _free_state(mine: dict[str, np.ndarray], comm: MPI.Comm) -> FreeState | None:
-    """The body's free state, None where a rank's rows say nothing of it.  Collective."""
+    """Return the contact-free solution, or None if it is missing on any rank.  Collective."""
     exact = "free" in mine
     is_known = {"digest", "load"} <= mine.keys() and (exact or "rough" in mine)
     if not comm.allreduce(is_known, op=MPI.LAND):
@@ -201,18 +236,26 @@ def _check_path(path: str | PathLike[str]) -> None:
         raise ValueError(f"path must be a file name, got {path!r}.")
 
 
-def _opened(path: str | PathLike[str]) -> dict[str, np.ndarray]:
+def _read(path: str | PathLike[str]) -> dict[str, np.ndarray]:
     try:
         with open(path, "rb") as stream, np.load(stream) as opened:
             return dict(opened)
     except OSError:
         raise
-    except Exception as error:  # of zip files, compression, headers: NumPy passes on what it meets
+    except (
+        Exception
+    ) as error:  # NumPy raises errors of many types, also of zip files and compression
         raise ValueError(f"{path} is no checkpoint: {error}.") from None
 
 
 def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: Any) -> None:
-    """Raise a ``ValueError`` unless the file has as many nodes as the problem that asks."""
+    """Raise a ``ValueError`` unless the file is a checkpoint with as many nodes as the problem.
+
+    Args:
+        path: Path of the file, for messages.
+        file: Arrays in the file by name.
+        asked: Original indices of the nodes of each rank, by name.
+    """
     if not {"nodes", "ranks"} <= file.keys():
         raise ValueError(f"{path} is no checkpoint.")
     if file.get("version", 0) != FILE_VERSION:
@@ -229,8 +272,11 @@ def _check_file(path: str | PathLike[str], file: dict[str, np.ndarray], asked: A
 def _check_supports(
     path: str | PathLike[str], mine: dict[str, np.ndarray], body: ElasticBody
 ) -> None:
-    """Raise a ``ValueError`` if other displacements of this rank were given in the run that wrote the file."""
-    here = _fixed(body)
+    """Raise a ``ValueError`` if the file was written with other prescribed degrees of freedom.
+
+    Only degrees of freedom of this rank are compared.
+    """
+    here = _fixed_rows(body)
     differs = np.flatnonzero((mine["fixed"] != here).any(axis=1))
     if differs.size:
         where = body.displacements.x[differs[0], : body.displacements.dim].tolist()
@@ -243,7 +289,13 @@ def _check_supports(
 def _check_stiffness(
     path: str | PathLike[str], file: dict[str, np.ndarray], stiffness: float
 ) -> None:
-    """Raise a ``ValueError`` unless the file has the same stiffness as the problem that asks."""
+    """Raise a ``ValueError`` unless the problem has the same stiffness as in the file.
+
+    Args:
+        path: Path of the file, for messages.
+        file: Arrays in the file by name.
+        stiffness: Norm of the stiffness matrix of the problem.
+    """
     saved = _number(path, file, "stiffness")
     if not abs(saved - stiffness) <= 1e-9 * stiffness:
         raise ValueError(
@@ -253,7 +305,7 @@ def _check_stiffness(
 
 
 def _number(path: str | PathLike[str], file: dict[str, np.ndarray], name: str) -> float:
-    """A number in the file."""
+    """Return a number in the file; raise a ``ValueError`` if it is missing or not finite."""
     try:
         return number(f"checkpoint {path}: {name}", file.get(name))
     except ValueError as error:
@@ -263,13 +315,22 @@ def _number(path: str | PathLike[str], file: dict[str, np.ndarray], name: str) -
 def _check_arrays(
     path: str | PathLike[str], file: dict[str, np.ndarray], like: dict[str, np.ndarray]
 ) -> None:
-    """Raise a ``ValueError`` unless all arrays are there, finite, and of the shape and kind of what would be saved now."""
-    missing = [name for name in like if name not in file and not name.endswith(MAY_LACK)]
+    """Raise a ``ValueError`` unless all arrays are present, finite and of the right shape.
+
+    Args:
+        path: Path of the file, for messages.
+        file: Arrays in the file by name.
+        like: Arrays by name that the problem would save now on this rank; shapes beyond the number
+            of rows, and types, must match.
+    """
+    missing = [name for name in like if name not in file and not name.endswith(OPTIONAL_ARRAYS)]
     if missing:
         raise ValueError(f"checkpoint {path} lacks {', '.join(missing)}. {WRITE_ANEW}")
     like = like | {name: like["x"] for name in ("load", "free", "rough")}
     for name, array in file.items():
-        surface = name.endswith("rigid_plane")  # compared by the contact; without wear it has NaN
+        surface = name.endswith(
+            "rigid_plane"
+        )  # checked by the contact; without wear it contains NaN
         if name == "digest":
             continue
         if array.dtype.kind not in "iuf":
@@ -292,7 +353,7 @@ def _check_arrays(
 
 
 def _nodes_of(name: str) -> str:
-    """Name of the indices to which the rows of an array belong."""
+    """Return the name of the array of original indices that identify the rows of an array."""
     prefix = name.split("_")[0]
     return f"{prefix}_nodes" if prefix.startswith(("contact", "state", "mixed")) else "nodes"
 
@@ -300,7 +361,20 @@ def _nodes_of(name: str) -> str:
 def _starts(
     path: str | PathLike[str], file: dict[str, np.ndarray], order: np.ndarray
 ) -> list[tuple]:
-    """Earlier condensed steps for nodes in this order; what belongs to anchors stays behind them."""
+    """Return initial guesses of the condensed solver from earlier steps, reordered for this run.
+
+    Args:
+        path: Path of the file, for messages.
+        file: Arrays in the file by name.
+        order: Original indices of the contact nodes in the order of this run, of all ranks.
+
+    Returns:
+        For each earlier step: nodal displacements and forces, each followed by the values of the
+        bilateral constraints (``tied``), and the number of these constraints.
+
+    Raises:
+        ValueError: the arrays in the file do not match.
+    """
     saved, nodes = file["starts"], file.get("starts_nodes", np.zeros(0))
     tied = int(_number(path, file, "starts_tied"))
     size = int(np.prod(saved.shape[2:])) - tied
@@ -322,7 +396,10 @@ def _starts(
 
 
 def _nodes(body: ElasticBody, contacts: Sequence[Contact]) -> dict[str, np.ndarray]:
-    """Original indices of this rank's nodes, of the body and of each contact.  Collective."""
+    """Return the original indices of this rank's nodes of body and contacts.  Collective.
+
+    For mixed spaces, the original indices of the cells are included.
+    """
     original = original_nodes(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
     if body.displacements.mixed:
@@ -331,35 +408,52 @@ def _nodes(body: ElasticBody, contacts: Sequence[Contact]) -> dict[str, np.ndarr
     return {"nodes": original} | of_contacts
 
 
-def _by_cells(body: ElasticBody, array: np.ndarray) -> np.ndarray:
-    """All unknowns of a mixed space in their units, a row an owned cell.  Collective."""
+def _cell_rows(body: ElasticBody, array: np.ndarray) -> np.ndarray:
+    """Return all unknowns of a mixed space in their units, one row per owned cell.  Collective."""
     values = fem.Function(body.V)
     values.x.array[: body.size] = body.values(array)
     values.x.scatter_forward()
-    return values.x.array[_cells(body)]
+    return values.x.array[_cell_dofs(body)]
 
 
-def _of_cells(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
-    """Values of owned degrees of freedom from what ``_by_cells`` returned."""
+def _from_cell_rows(body: ElasticBody, rows: np.ndarray) -> np.ndarray:
+    """Return the vector of owned degrees of freedom, scaled as in the solver, from rows of cells.
+
+    Args:
+        body: The body.
+        rows: Values of all unknowns in their units, one row for each owned cell, see
+            ``_cell_rows``.
+    """
     values = np.zeros_like(body.u.x.array)
-    values[_cells(body)] = rows
+    values[_cell_dofs(body)] = rows
     return body.taken(values)
 
 
-def _cells(body: ElasticBody) -> np.ndarray:
-    """Degrees of freedom of each owned cell."""
+def _cell_dofs(body: ElasticBody) -> np.ndarray:
+    """Return the local indices of the degrees of freedom of owned cells, one row per cell."""
     topology = body.V.mesh.topology
     return compat.cell_dofs(body.V)[: topology.index_map(topology.dim).size_local]
 
 
-def _part(
+def _rows_of_rank(
     file: dict[str, np.ndarray],
     orders: dict[str, np.ndarray],
     nodes: dict[str, np.ndarray],
     rank: int,
     ranks: int,
 ) -> dict[str, np.ndarray]:
-    """The rows of one rank, which asks for ``nodes``."""
+    """Return the rows of the arrays in a file that belong to one rank, by name.
+
+    Args:
+        file: Arrays in the file by name.
+        orders: Permutation that sorts each array of original indices, by name.
+        nodes: Original indices of the nodes of the rank, by name.
+        rank: Index of the rank.
+        ranks: Number of ranks.
+
+    Raises:
+        ValueError: the file does not contain a node.
+    """
     part = {}
     for key, wanted in nodes.items():
         at, prefix = _positions(file[key], orders[key], wanted), key.removesuffix("nodes")
@@ -368,7 +462,8 @@ def _part(
         names = of_body if prefix == "" else file
         for name in (n for n in names if n in file and n.startswith(prefix) and n != key):
             part[name] = file[name] if name.endswith("_plane") else file[name][at]
-    # Of the coefficients for which the free state holds a rank knows its own share alone.
+    # The digest of the stiffness depends on the partition: it is valid only if the rank has the
+    # same nodes.
     if "digest" in file and file["ranks"].shape == file["digest"].shape[:1] == (ranks,):
         last = np.cumsum(file["ranks"])[rank]
         if np.array_equal(file["nodes"][last - file["ranks"][rank] : last], nodes["nodes"]):
@@ -377,7 +472,16 @@ def _part(
 
 
 def _positions(nodes: np.ndarray, order: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Where in ``nodes``, which ``order`` sorts, those wanted are."""
+    """Return the positions in ``nodes`` of the indices ``wanted``.
+
+    Args:
+        nodes: Indices in any order.
+        order: Permutation that sorts ``nodes``.
+        wanted: Indices to find.
+
+    Raises:
+        ValueError: an index is missing.
+    """
     at = np.searchsorted(nodes, wanted, sorter=order)
     found = order[np.minimum(at, len(nodes) - 1)]
     if not np.array_equal(nodes[found], wanted):

@@ -1,8 +1,8 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Draw what ``plot.py`` has gathered:  python draw.py SEEN.npz PICTURE.png TITLE
+"""Script that draws the data gathered by ``plot.py``:  python draw.py SEEN.npz PICTURE.png TITLE
 
-A program of its own, with NumPy and PyVista alone.
+It runs in a separate process and needs only NumPy and PyVista.
 """
 
 import sys
@@ -11,28 +11,36 @@ from typing import Any
 import numpy as np
 import pyvista
 
+# Name and colour of each contact status, by its number.
 STATUS_COLOURS = {0: ("open", "#8c8c8c"), 1: ("stick", "#2a6fbb"), 2: ("slip", "#f0a33a")}
 
-# Size of a node in pixels: this over the root of their number, within limits.
+# Size of the dot at a contact node, pixels: DOT_PIXELS divided by the square root of the number of
+# nodes, within the limits below, so that dots are visible but do not overlap much.
 DOT_PIXELS = 150.0
 SMALLEST_DOT = 4.0
 LARGEST_DOT = 12.0
 
+# Fraction of the width and height of the picture that a two-dimensional body fills at most.  The
+# rest is for legend and colour bar.
+BODY_FRACTION = 0.75
 
-# Part of a picture of a plane body that lies between the legend and the colour bar, or between top and bottom.
-OPACITY_BETWEEN = 0.75
 
-
-def body(seen: Any) -> pyvista.UnstructuredGrid:
-    """The body, displaced."""
+def body_grid(seen: Any) -> pyvista.UnstructuredGrid:
+    """Return the displaced mesh of the body as a PyVista grid."""
     kinds = {name: int(name[5:]) for name in seen if name.startswith("cells")}
     rows = [np.insert(seen[name], 0, seen[name].shape[1], axis=1).ravel() for name in kinds]
     types = [np.full(len(seen[name]), kind, dtype=np.uint8) for name, kind in kinds.items()]
     return pyvista.UnstructuredGrid(np.concatenate(rows), np.concatenate(types), seen["x"])
 
 
-def surface(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
-    """Where the distance is zero."""
+def zero_contour(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
+    """Return a rigid surface: the zero level set of the distance.
+
+    Args:
+        box: Lowest corner, highest corner and number of points per direction of the grid,
+            ``shape=(3, 3)``.
+        distance: Distance at each grid point, with x varying fastest.
+    """
     low, high, counts = box
     spacing = (high - low) / np.maximum(counts - 1, 1)
     spacing[spacing == 0.0] = 1.0
@@ -43,15 +51,15 @@ def surface(box: np.ndarray, distance: np.ndarray) -> pyvista.PolyData:
 
 def draw(seen: Any, picture: str, title: str) -> None:
     plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 750))
-    grid = body(seen)
+    grid = body_grid(seen)
     bar = {"title": f"{title}\n", "vertical": True, "fmt": "%.3g", "color": "black"}
     bar |= {"position_x": 0.86, "position_y": 0.3, "title_font_size": 18, "label_font_size": 15}
-    looks = {"color": "#d8d8d8"}
+    style = {"color": "#d8d8d8"}
     if "colour" in seen:
-        looks = {"scalars": seen["colour"], "lighting": False, "scalar_bar_args": bar}
+        style = {"scalars": seen["colour"], "lighting": False, "scalar_bar_args": bar}
     if "between" in seen:
-        looks["opacity"] = 0.3
-    plotter.add_mesh(grid, show_edges=True, edge_opacity=0.25, **looks)
+        style["opacity"] = 0.3
+    plotter.add_mesh(grid, show_edges=True, edge_opacity=0.25, **style)
     size = float(np.clip(DOT_PIXELS / np.sqrt(len(seen["nodes"])), SMALLEST_DOT, LARGEST_DOT))
     for status, (name, colour) in STATUS_COLOURS.items():
         nodes = seen["nodes"][seen["status"] == status]
@@ -62,30 +70,39 @@ def draw(seen: Any, picture: str, title: str) -> None:
             )
     for name in seen:
         if name.startswith("box"):
-            found = surface(seen[name], seen[f"distance{name[3:]}"])
+            found = zero_contour(seen[name], seen[f"distance{name[3:]}"])
             if found.n_points:
                 plotter.add_mesh(found, color="#9aa5b1", opacity=0.35, line_width=3)
     plotter.add_legend(bcolor=None, size=(0.15, 0.1), face="circle", loc="upper left")
-    look(plotter, grid, seen["view"])
+    set_camera(plotter, grid, seen["view"])
     plotter.screenshot(picture)
 
 
-def look(plotter: Any, grid: Any, up: np.ndarray) -> None:
-    """The view: in the plane from before it, in space from below the contact and aside."""
+def set_camera(plotter: Any, grid: Any, up: np.ndarray) -> None:
+    """Set the camera position.
+
+    A two-dimensional body is viewed from the front.  A three-dimensional body is viewed from below
+    and beside the contact.
+
+    Args:
+        plotter: PyVista's plotter.
+        grid: Mesh of the body.
+        up: Mean normal of the contact surface, global frame; empty in two dimensions.
+    """
     if not up.size:
         plotter.view_xy()
         plotter.enable_parallel_projection()
         low, high = np.reshape(plotter.bounds, (3, 2)).T
         width, height = plotter.window_size
         wide, high = (high - low)[:2]
-        plotter.camera.parallel_scale = 0.5 * max(high, wide * height / width) / OPACITY_BETWEEN
+        plotter.camera.parallel_scale = 0.5 * max(high, wide * height / width) / BODY_FRACTION
         return
     up = up / np.linalg.norm(up)
     aside = np.eye(3)[np.abs(up).argmin()]
     aside = np.cross(up, np.cross(aside, up))
-    from_there = -0.5 * up + aside / np.linalg.norm(aside) - 0.6 * np.cross(up, aside)
+    direction = -0.5 * up + aside / np.linalg.norm(aside) - 0.6 * np.cross(up, aside)
     centre = np.array(grid.center)
-    plotter.camera_position = [centre + grid.length * from_there, centre, up]
+    plotter.camera_position = [centre + grid.length * direction, centre, up]
     plotter.reset_camera()
     plotter.camera.zoom(1.3)
 

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A table of a run with one row per step: totals of the contacts, and results at tracked nodes."""
+"""Table with one row per load step: totals of the contacts, and results at tracked nodes."""
 
 from __future__ import annotations
 
@@ -23,27 +23,33 @@ if TYPE_CHECKING:
 
 
 class History:
-    """Records totals and tracked nodes after every step, and writes them to a CSV file as it goes.
+    """Table of totals and of results at tracked nodes after every load step, also as a CSV file.
 
-    Every row has ``step``, the caller's own columns and the step's record.  For each contact (``contact0_...``), it has the total
-    reaction in global components, the sum of the norms of the tangential reactions, dissipation and worn volume so far, and the
-    displacement of a plane that is driven by force when the table is made.  For each tracked node (``node0_...``), it has its
-    local reaction, displacement relative to the plane, slip path, dissipation, gap and status.
+    Every row begins with the number of the step (``step``), the user's own columns and the record
+    of the step.  For each contact (``contact0_...``), it contains the total reaction in global
+    components, the sum of the norms of the tangential reactions, the accumulated dissipation and
+    worn volume, and, if its surface was driven by force when the table was created, the
+    displacement of the surface.  For each tracked node (``node0_...``), it contains the reaction
+    and the displacement relative to the surface, both in the local frame, slip path, dissipation,
+    load function, gap and status.
 
     Args:
         problem: The ContactProblem to record.
-        path: CSV file, written by rank 0; None keeps the rows in memory only.
-        points: Positions of the nodes to track, ``shape=(m, gdim)``, global frame, length units; the nearest contact node of
-            ``contact`` is taken.
-        contact: Index of the contact that has the tracked nodes.
-        resume: Number of rows to keep of an existing file, those of the steps before a checkpoint.
+        path: CSV file, written by rank 0; with None, the rows are kept in memory only.
+        points: Positions of the nodes to track, ``shape=(m, gdim)``, global frame, length units.
+            For each position, the nearest contact node of ``contact`` is tracked.
+        contact: Index of the contact with the tracked nodes.
+        resume: Number of rows of an existing file to keep, for instance the number of steps before
+            a checkpoint.
 
     Raises:
-        ValueError: ``points`` have another dimension, the folder of the file does not exist, or the file has fewer rows than ``resume``.
+        ValueError: ``points`` have another dimension, the folder of the file does not exist, or the
+            file has fewer rows than ``resume``.
 
     Attributes:
-        rows: List of dictionaries, the same on all ranks.
-        positions: Reference positions of the tracked nodes, ``shape=(m, 3)``, global frame, length units.
+        rows: Rows of the table, a list of dictionaries, the same on all ranks.
+        positions: Reference positions of the tracked nodes, ``shape=(m, 3)``, global frame, length
+            units.
 
     Example:
         >>> history = dc.History(problem)
@@ -89,12 +95,17 @@ class History:
             self._write()
 
     def record(self, step: Step, **columns: object) -> dict[str, Any]:
-        """Append a row for ``step``, the record of the last solve; ``columns`` come first.  Collective.
+        """Append a row to the table, write it to the file, and return it.  Collective.
 
-        A row that cannot be written, for instance on a full disk, is kept and written with the next one.
+        If a row cannot be written, for instance since the disk is full, it is kept and written
+        together with the next row.
+
+        Args:
+            step: Record of the load step, as returned by ``problem.solve()``.
+            columns: Further values by name, which follow the number of the step.
 
         Raises:
-            ValueError: other columns than in the first row.
+            ValueError: the columns differ from the columns of the first row.
             OSError: on all ranks, if the file cannot be written.
         """
         row = {"step": len(self.rows) + 1, **columns}
@@ -116,7 +127,7 @@ class History:
         return row
 
     def column(self, name: str) -> np.ndarray:
-        """One column over all steps, ``shape=(steps,)``.
+        """Return a column of the table, one value for each step, ``shape=(steps,)``.
 
         Raises:
             ValueError: there is no such column; the message lists the existing ones.
@@ -144,7 +155,10 @@ class History:
             yield quantity, self._at(node, getattr(contact, quantity))
 
     def _nearest(self, point: np.ndarray) -> tuple[int, int]:
-        """Rank and index of the contact node nearest to a point; the lowest rank of equals."""
+        """Return rank and local index of the contact node nearest to a point.  Collective.
+
+        If nodes of several ranks have the same distance, the lowest rank is returned.
+        """
         distance = np.linalg.norm(self._tracked.x[:, : point.size] - point, axis=1)
         nearest = int(distance.argmin()) if distance.size else -1
         _, owner = self.comm.allreduce(
@@ -158,7 +172,7 @@ class History:
         return self.comm.bcast(mine, root=owner)
 
     def _write(self) -> None:
-        """Write the rows that the file does not have yet.  Collective."""
+        """Append the rows that are not yet in the file; rank 0 writes.  Collective."""
         with raised_together(self.comm):
             if self.path is not None and self.comm.rank == 0:
                 new = not self._written

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Body and contact surface as VTK knows meshes, gathered on rank 0, with the values that files and pictures show."""
+"""Meshes of body and contact surface with results, in VTK's conventions, gathered on rank 0."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.displacements import Displacements
 
-# VTK's cells by number of vertices and of nodes; a tetrahedron and a quadrilateral differ by their dimension, the first number.
+# VTK's cell types by dimension, number of vertices and number of nodes.
 VTK_TYPES = {
     (1, 2, 2): 3,
     (2, 3, 3): 5,
@@ -37,7 +37,9 @@ VTK_TYPES = {
 VTK_LINE3 = 21
 VTK_TRIANGLE6 = 22
 
-# VTK's order of vertices, and the vertices (in that order) in whose middle each further node is.
+# VTK's order of the vertices where it differs from DOLFINx's, by dimension and number of vertices;
+# and for each further node of a second-order cell, the vertices in VTK's order whose centroid is
+# the position of the node.
 SQUARE_ORDER = (0, 1, 3, 2)
 VERTEX_ORDERS = {(2, 4): SQUARE_ORDER, (3, 8): (*SQUARE_ORDER, *(4 + k for k in SQUARE_ORDER))}
 RING_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0)]
@@ -65,13 +67,13 @@ MIDDLE_NODES = {
 
 
 class Mesh(NamedTuple):
-    """A mesh and values at its nodes and cells; on ranks other than 0 empty.
+    """Mesh with values at nodes and cells, gathered on rank 0; arrays are empty on all other ranks.
 
     Attributes:
-        x: Positions of the nodes, ``shape=(n, 3)``, undeformed, global frame.
-        cells: Nodes of the cells of each VTK type, in VTK's order, ``shape=(m, k)``.
-        at_nodes: Arrays by name, ``shape=(n,)`` or ``(n, 3)``.
-        at_cells: Arrays by name, ``shape=(cells,)``, ``(cells, 3)`` or ``(cells, 9)``.
+        x: Positions of the nodes, ``shape=(n, 3)``, undeformed, global frame, length.
+        cells: Nodes of the cells in VTK's order, ``shape=(m, k)``, by VTK's cell type.
+        at_nodes: Nodal values by name, ``shape=(n,)``, ``(n, 3)`` or ``(n, 9)``.
+        at_cells: Cell values by name, ``shape=(cells,)``, ``(cells, 3)`` or ``(cells, 9)``.
     """
 
     x: np.ndarray
@@ -81,11 +83,11 @@ class Mesh(NamedTuple):
 
 
 def vtk_order(points: np.ndarray, vertices: np.ndarray) -> tuple[int, np.ndarray]:
-    """VTK's type of a cell, and its nodes in VTK's order.
+    """Return VTK's cell type of a reference cell, and the indices of its nodes in VTK's order.
 
     Args:
         points: Positions of the nodes in the reference cell, ``shape=(k, dim)``.
-        vertices: Which of them are vertices, in DOLFINx's order.
+        vertices: Indices of the nodes that are vertices, in DOLFINx's order.
     """
     dim, count = points.shape[1], len(vertices)
     corners = points[vertices[list(VERTEX_ORDERS.get((dim, count), range(count)))]]
@@ -96,19 +98,26 @@ def vtk_order(points: np.ndarray, vertices: np.ndarray) -> tuple[int, np.ndarray
 
 
 def gathered(comm: MPI.Comm, *arrays: np.ndarray) -> list[np.ndarray]:
-    """Rows of all ranks, in the order of ranks, on rank 0; none elsewhere.  Collective."""
+    """Gather rows of arrays from all ranks, in the order of ranks, on rank 0.  Collective.
+
+    On all other ranks, the returned arrays have no rows.
+    """
     found = [comm.gather(array, root=0) for array in arrays]
     return [
         array[:0] if rows is None else np.concatenate(rows) for rows, array in zip(found, arrays)
     ]
 
 
-# What vertices of second-order tetrahedra, which are no contact nodes, are given.
+# Quantities recovered at the vertices of second-order tetrahedra, which are not contact nodes.
 RECOVERED_NAMES = ("pressure", "shear_traction", "slip", "wear_depth")
 
 
 def padded(values: np.ndarray) -> np.ndarray:
-    """Vectors and tensors of two dimensions, ``shape=(n, 2)`` or ``(n, 4)``, with zeros as the third component."""
+    """Extend two-dimensional vectors and tensors to three dimensions by zeros.
+
+    Arrays of ``shape=(n, 2)`` become ``(n, 3)``, and ``(n, 4)`` become ``(n, 9)``.  Other arrays
+    are returned unchanged.
+    """
     size = values.shape[1]
     if size == 4:
         whole = np.zeros((len(values), 3, 3))
@@ -122,10 +131,10 @@ def scalar_or_rows(values: np.ndarray) -> np.ndarray:
 
 
 class BodyMesh:
-    """The mesh of a body, with the nodes of its displacements.  Collective.
+    """Mesh of a body, whose nodes are the nodes of the displacement space.  Collective.
 
     Args:
-        displacements: The ``Displacements``.
+        displacements: The ``Displacements`` of the body.
     """
 
     def __init__(self, displacements: Displacements) -> None:
@@ -143,12 +152,12 @@ class BodyMesh:
         self._x, self._cells = gathered(self._comm, displacements.x[: displacements.count], numbers)
 
     def __call__(self, u: fem.Function, fields: dict[str, Any]) -> Mesh:
-        """The mesh with the displacement and other fields.  Collective.
+        """Return the mesh with the displacement and further fields as values.  Collective.
 
         Args:
             u: Function of all unknowns.
-            fields: Functions of Lagrange spaces, whose values at the nodes are taken, and other UFL expressions, whose values
-                in the middle of each cell are; by name.
+            fields: Further fields by name.  Functions of Lagrange spaces become nodal values, other
+                UFL expressions become cell values, evaluated at the midpoints of the cells.
         """
         owned = u.x.array[: self._displacements.size]
         at_nodes = {
@@ -159,15 +168,15 @@ class BodyMesh:
             continuous = isinstance(field, fem.Function) and compat.lagrange_degree(
                 field.function_space
             )
-            found = self._nodal(field) if continuous else self._of_cells(field)
+            found = self._nodal_values(field) if continuous else self._cell_values(field)
             (at_nodes if continuous else at_cells)[name] = gathered(
                 self._comm, scalar_or_rows(found)
             )[0]
         cells = {self._type: self._cells} if self._comm.rank == 0 else {}
         return Mesh(self._x, cells, at_nodes, at_cells)
 
-    def _nodal(self, field: fem.Function) -> np.ndarray:
-        """At owned nodes, ``shape=(n, components)``."""
+    def _nodal_values(self, field: fem.Function) -> np.ndarray:
+        """Return the values of a field at this rank's owned nodes, ``shape=(n, components)``."""
         cells = np.arange(len(self._local), dtype=np.int32)
         found = compat.cell_values(fem.Expression(field, self._points), self._V.mesh, cells)
         k = self._local.shape[1]
@@ -176,15 +185,15 @@ class BodyMesh:
         values[self._local.ravel()] = found.reshape(-1, found.shape[2])
         return values[: self._displacements.count]
 
-    def _of_cells(self, field: fem.Function) -> np.ndarray:
-        """In the middle of owned cells, ``shape=(cells, components)``."""
+    def _cell_values(self, field: fem.Function) -> np.ndarray:
+        """Return a field at the midpoints of owned cells, ``shape=(cells, components)``."""
         middle = self._points.mean(axis=0, keepdims=True)
         cells = np.arange(self._count, dtype=np.int32)
         return compat.cell_values(fem.Expression(field, middle), self._V.mesh, cells)
 
 
 class SurfaceMesh:
-    """The contact surface of a contact: its facets, with the nodes of the displacements.  Collective.
+    """Mesh of the facets of a contact, with the nodes of the displacement space.  Collective.
 
     Args:
         contact: The contact.
@@ -217,10 +226,13 @@ class SurfaceMesh:
         self._at = at
 
     def __call__(self, u: fem.Function) -> Mesh:
-        """The surface with the state of the contact.  Collective.
+        """Return the mesh of the contact surface with results as nodal values.  Collective.
 
-        Vectors are in global components.  Vertices of second-order tetrahedra, which are no contact nodes, have values that are
-        recovered from the middles of edges, see ``recovered``.
+        Vectors are in global components.  Vertices of second-order tetrahedra are not contact
+        nodes.  Their values are recovered from the midpoints of the edges, see ``recovered``.
+
+        Args:
+            u: Function of all unknowns.
         """
         contact, displacements = self._contact, self._contact.displacements
         frames, reaction = contact.points.frames, contact.reaction
@@ -239,7 +251,8 @@ class SurfaceMesh:
             "contact_node": np.ones(contact.nodes.size, dtype=np.int32),
         }
         values = {
-            name: gathered(self._comm, self._placed(array))[0] for name, array in local.items()
+            name: gathered(self._comm, self._at_facet_nodes(array))[0]
+            for name, array in local.items()
         }
         gap = self._gaps(moved)
         values["gap"], values["displacement"] = gathered(self._comm, gap, padded(moved))
@@ -247,19 +260,32 @@ class SurfaceMesh:
             names = (*RECOVERED_NAMES, "gap") if contact.surface.deformable else RECOVERED_NAMES
             recovered(self._x, self._cells[VTK_TRIANGLE6], values, names)
         if VTK_LINE3 in self._cells:
-            recovered_on_axis(self._cells[VTK_LINE3], values)
+            recover_on_axis(self._cells[VTK_LINE3], values)
         return Mesh(self._x, self._cells, values, {})
 
-    def _placed(self, values: np.ndarray) -> np.ndarray:
-        """Values at contact nodes at those of all nodes of the facets that this rank owns, zero at others."""
+    def _at_facet_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Return values at all facet nodes that this rank owns.
+
+        The values are zero at nodes that are not contact nodes.
+
+        Args:
+            values: Values at this rank's contact nodes, ``shape=(n, ...)``.
+        """
         found = np.zeros((self._owned.size, *values.shape[1:]), dtype=values.dtype)
         found[self._at] = values
         return found
 
     def _gaps(self, moved: np.ndarray) -> np.ndarray:
-        """Of all nodes: of those that are no contact nodes the distance from the surface where it stands."""
+        """Return the gaps of all facet nodes that this rank owns, ``shape=(k,)``, length.
+
+        At nodes that are not contact nodes, the gap is the distance of the displaced node from the
+        surface in its present position.  Unknown gaps are NaN.
+
+        Args:
+            moved: Displacements of the nodes, ``shape=(k, gdim)``, global frame, length.
+        """
         contact, gap = self._contact, self._contact.gap
-        gaps = self._placed(np.where(np.isinf(gap), np.nan, gap))  # pictures leave it out
+        gaps = self._at_facet_nodes(np.where(np.isinf(gap), np.nan, gap))  # not drawn
         others = np.setdiff1d(np.arange(self._owned.size), self._at)
         if others.size:
             dim = moved.shape[1]
@@ -269,12 +295,16 @@ class SurfaceMesh:
         return gaps
 
 
-def recovered_on_axis(lines: np.ndarray, values: dict[str, np.ndarray]) -> None:
-    """Give nodes on an axis of symmetry, which carry nothing, the pressure and depth of a parabola with its top there, in place.
+def recover_on_axis(lines: np.ndarray, values: dict[str, np.ndarray]) -> None:
+    """Recover pressure, wear depth and status at nodes on the axis of symmetry, in place.
+
+    These nodes are not contact nodes.  Pressure and wear depth are extrapolated by the parabola
+    through the other two nodes of the edge with its vertex on the axis.  The status is that of the
+    midpoint.
 
     Args:
         lines: Nodes of second-order edges, ends first, ``shape=(m, 3)``.
-        values: By name; ``contact_node`` says which nodes stay as they are.
+        values: Nodal values by name.  Nodes with ``contact_node`` equal to 1 keep their values.
     """
     free = values["contact_node"] == 0
     for first, other, middle in np.concatenate((lines, lines[:, [1, 0, 2]])):
@@ -291,19 +321,22 @@ def recovered(
     values: dict[str, np.ndarray],
     names: tuple[str, ...] = RECOVERED_NAMES,
 ) -> None:
-    r"""Give vertices of second-order triangles values that fit those at the middles of edges, in place.
+    r"""Recover values at vertices of second-order triangles from midpoints of edges, in place.
 
     .. math:: v_i = \sum_T A_T (m_{ij} + m_{ki} - m_{jk}) \Big/ \sum_T A_T
 
-    On each triangle ``T`` around the vertex the linear function through the three middles, and its mean by area.  The integral of the
-    second-order function does not depend on vertices; that of linear pieces between all nodes is the same.  Quantities that
-    cannot be negative are cut off at zero.  The status is the one that most of the middles around have.
+    On each triangle ``T``, a linear function interpolates the values at the three midpoints.  The
+    value at a vertex is the average over the adjacent triangles, weighted by their area ``A_T``.
+    The integral of a second-order function over a triangle does not depend on the vertex values.
+    With the recovered values, linear interpolation between all nodes has the same integral over the
+    surface.  Pressure and wear depth are cut off at zero.  The status of a vertex is the most
+    frequent status of the adjacent midpoints.
 
     Args:
-        x: Positions of nodes.
-        triangles: Nodes in VTK's order, ``shape=(m, 6)``.
-        values: By name; ``contact_node`` says which nodes stay as they are.
-        names: Of those that are recovered.
+        x: Positions of the nodes, ``shape=(n, 3)``, length.
+        triangles: Nodes of the triangles in VTK's order, ``shape=(m, 6)``.
+        values: Nodal values by name.  Nodes with ``contact_node`` equal to 1 keep their values.
+        names: Names of the values to recover.
     """
     free = values["contact_node"] == 0
     corners, middles = triangles[:, :3], triangles[:, 3:]

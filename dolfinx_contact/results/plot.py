@@ -1,6 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A picture of a problem: what is to be seen is gathered here, and ``draw.py`` draws it in a process of its own."""
+"""Picture of a problem in its present state.
+
+The data are gathered here.  ``draw.py`` draws the picture in a separate process.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.problem import ContactProblem
 
-# Points per direction of the grid on which a rigid surface is drawn, by dimension, and how far it goes beyond the contact, over its size.
+# Grid on which the distance from a surface is evaluated for drawing: number of points per
+# direction, by dimension, and margin around the contact nodes, relative to their extent.
 GRID_POINTS = {2: 400, 3: 60}
 GRID_MARGIN = 0.15
 
@@ -36,23 +40,27 @@ def plot(
     title: str = "",
     factor: float = 1.0,
 ) -> None:
-    """Draw the body, its contact nodes by status, and the rigid surfaces in their present positions.  Collective.
+    """Draw the body, the status of the contact nodes, and the rigid surfaces.  Collective.
 
-    Needs PyVista, ``pip install pyvista``, and no display.  A body in space is seen from below the contact, through the surface;
-    two bodies in contact are translucent.
+    The picture shows the present state.  PyVista is required (``pip install pyvista``), a display
+    is not.  A three-dimensional body is viewed from below the contact, through the transparent
+    surface.  Two bodies in contact are drawn translucent.
 
     Args:
         problem: The ContactProblem.
-        path: The picture, ``*.png``.
-        colour: Field that colours the body: a scalar Function of a Lagrange space or another scalar UFL expression, such as von
-            Mises stress.
-        title: Title of its colour bar.
-        factor: Magnification of displacements, also those of surfaces; rotations are not magnified.
+        path: File of the picture, ``*.png``.
+        colour: Field by which the body is coloured: a scalar Function of a Lagrange space or
+            another scalar UFL expression, such as the von Mises stress.
+        title: Title of the colour bar.
+        factor: Magnification of the displacements of bodies and surfaces; rotations of surfaces are
+            not magnified.
 
     Raises:
-        ValueError: on all ranks, if ``path`` does not end in ``.png``, ``colour`` is not scalar, or ``factor`` is not finite.
-        ModuleNotFoundError: on all ranks, without PyVista.
-        RuntimeError: on all ranks, if PyVista cannot draw here; the message quotes it.
+        ValueError: on all ranks, if ``path`` does not end in ``.png``, ``colour`` is not scalar, or
+            ``factor`` is not finite.
+        ModuleNotFoundError: on all ranks, if PyVista is not installed.
+        RuntimeError: on all ranks, if PyVista cannot draw the picture; the message contains its
+            error output.
 
     Example:
         >>> dc.plot(problem, "block.png", factor=20)  # doctest: +SKIP
@@ -74,7 +82,16 @@ def plot(
 
 
 def _draw(path: Path, title: str, seen: dict[str, np.ndarray]) -> None:
-    """Draw in another process: VTK's libraries and those of DOLFINx clash in one."""
+    """Draw the picture in a separate process, since libraries of VTK and DOLFINx can conflict.
+
+    Args:
+        path: File of the picture.
+        title: Title of the colour bar.
+        seen: Input of ``draw.py``, as returned by ``_seen``.
+
+    Raises:
+        RuntimeError: PyVista cannot draw the picture.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "seen.npz"
@@ -97,8 +114,15 @@ def _draw(path: Path, title: str, seen: dict[str, np.ndarray]) -> None:
 def _seen(
     contacts: Sequence[Contact], body: Mesh, foot: list[Mesh], factor: float
 ) -> dict[str, np.ndarray]:
-    """What ``draw.py`` draws, arrays by name."""
-    seen = {"x": _standing(body, factor), "view": np.zeros(0)}
+    """Return the input of ``draw.py``: positions, cells, colours and surfaces as arrays, by name.
+
+    Args:
+        contacts: The contacts of the problem.
+        body: Mesh of the body with its nodal and cell values.
+        foot: Mesh of the surface of each contact.
+        factor: Magnification of the displacements.
+    """
+    seen = {"x": _displaced(body, factor), "view": np.zeros(0)}
     if any(contact.surface.deformable for contact in contacts) and contacts[0].points.dim == 3:
         seen["between"] = np.ones(1)  # the nodes are between two bodies
     for kind, cells in body.cells.items():
@@ -108,13 +132,13 @@ def _seen(
             seen["colour"] = values["colour"]
     touching = [mesh.at_nodes["contact_node"] == 1 for mesh in foot]
     seen["nodes"] = np.concatenate(
-        [_standing(mesh, factor)[at] for mesh, at in zip(foot, touching)]
+        [_displaced(mesh, factor)[at] for mesh, at in zip(foot, touching)]
     )
     seen["status"] = np.concatenate(
         [mesh.at_nodes["status"][at] for mesh, at in zip(foot, touching)]
     )
     for k, (contact, mesh) in enumerate(zip(contacts, foot)):
-        box, found = _distances(contact, _standing(mesh, factor), factor)
+        box, found = _distances(contact, _displaced(mesh, factor), factor)
         if np.isfinite(found).all():
             seen |= {f"box{k}": box, f"distance{k}": found}
     if contacts[0].points.dim == 3:
@@ -124,12 +148,22 @@ def _seen(
     return seen
 
 
-def _standing(mesh: Mesh, factor: float) -> np.ndarray:
+def _displaced(mesh: Mesh, factor: float) -> np.ndarray:
     return mesh.x + factor * mesh.at_nodes["displacement"]
 
 
 def _distances(contact: Contact, x: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """A grid about positions, its lowest and highest corner and number of points, ``shape=(3, 3)``; distances from the surface there."""
+    """Return a grid around given positions, and the distances of its points from the surface.
+
+    Args:
+        contact: The contact with the surface.
+        x: Positions that the grid surrounds, ``shape=(n, 3)``, global frame, length.
+        factor: Magnification of the displacement of the surface.
+
+    Returns:
+        Lowest corner, highest corner and number of points per direction as rows, ``shape=(3, 3)``;
+        and distances, ``shape=(points,)``, length, with x varying fastest.
+    """
     dim = contact.points.dim
     inside = np.arange(3) < dim
     low, high = x.min(axis=0), x.max(axis=0)

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Contact results along a line, a circle or any other row of points on the contact surface."""
+"""Contact results along a line or curve on the contact surface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from dolfinx_contact.support.collective import by_first_rank, raised_together
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
-# Lines and triangles between the nodes of a facet, by VTK's type.
+# Subdivision of a facet into lines or triangles between its nodes (local indices), by VTK's cell
+# type.
 VTK_PIECES = {
     3: [(0, 1)],
     21: [(0, 2), (2, 1)],
@@ -28,7 +29,8 @@ VTK_PIECES = {
     28: [(0, 4, 8), (0, 8, 7), (4, 1, 5), (4, 5, 8), (8, 5, 2), (8, 2, 6), (7, 8, 6), (7, 6, 3)],
 }
 
-# Nodal forces and works are no densities: between nodes they mean nothing.
+# Quantities that can be interpolated between nodes.  Nodal forces and nodal dissipation cannot:
+# they are integrals.
 PROFILE_NAMES = ("pressure", "shear_traction", "gap", "slip", "wear_depth", "displacement")
 
 
@@ -39,21 +41,25 @@ def profile(
     *,
     contact: int = 0,
 ) -> dict[str, np.ndarray]:
-    """Contact results at points of the contact surface, interpolated between nodes, as a table and a CSV file.  Collective.
+    """Return contact results, interpolated at points of the contact surface.  Collective.
 
     Args:
         problem: The ContactProblem.
-        points: Positions on the undeformed contact surface in order, ``shape=(k, gdim)``, global frame; each is moved to the
-            nearest point of the surface.
-        path: CSV file; None writes none.
+        points: Positions on the undeformed contact surface, in the order along the curve,
+            ``shape=(k, gdim)``, global frame, length units.  Results are those at the nearest
+            points of the surface.
+        path: CSV file to which the table is also written; with None, no file is written.
         contact: Index of the contact.
 
     Returns:
-        Columns by name, ``shape=(k,)``, the same on all ranks: ``s``, the length along the points; ``x``, ``y``, ``z``; ``pressure``;
-        ``shear_traction_x``, ...; ``gap``; ``slip_x``, ...; ``wear_depth``; ``displacement_x``, ...; ``status`` of the nearest node.
+        Columns of the table by name, ``shape=(k,)``, the same on all ranks: ``s``, the arc length
+        along the points; ``x``, ``y``, ``z``; ``pressure``; ``shear_traction_x``, ...; ``gap``;
+        ``slip_x``, ...; ``wear_depth``; ``displacement_x``, ...; ``status``, that is, the status of
+        the nearest node.  Vectors are in global components.
 
     Raises:
-        ValueError: on all ranks, if ``points`` have another shape, or one is farther from the surface than the size of a facet.
+        ValueError: on all ranks, if ``points`` have another shape, or the distance of a point from
+            the surface exceeds the size of a facet.
         OSError: on all ranks, if the file cannot be written.
 
     Example:
@@ -74,7 +80,15 @@ def profile(
 
 
 def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
-    """The columns."""
+    """Return the columns of the table by name.
+
+    Args:
+        mesh: Mesh of the contact surface with its nodal values.
+        at: Positions along the curve, ``shape=(k, 3)``, global frame, length.
+
+    Raises:
+        ValueError: a position is too far from the surface.
+    """
     pieces = [
         mesh.cells[kind][:, VTK_PIECES[kind]].reshape(-1, len(VTK_PIECES[kind][0]))
         for kind in mesh.cells
@@ -97,7 +111,19 @@ def _table(mesh: Mesh, at: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _nearest(corners: np.ndarray, point: np.ndarray) -> tuple[int, np.ndarray]:
-    """The nearest of some lines or triangles, ``shape=(m, 2 or 3, 3)``, and the weights of its corners."""
+    """Return the line or triangle nearest to a point, and interpolation weights of its corners.
+
+    Args:
+        corners: Positions of the corners of lines or triangles, ``shape=(m, 2 or 3, 3)``.
+        point: Position, ``shape=(3,)``.
+
+    Returns:
+        Index of the line or triangle, and the weights of its corners, which are not negative and
+        sum up to one.
+
+    Raises:
+        ValueError: the distance of the point exceeds the size of the line or triangle.
+    """
     sides = corners[:, 1:] - corners[:, :1]
     square = sides @ sides.transpose(0, 2, 1)
     along = np.einsum("mij,mj->mi", sides, point - corners[:, 0])

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The record of a load step, and what is raised when it fails."""
+"""Record of a load step, and the exception and warnings for steps that are not accurate enough."""
 
 from __future__ import annotations
 
@@ -21,16 +21,20 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.errors import Errors
     from dolfinx_contact.step.load_step import StepState
 
-# Times the tolerance that errors over the reactions alone may have without a word.
+# Ratio of the error, relative to the reactions alone, to the tolerance above which a warning is
+# given.
 WORSE_THAN_TOLERANCE = 1e3
 
-# Reasons of steps that have no solution, in words.
+# Parts of error messages of steps that have no solution.
 NO_SOLUTION = "there is no solution"
 NOT_HELD = "a body leaves what held it"
 
 
 class Counts(NamedTuple):
     """Number of contact nodes by status, over all ranks.
+
+    Attributes:
+        open, stick, slip: Number of open, sticking and slipping contact nodes.
 
     Example:
         >>> sum(step.counts)  # nodes of the contact
@@ -47,24 +51,32 @@ class Step:
     """Record of a load step, the same on all ranks.
 
     Attributes:
-        error: Error of equilibrium, law and non-penetration, relative to the acting forces; see docs/errors.md.
-        slip_error: Defect of the slip rule, as a force relative to the acting forces; see docs/errors.md.
-        rounding: Rounding error of both in double precision; if it exceeds the tolerance, it replaces the tolerance.
-        forward_error: Estimated error of the reactions, relative to the same forces, from the solver's last correction.
-        contact_error: The largest of error, slip error and forward error, relative to the reactions alone: the accuracy of
-            contact forces that are small compared with loads and support forces; 0 without reactions.
-        bipotential_gap: Sum of ``contact.bipotential_gap`` over all nodes, >= 0, force times length.
+        error: Residual of equilibrium, contact law and non-penetration, relative to the acting
+            forces; see docs/errors.md.
+        slip_error: Residual of the slip rule, as a force relative to the acting forces; see
+            docs/errors.md.
+        rounding: Rounding error of ``error`` and ``slip_error`` in double precision.  If it exceeds
+            the tolerance, it replaces the tolerance.
+        forward_error: Estimated error of the reactions, relative to the acting forces, from the
+            last correction of the solver.
+        contact_error: The largest of error, slip error and forward error, but relative to the
+            reactions alone.  It is the accuracy of contact forces that are small compared with
+            loads and support forces; 0 without reactions.
+        bipotential_gap: Sum of ``contact.bipotential_gap`` over all nodes, >= 0, force times
+            length.
         penetration: Largest penetration of contact nodes, >= 0, length.
-        vertex_penetration: Largest penetration of facet nodes that carry no load, the vertices of second-order tetrahedra; 0
-            without such nodes, and with wear.
-        geometry_error: Change of distances, normals, textures and lever arms between the solution and its end position, as a
-            force relative to the reactions, see docs/surfaces.md; 0 on flat planes that do not rotate, and with small sliding.
-        iterations: Corrections by the solver; 0 if the contact-free solution, or the solver's initial state (the last step's, or
-            its extrapolation), already was the solution.
-        seconds: Wall time of the step.
-        counts: Contact nodes open, sticking and slipping.
-        solver: The solver that found the state: a ``SolverName``, or the name that your own solver gives.
-        reason: In words: why this solver was chosen, if the user did not choose; how others ended; remarks of the solver.
+        vertex_penetration: Largest penetration of facet nodes without reactions (the vertices of
+            second-order tetrahedra), >= 0, length; 0 without such nodes, and with wear.
+        geometry_error: Change of distances, normals, textures and lever arms between the
+            linearised and the final position, as a force relative to the reactions, see
+            docs/surfaces.md; 0 on flat planes that do not rotate, and with small sliding.
+        iterations: Number of corrections by the solver; 0 if its initial guess (the contact-free
+            solution, the last state or an extrapolation) already was the solution.
+        seconds: Wall time of the step, seconds.
+        counts: Number of open, sticking and slipping contact nodes.
+        solver: Solver that found the state: a ``SolverName``, or the name of a user-defined solver.
+        reason: Text: why this solver was chosen, if the user did not choose it; how other solvers
+            failed; remarks of the solver.
         tried: Methods that the solver tried, in order, if it has several.
 
     Example:
@@ -90,31 +102,32 @@ class Step:
     reason: str = ""
 
     def __str__(self) -> str:
-        """One line: errors, iterations, nodes by status."""
+        """Return errors, number of iterations and number of nodes by status as one line of text."""
         return (
-            f"error {_message(self.error)}, slip error {_message(self.slip_error)}, forward error {_message(self.forward_error)}, "
+            f"error {_error_text(self.error)}, slip error {_error_text(self.slip_error)}, forward error {_error_text(self.forward_error)}, "
             f"rounding {self.rounding:.1e}, after {self.iterations} iterations ({self.counts.open} open, "
             f"{self.counts.stick} sticking, {self.counts.slip} slipping nodes)"
         )
 
 
-def _message(error: float) -> str:
-    """A number; of what cannot be measured, as where rounding hides the loads on what has moved far away, that it cannot."""
+def _error_text(error: float) -> str:
+    """Return an error as text: the number, or "unknown" if it is not finite."""
     return f"{error:.3e}" if np.isfinite(error) else "unknown"
 
 
 def named(step: Step) -> str:
-    """Solver and reason of a step in words."""
+    """Return the name of the solver of a step, followed by the reason if there is one, as text."""
     return f"{step.solver}: {step.reason}" if step.reason else str(step.solver)
 
 
 class NotConverged(RuntimeError):
-    """A step did not reach its tolerance; the problem keeps its last converged state.
+    """A load step did not converge to its tolerance; the problem keeps its last converged state.
 
     Attributes:
-        step: Record of the step, with what was tried.
-        displacement: The best state found, owned degrees of freedom; not a solution.
-        reactions: Reactions of each contact in that state, a list of arrays ``shape=(n, gdim)``, local frame, force units.
+        step: Record of the step that did not converge, including the methods that were tried.
+        displacement: Displacement of the best iterate, owned degrees of freedom; not a solution.
+        reactions: Reactions of each contact at the best iterate, a list of arrays
+            ``shape=(n, gdim)``, local frame, force units.
 
     Example:
         >>> try:
@@ -130,12 +143,18 @@ class NotConverged(RuntimeError):
         self.step, self.displacement, self.reactions = step, displacement, reactions
 
     def __reduce__(self) -> tuple:
-        # An exception is taken apart into its message alone, and could not be put together on the other side.
+        # By default, pickle keeps only the message of an exception, and could not call
+        # ``__init__``.
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
 def counts_of(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
-    """Contact nodes open, sticking and slipping, of the states of some contacts, or these themselves.  Collective."""
+    """Return the number of open, sticking and slipping contact nodes over all ranks.  Collective.
+
+    Args:
+        body: The body, for its communicator.
+        nodes: Contacts or contact states, which have an attribute ``status``.
+    """
     here = sum(np.bincount(state.status, minlength=3) for state in nodes)
     return Counts(*(int(count) for count in body.total(here + np.zeros(3))))
 
@@ -143,20 +162,20 @@ def counts_of(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
 def record(
     state: StepState, found: SolverResult, seconds: float, geometry_error: float = 0.0
 ) -> Step:
-    """Record of a state.  Collective.
+    """Return the record of a load step.  Collective.
 
     Args:
-        state: The state, judged by F itself.
-        found: What the solver has found.
-        seconds: That the step took on this rank.
-        geometry_error: As ``Step`` has it.
+        state: State at the end of the step, whose errors are computed from the residual form.
+        found: Result of the solver.
+        seconds: Wall time of the step on this rank, seconds.
+        geometry_error: Error of the linearised surface geometry, see ``Step``.
     """
     step, errors = state.step, state.errors
     gap, penetration, of_vertices = 0.0, 0.0, 0.0
     for contact, nodes in zip(step.contacts, state.nodes):
         given = contact.given
         if given.displacements.degree > 1 and given.wear is None:
-            of_vertices = max(of_vertices, _penetration_between(given, state.x))
+            of_vertices = max(of_vertices, _vertex_penetration(given, state.x))
         gap += contact.bipotential_gap(nodes).sum()
         penetration = max(penetration, -nodes.gap.min(initial=0.0))
     largest = step.body.largest
@@ -164,7 +183,7 @@ def record(
         error=errors.error,
         slip_error=errors.slip_error,
         rounding=errors.rounding,
-        # where nothing acts it has no scale
+        # without acting forces, it has no scale
         forward_error=found.forward_error if errors.acts else errors.largest,
         bipotential_gap=float(step.total(gap)),
         penetration=largest(np.array([penetration])),
@@ -181,13 +200,22 @@ def record(
 
 
 def converged(errors: Errors, step: Step, tol: float) -> bool:
-    """Whether all errors are at most the tolerance, or nothing is left above rounding."""
+    """Return whether all errors of a step are at most the tolerance, or at the rounding level.
+
+    Args:
+        errors: Errors of equilibrium and of the slip rule.
+        step: Record of the step, which has the forward error.
+        tol: Tolerance, relative to the acting forces.
+    """
     near = step.forward_error <= tol or errors.within(0.0)
     return near and errors.within(tol)
 
 
 def warn_of_rounding(step: Step, tol: float) -> None:
-    """Warn, in the name of who called ``solve``, of errors above the tolerance that rounding leaves."""
+    """Warn if errors of a step exceed the tolerance, since rounding prevents smaller ones.
+
+    The warning points to the line that called ``solve``.
+    """
     if max(step.error, step.slip_error, step.forward_error) > tol:
         warnings.warn(
             f"double precision allows no smaller error here than at present, tol is {tol:.1e}: {step}.",
@@ -197,9 +225,13 @@ def warn_of_rounding(step: Step, tol: float) -> None:
 
 
 def warn_of_contact(step: Step, tol: float) -> None:
-    """Warn, in the name of who called ``solve``, of reactions far less accurate than the tolerance, if a smaller one would help."""
+    """Warn if the reactions are much less accurate than the tolerance.
+
+    There is no warning if rounding dominates the errors, since a smaller tolerance would not help.
+    The warning points to the line that called ``solve``.
+    """
     left = max(step.error, step.slip_error, step.forward_error)
-    known = max(tol, left)  # where that is more than tol, rounding is warned of
+    known = max(tol, left)  # if ``left`` exceeds tol, ``warn_of_rounding`` warns
     if (
         WORSE_THAN_TOLERANCE * known < step.contact_error < np.inf
         and left > ROUNDING_FACTOR * step.rounding
@@ -211,8 +243,13 @@ def warn_of_contact(step: Step, tol: float) -> None:
         )
 
 
-def _penetration_between(contact: Contact, u: np.ndarray) -> float:
-    """Largest penetration of nodes of the facets that carry nothing, >= 0, length, at owned degrees of freedom.  Collective."""
+def _vertex_penetration(contact: Contact, u: np.ndarray) -> float:
+    """Return the largest penetration of facet nodes without reactions, >= 0, length.  Collective.
+
+    Args:
+        contact: The contact.
+        u: Displacement, owned degrees of freedom.
+    """
     displacements = contact.displacements
     here = displacements.rows(u)[contact.left_out]
     gaps = contact.geometry.distances(displacements.x[contact.left_out, : displacements.dim] + here)

@@ -1,9 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Time series for ParaView, PyVista and meshio: VTK's XML format, the same from all releases of DOLFINx.
+"""Time series in VTK's XML format for ParaView, PyVista and meshio.
 
-VTK's own writer shares a process badly with DOLFINx where both bring the same libraries, and DOLFINx's differ from
-release to release; the format itself is a page long [https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html].
+The format is written directly
+[https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html].
+VTK is not used, since its libraries can conflict with those of DOLFINx in one process.  The writers
+of DOLFINx are not used, since they differ between releases.
 """
 
 from __future__ import annotations
@@ -25,13 +27,18 @@ from dolfinx_contact.support.collective import by_first_rank, raised_together
 if TYPE_CHECKING:
     from dolfinx_contact.problem import ContactProblem
 
-VTK_KINDS = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+# VTK's names of data types, by NumPy's kind of data type.
+VTK_DATA_TYPES = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+# VTK's names of file types: a time series, and a mesh.
 VTK_COLLECTION = "Collection"
 VTK_PIECE = "UnstructuredGrid"
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """Contact surfaces as one mesh; ``contact`` is the index of the contact of each node."""
+    """Return the meshes of all contact surfaces as one mesh.
+
+    The nodal values ``contact`` are the index of the contact of each node.
+    """
     starts = np.cumsum([0, *(len(mesh.x) for mesh in meshes)])
     kinds = sorted({kind for mesh in meshes for kind in mesh.cells})
     cells = {
@@ -47,7 +54,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
 
 
 def write_vtu(path: Path, mesh: Mesh) -> None:
-    """Write a mesh to a file of VTK's XML format."""
+    """Write a mesh and its values to a file in VTK's XML format (``*.vtu``)."""
     file = _file(VTK_PIECE)
     cells = mesh.cells.values()
     counts = [np.full(len(nodes), nodes.shape[1]) for nodes in cells]
@@ -73,7 +80,7 @@ def write_vtu(path: Path, mesh: Mesh) -> None:
 
 
 def _file(kind: str) -> ET.Element:
-    """The root of a file with the element that has its contents."""
+    """Return the root element of a VTK file, with an empty element of type ``kind`` in it."""
     order = {"version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
     file = ET.Element("VTKFile", {"type": kind, **order})
     ET.SubElement(file, kind)
@@ -81,10 +88,10 @@ def _file(kind: str) -> ET.Element:
 
 
 def _data(name: str, array: np.ndarray) -> ET.Element:
-    """An array in base64, its number of bytes before it."""
+    """Return the XML element of an array: number of bytes and values, encoded in base64."""
     kind = array.dtype.kind
     data = array.astype({"f": "<f8", "i": "<i8", "u": "u1"}[kind]).tobytes()
-    about = {"type": VTK_KINDS[kind], "Name": name, "format": "binary"}
+    about = {"type": VTK_DATA_TYPES[kind], "Name": name, "format": "binary"}
     if array.ndim > 1:
         about["NumberOfComponents"] = str(array.shape[1])
     element = ET.Element("DataArray", about)
@@ -93,7 +100,10 @@ def _data(name: str, array: np.ndarray) -> ET.Element:
 
 
 def _replace(path: Path, file: ET.Element) -> None:
-    """Write a file in one go: a run that is killed leaves the one before."""
+    """Write an XML file and replace an older one only when it is complete.
+
+    If the process is killed while writing, the older file remains.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(path.name + ".part")
     ET.ElementTree(file).write(fresh, xml_declaration=True, encoding="utf-8")
@@ -101,24 +111,31 @@ def _replace(path: Path, file: ET.Element) -> None:
 
 
 class Writer:
-    """Writes the body and its contact surfaces after a step, as a time series.  Any number of ranks.
+    """Writer of a time series of the body and its contact surfaces, on any number of ranks.
 
-    ``block.pvd`` is the body: ``displacement`` and the fields.  ``block_contact.pvd`` is the contact surface alone, of all
-    contacts, distinguished by ``contact``: ``pressure``, ``shear_traction``, ``slip`` in the last step, ``status`` (0 open, 1 stick, 2
-    slip), ``gap``, ``wear_depth``, ``dissipation``, ``displacement`` and ``reaction``; vectors are in global components.  Nodal
-    forces in ``reaction`` add up to ``contact.force()``.  The meshes are in ``block_data``, one file per step.  Rank 0 gathers
-    and writes everything.
+    For the path ``block.pvd``, the file ``block.pvd`` is the time series of the body, with
+    ``displacement`` and the further fields.  The file ``block_contact.pvd`` is the time series of
+    all contact surfaces, with the index ``contact`` of the contact.  It contains ``pressure``,
+    ``shear_traction``, ``slip`` in the last step, ``status`` (0 open, 1 stick, 2 slip), ``gap``,
+    ``wear_depth``, ``dissipation``, ``displacement`` and ``reaction``.  Vectors are in global
+    components.  The sum of the nodal forces ``reaction`` is ``contact.force()``.  The meshes are in
+    the folder ``block_data``, one file per step and series.  Rank 0 gathers and writes all data.
 
     Args:
         problem: The ContactProblem.
-        path: The collection, ``*.pvd``.
-        fields: Further fields of the body, by name: Functions of Lagrange spaces, written at nodes, and other UFL expressions,
-            such as stress, written at the midpoint of each cell.  Scalars, vectors and tensors.
-        resume: Number of steps to keep of an existing series, those before a checkpoint.
+        path: File of the time series, ``*.pvd``.
+        fields: Further scalar, vector or tensor fields of the body, by name.  Functions of Lagrange
+            spaces are written at nodes, other UFL expressions, such as a stress, at the midpoint of
+            each cell.
+        resume: Number of steps of an existing time series to keep, for instance the number of steps
+            before a checkpoint.
+
+    Attributes:
+        times: Times of the written steps.
 
     Raises:
-        ValueError: on all ranks, for a path that does not end in ``.pvd``, a name already in use, or fewer steps in the file than
-            ``resume``.
+        ValueError: on all ranks, if the path does not end in ``.pvd``, the name of a field is
+            ``displacement``, or the file has fewer steps than ``resume``.
 
     Example:
         >>> writer = dc.Writer(problem, "block.pvd")
@@ -154,9 +171,13 @@ class Writer:
         self._surfaces = [SurfaceMesh(contact) for contact in problem.contacts]
 
     def write(self, time: float) -> None:
-        """Write the present state of the problem; ``time`` is finite.  Collective.
+        """Write the present state of the problem.  Collective.
+
+        Args:
+            time: Time of the state in the time series, finite.
 
         Raises:
+            ValueError: on all ranks, if ``time`` is not finite.
             OSError: on all ranks, if a file cannot be written.
         """
         with raised_together(self._comm):
@@ -170,12 +191,12 @@ class Writer:
         self.times = times
 
     def _parts(self) -> dict[str, Path]:
-        """The collections, and what their files begin with."""
+        """Return the paths of both time series, by the prefix of the names of their mesh files."""
         stem = self._path.stem
         return {"body": self._path, "contact": self._path.with_name(f"{stem}_contact.pvd")}
 
     def _name(self, part: str, k: int) -> str:
-        """A file relative to the collections."""
+        """Return the path of the mesh file of step ``k``, relative to the ``.pvd`` file."""
         return f"{self._path.stem}_data/{part}{k:06d}.vtu"
 
     def _write(self, times: list[float], body: Mesh, surfaces: list[Mesh]) -> None:
@@ -190,7 +211,11 @@ class Writer:
             _replace(path, file)
 
     def _times_of_file(self, count: int) -> list[float]:
-        """Times of the first steps of an existing series."""
+        """Return the times of the first ``count`` steps of an existing time series.
+
+        Raises:
+            ValueError: the file is missing or invalid, or has fewer steps.
+        """
         try:
             sets = ET.parse(self._path).getroot().findall(f"{VTK_COLLECTION}/DataSet")
             times = [float(entry.attrib["timestep"]) for entry in sets]

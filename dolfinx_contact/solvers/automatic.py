@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The default choice of a solver."""
+"""The default solver: it chooses a method by the size and kind of the problem."""
 
 from __future__ import annotations
 
@@ -16,24 +16,27 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
 
 
-# Largest number of multigrid solves for the condensed operator after the fixed point has failed: about a thousand cycles.
+# If linear systems are solved by multigrid, the condensed operator needs one solve per column.  Up
+# to this number of solves (about a thousand multigrid cycles), it is tried after the fixed point
+# failed.
 MOST_SOLVES = 100
 
 
 def most_nodes(unknowns: int, friction: bool) -> int:
-    """Largest number of contact nodes for which the condensed solver is tried first, see docs/solvers.md.
+    """Largest number of contact nodes for which the condensed solver is tried first.
 
-    Its time grows with the cube of the contact nodes, that of the fixed point with the unknowns.
+    The time of the condensed solver grows with the cube of the number of contact nodes, the time of
+    the fixed point in proportion to the number of unknowns; see docs/solvers.md.
 
     Args:
-        unknowns: Unknowns of the body.
+        unknowns: Number of degrees of freedom of the body.
         friction: Whether any contact has friction.
     """
     equal, measured = 4e4, 1010
     return min(measured, round((equal * unknowns) ** (1 / 3))) if friction else measured
 
 
-# The candidates, each imported when it is first used.
+# The candidate solvers; each module is imported when its solver is first used.
 
 
 def _condensed() -> Solver:
@@ -61,10 +64,12 @@ def _sparse() -> Solver:
 
 
 class Automatic(Solver):
-    """Newton's method on the condensed problem for small contacts, the fixed point for large ones.
+    """Default solver: ``CondensedNewton`` for few contact nodes, ``FixedPoint`` for many.
 
-    For nonlinear bodies, Newton's method on body and contact together; or, if linear systems are not factorised or planes are driven
-    by force, the fixed point on the linearised body.  If the first choice fails, the other is tried; ``SolverResult.reason`` says so.
+    For non-linear bodies, it uses ``SparseNewton``, Newton's method on body and contact together.
+    If linear systems are not factorised or surfaces are driven by force, it applies ``FixedPoint``
+    to the linearised body.  If the first choice fails, the other solver is tried;
+    ``SolverResult.reason`` records this.
     """
 
     nonlinear = True
@@ -75,7 +80,7 @@ class Automatic(Solver):
 
 
 class BoundAutomatic(BoundSolver):
-    """The candidate solvers, each bound when it is first used."""
+    """The default solver, set up for one problem; candidates are set up when first used."""
 
     def __init__(self, step: LoadStep):
         self._bound: dict[Callable, BoundSolver] = {}
@@ -89,7 +94,11 @@ class BoundAutomatic(BoundSolver):
             self._choose_linear(step)
 
     def update(self, step: LoadStep) -> None:
-        """See ``BoundSolver``; candidates are told when they are used."""
+        """Choose the candidate solvers anew if the problem has changed.
+
+        This concerns stiffness, frames, surface motions and friction.  The candidates themselves
+        are updated when they are next used.  Collective.
+        """
         new, old, self._stamps = step.stamps, self._stamps, step.stamps
         rows = new.rows != old.rows and new.step != old.step
         if rows or new.stiffness != old.stiffness or new.parts != old.parts:
@@ -97,7 +106,7 @@ class BoundAutomatic(BoundSolver):
             for solver in [one for one in self._bound if one is not self._solvers[0]]:
                 self._bound.pop(solver).close()  # memory counts more than time
         elif self._components not in (None, components(step.contacts)):
-            self._choose(step)  # with friction another one may be the faster
+            self._choose(step)  # with friction, another solver may be the faster one
 
     def _candidate(self, solver: Callable, step: LoadStep) -> BoundSolver:
         if solver in self._bound:
@@ -136,15 +145,19 @@ class BoundAutomatic(BoundSolver):
             self._solvers = self._solvers[:1]
 
     def close(self) -> None:
-        """Free all solvers.  Collective."""
+        """Free all candidate solvers.  Collective."""
         for bound in self._bound.values():
             bound.close()
 
     def solve(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
-        """See ``BoundSolver``."""
+        """Apply candidate solvers until one reaches the tolerance; return the best result.
+
+        Collective.
+        """
         iterations, smallest, best, start, ended, kept = 0, np.inf, None, None, [], None
         solvers = self._solvers
-        # For bodies held by contact alone, the fixed point quickly solves cases that take Newton's fallbacks thousands of iterations.
+        # For bodies held by contact alone, the fixed point quickly solves cases that take Newton's
+        # fallbacks thousands of iterations.
         brief = step.statics is not None and solvers[0] is _condensed
         for solver in [solvers[0], *solvers[1:], solvers[0]] if brief else solvers:
             options = {"fallbacks": False} if brief and not ended else {}
@@ -154,14 +167,15 @@ class BoundAutomatic(BoundSolver):
             errors, kept = found.state.errors, found.start or kept
             ended.append((found, f"{found.solver} ended at {errors.largest:.1e}"))
             near = found.forward_error <= max(step.tol, errors.rounding)
-            # An open state may be one that Newton's method strayed to, away from a pressed one: the fixed point decides.
+            # Newton's method may have left a state in contact for an open one: the fixed point
+            # decides.
             strayed = brief and not errors.acts and (len(ended) == 1 or not near)
             done = errors.within(step.tol if near else 0.0) and not strayed
             # Without acting forces, relative errors cannot be compared.
             size = errors.largest if errors.acts else np.inf
             if best is None or done or size < smallest:
                 smallest, best = size, found
-                # far from a solution, the state is no better than the other solver's own start
+                # far from a solution, the state is no better than the next solver's own start
                 start = found.state if smallest <= ASTRAY_ERROR else None
             if done:
                 break

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: MIT
 """The interface of solvers.
 
-A ``Solver`` is an object with options and a method ``bind(step)``, which returns a ``BoundSolver``.  The bound solver solves load steps of
-one problem.  It owns what it has set up, and is told by ``update(step)``, before each solution, what has become another one.
+A ``Solver`` holds options.  Its method ``bind(step)`` returns a ``BoundSolver``, which solves the
+load steps of one problem and owns the matrices and factorisations it sets up.  Before each
+solution, the problem calls ``update(step)``, so that the bound solver can discard data that are out
+of date.
 """
 
 from __future__ import annotations
@@ -17,13 +19,17 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-ASTRAY_ERROR = 1e-3  # error above which it is not digits that miss, and the state is no start for another solver
+# Relative error above which a state is too far from a solution to serve as another solver's start.
+ASTRAY_ERROR = 1e-3
 
-KEPT_STARTS = 64  # earlier steps in the memory of a problem: more than most load cycles have
+# Number of earlier steps whose start data a problem keeps: more than most load cycles have steps.
+KEPT_STARTS = 64
 
 
 class SolverName(str, Enum):
-    """Names of this package's solvers in ``step.solver``; ``NONE`` if the contact-free solution was the answer.
+    """Name of one of this package's solvers, as ``step.solver`` records it.
+
+    ``NONE`` means that no solver ran: the contact-free solution solved the step.
 
     Example:
         >>> step.solver == dc.SolverName.CONDENSED_NEWTON  # equal to "CondensedNewton", too
@@ -36,21 +42,23 @@ class SolverName(str, Enum):
     SNES = "SNES"
     NONE = "none"
 
-    __str__ = str.__str__  # the plain word on every Python
+    __str__ = str.__str__  # the same text on every Python version
     __format__ = str.__format__
 
 
 class SolverResult(NamedTuple):
-    """What a solver found for a load step; the problem decides whether to accept it.
+    """Result of a solver for one load step; the problem decides whether to accept it.
 
     Attributes:
-        state: The best state found, of ``step.evaluate`` or ``step.measure``.
-        iterations: Iterations of the solver.
+        state: The best state found, as returned by ``step.evaluate`` or ``step.measure``.
+        iterations: Number of iterations of the solver.
         forward_error: Estimated error of the reactions, relative to the acting forces.
         solver: A ``SolverName``, or the name of your own solver.
         tried: Methods that were tried, in order, if the solver has several.
-        reason: In words: why this solver was chosen, if the user did not choose, and the solver's remarks.
-        start: What the solver wants to have among the ``starts`` of later steps; None is nothing.
+        reason: Text: why this solver was chosen, if the user did not choose, and the solver's
+            remarks.
+        start: Data that the solver will receive among the ``starts`` of later steps; None if it
+            needs no data.
     """
 
     state: StepState
@@ -63,34 +71,40 @@ class SolverResult(NamedTuple):
 
 
 class BoundSolver(ABC):
-    """Base class of solvers that are bound to the steps of a problem."""
+    """Base class of solvers that are set up for the load steps of one problem."""
 
     def update(self, step: LoadStep) -> None:  # noqa: B027 (may be left out)
-        """Keep of what is set up that which is valid for a step, see ``step.stamps``; here nothing is.  Collective."""
+        """Discard the set-up data that ``step.stamps`` shows to be out of date.  Collective.
+
+        The base class keeps no such data.
+        """
 
     @abstractmethod
     def solve(self, step: LoadStep, starts: Sequence[Any]) -> SolverResult:
-        """Search for a state whose errors are at most ``step.tol``; return the best one found.  Collective.
+        """Search for a state whose errors are at most ``step.tol``; return the best one found.
+        Collective.
 
         Args:
-            step: The step.
-            starts: What solvers have returned as ``start`` in earlier steps, at most ``KEPT``, the last one last.
+            step: The load step.
+            starts: The ``SolverResult.start`` of earlier steps, at most ``KEPT_STARTS`` of them,
+                the latest one last.
         """
 
     def close(self) -> None:  # noqa: B027
-        """Free PETSc objects; here there are none.  Collective."""
+        """Free the solver's PETSc objects; the base class has none.  Collective."""
 
 
 class Solver(ABC):
-    """Base class of solvers' options; one object may serve several problems.
+    """Base class of solver options; one object may serve several problems.
 
     Attributes:
-        nonlinear: Whether the solver handles steps whose residual is a nonlinear function of the displacement; without it, it gets
-            a sequence of linear ones.
+        nonlinear: Whether the solver handles a residual that is a non-linear function of the
+            displacement.  If not, it receives a sequence of linearised load steps instead.
     """
 
     nonlinear: ClassVar[bool] = False
 
     @abstractmethod
     def bind(self, step: LoadStep) -> BoundSolver:
-        """The solver for steps like this one.  Collective."""
+        """Return a ``BoundSolver`` with these options, set up for the problem of a load step.
+        Collective."""

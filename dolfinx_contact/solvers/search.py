@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The state of a search: its best iterate, the estimated error, and whether to continue."""
+"""Progress of an iterative solver: best iterate, estimated error, and whether to continue."""
 
 from __future__ import annotations
 
@@ -14,30 +14,36 @@ import numpy as np
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# Iterations from which the convergence rate is estimated.
+# Number of last iterations from which the convergence rate is estimated.
 RATE_WINDOW = 3
 
-# Iterates in which it is counted how many nodes change their status.
+# Number of last iterates over which changes of nodal status are counted, for error messages.
 COUNTED_ITERATES = 50
 
 
 class Search:
-    """Keeps the best state and decides when a search ends.
+    """Progress of an iterative solver in one load step: best state, errors and stopping criteria.
+
+    The search may consist of several attempts, each with its own start and iteration limit.
 
     Args:
-        step: The ``LoadStep``.
-        state: Where it begins.
+        step: The load step.
+        state: The initial state.
         max_seconds: Wall time after which the search ends, seconds.
 
     Attributes:
-        best: The state with the smallest errors.
-        nearest: That of the present attempt.
-        error: The largest error of the last state; far from the tolerance that of equilibrium alone.
-        forward_error: Forward error of the best state, see docs/errors.md.
-        iterations: Iterations so far.
-        left: Iterations left in the present attempt.
-        over: Whether the step is solved, or time has run out.
-        strayed: A state without forces of a loose body that was pressed: another one may be the answer; None if none was met.
+        best: The state with the smallest errors of all attempts.
+        nearest: The state with the smallest errors of the present attempt.
+        error: Largest relative error of the last iterate.  Far from a solution, only the error of
+            equilibrium is evaluated.
+        forward_error: Estimated forward error of the best state, see docs/errors.md.
+        iterations: Number of iterations so far.
+        left: Number of iterations left in the present attempt.
+        over: Whether the search has ended: the step is solved, only rounding errors are left, or
+            the time limit is reached.
+        strayed: A force-free equilibrium of a body that is held by contact alone and was in contact
+            at the end of the last step.  It may be the wrong solution.  None if no such state was
+            found.
     """
 
     strayed: StepState | None = None
@@ -49,33 +55,46 @@ class Search:
         self._errors: deque[float] = deque(maxlen=RATE_WINDOW + 1)
         self.iterations = self.left = 0
         self._states, self._status = 0, np.zeros(0, dtype=np.uint8)
-        self._changed_in = np.zeros(0, dtype=int)  # in which state each node has last changed
+        # number of the state in which each node last changed its status
+        self._changed_in = np.zeros(0, dtype=int)
         self._start, self._seconds = perf_counter(), max_seconds
         self.over = self._lost = False
 
     def begin(self, state: StepState, most: int, patience: float = math.inf) -> None:
-        """Begin an attempt at a state, of at most ``most`` iterations; it is lost if its smallest error does not halve within ``patience`` of them."""
+        """Begin a new attempt from a state.
+
+        Args:
+            state: The initial state of the attempt.
+            most: Iteration limit of the attempt.
+            patience: The attempt is given up if its smallest error has not halved within this
+                number of iterations.
+        """
         self.left, self._lost, self._patience = most, False, patience
         self.nearest, self._attempt, self._smallest = state, (True, np.inf), np.inf
         self._halved, self._since = np.inf, self.iterations
 
     @property
     def within(self) -> bool:
-        """Whether the errors of the best state are at most the tolerance."""
+        """Whether all errors of the best state are at most the tolerance."""
         return not self._rank[0]
 
     @property
     def goes_on(self) -> bool:
-        """Whether the attempt continues: not over, not lost, and with iterations left."""
+        """Whether the present attempt continues: not ended or given up, iterations left."""
         return not (self.over or self._lost) and self.left > 0
 
     def count(self, iterations: int) -> None:
-        """Count iterations that were done."""
+        """Add a number of completed iterations to the counters."""
         self.iterations += iterations
         self.left -= iterations
 
     def see(self, state: StepState) -> StepState:
-        """Take note of a state; where its errors are at most the tolerance it is judged by F itself.  Returns it.  Collective."""
+        """Record an iterate: update errors, best state and stopping criteria; return the state.
+        Collective.
+
+        If its errors are at most the tolerance, they are evaluated again with the residual form F,
+        and the state with these errors is recorded and returned.
+        """
         errors, tol = state.balance, self.step.tol
         if not state.is_far:
             errors = state.errors
@@ -87,7 +106,7 @@ class Search:
         self._errors.append(errors.balance)
         self.count_changes(state)
         change = errors.change * self._contraction()
-        within = self.error <= tol  # then the forward error counts, too
+        within = self.error <= tol  # only then is the forward error part of the rank
         rank = (not within, max(self.error, change) if within else self.error)
         strays = not errors.acts and self.step.was_pressed
         if rank < self._rank and not strays:
@@ -103,11 +122,11 @@ class Search:
         rounded = stalled and errors.within(0.0)
         if rounded and strays:
             self.strayed, self._lost, rounded = state, True, False
-        self.over = bool(solved or rounded or self._late())
+        self.over = bool(solved or rounded or self._time_is_up())
         return state
 
     def count_changes(self, state: StepState) -> None:
-        """Take note of nodes whose status is another one than in the last state."""
+        """Record which nodes have a different status (stick, slip, open) than in the last state."""
         status = np.concatenate([np.zeros(0, np.uint8), *(nodes.status for nodes in state.nodes)])
         if self._states == 0:
             self._status, self._changed_in = status, np.zeros(status.size, dtype=int)
@@ -117,21 +136,24 @@ class Search:
 
     @property
     def changes(self) -> tuple[int, int]:
-        """How many nodes of this rank have changed their status in the last states, and in how many of these."""
+        """Numbers of this rank's nodes that changed status recently, and of states counted."""
         counted = min(self._states, COUNTED_ITERATES)
-        first = self._states - counted + 1  # the first one has nothing before it
+        first = self._states - counted + 1  # the first state has no predecessor
         return int(np.count_nonzero(self._changed_in > first)), counted
 
     def _contraction(self) -> float:
-        """Ratio of the remaining error to the last change, if convergence continues at its present rate."""
+        """Ratio of the remaining error to the last change of the reactions.
+
+        Assumes that convergence continues at its present rate.
+        """
         last, first, steps = self._errors[-1], self._errors[0], len(self._errors) - 1
         if last == 0.0 or steps == 0:
             return 0.0 if last == 0.0 else 1.0
         rate = max(last / self._errors[-2], (last / first) ** (1 / steps))
         return rate / (1 - rate) if rate < 0.9 else 9.0
 
-    def _late(self) -> bool:
-        """Whether time is up on any rank; communicates only if there is a limit."""
+    def _time_is_up(self) -> bool:
+        """Whether the time limit is reached on any rank.  Collective if there is a limit."""
         if self._seconds == math.inf:
             return False
         return bool(self.step.total([perf_counter() - self._start > self._seconds])[0] > 0)

@@ -1,30 +1,40 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-r"""The errors of a step, dimensionless numbers; see docs/errors.md.
+r"""Dimensionless errors of a state of a load step, see docs/errors.md.
 
-The kernel computes the defects of a node, ``law.bipotential_map`` and ``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``); the
-condensed solver's checks use the same predictor and slip rule.
+The kernel computes the residuals of the law at a node by ``law.bipotential_map`` and
+``law.slip_defect`` (``law/bipotential.h``, ``law/slip_rule.h``).  The checks of the condensed
+solver use the same predictor and slip rule.
 
-For a displacement ``u`` with nodal reactions ``r`` in the friction cone, all errors are residual forces relative to the
-acting forces of the same state,
+For a displacement ``u`` with nodal reactions ``r`` in the friction cone, all errors are residual
+forces relative to the acting forces of the same state,
 
 .. math:: S = \max(|r|, |f|, |R|),
 
-Euclidean norms over nodes of reactions, external forces and support forces.
+where the norms are Euclidean norms of the nodal reactions, external forces and support forces.
 
-- ``error``: the largest of three. Equilibrium, ``|r - F(u)| / S`` on free degrees of freedom, F assembled by
-  DOLFINx, with equations of pressures converted to forces (``bodies/unknowns.py``), equilibrium of planes driven by force along their free
-  directions, and the error of boundary values times the stiffness. The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the
-  paper's projection equation [dSFMH07, Section 2], ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``. Penetration,
-  ``|kappa max(-x_n, 0)| / S``. The metric ``kappa`` is the normal diagonal entry of the stiffness at the node, never the rho of a solver.
-- ``slip_error``: ``|K_t (Delta u_t + |Delta u_t| d)| / S`` over slipping nodes, ``d`` the unit vector along
-  ``P^-2 r_t``, and ``|K_t Delta u_t|`` over sticking ones; none where mu = 0. ``K_t`` is the tangential block of the
-  stiffness at the node. The projection equation weights slip by ``Q^2`` and is insensitive to it where p is small.
-- ``rounding``: the rounding error of both in double precision, estimated from the size of the terms that cancel in
-  ``f - K u + r``, in the gaps and in the slips. No smaller error can be reached.
+- ``error``: the largest of three errors.
 
-If ``S`` itself is at the rounding level, no force acts. The state is then accepted if the residuals are below rounding, and
-all numbers are relative to the terms that cancel.
+  - Equilibrium, ``|r - F(u)| / S`` on free degrees of freedom, with F assembled by DOLFINx and the
+    equations of pressures converted to forces (``bodies/unknowns.py``).  It includes the
+    equilibrium of surfaces driven by force along their free directions, and the error of boundary
+    values times the stiffness.
+  - The law, ``|r - proj(r - kappa w, K_mu)| / S``, the residual of the projection equation
+    [dSFMH07, Section 2], with ``w = (Q^2 Delta u_t, x_n + ||M Q^2 Delta u_t||)``.
+  - Penetration, ``|kappa max(-x_n, 0)| / S``.
+
+  The metric ``kappa`` is the normal diagonal entry of the stiffness at the node, never the
+  parameter rho of a solver.
+- ``slip_error``: ``|K_t (Delta u_t + |Delta u_t| d)| / S`` over slipping nodes, where ``d`` is the
+  unit vector along ``P^-2 r_t``, and ``|K_t Delta u_t| / S`` over sticking nodes; zero where
+  mu = 0.  ``K_t`` is the tangential block of the stiffness at the node.  This error is needed
+  because the projection equation weights slip by ``Q^2`` and is insensitive to slip where p is
+  small.
+- ``rounding``: the rounding error of both in double precision, estimated from the size of the terms
+  that cancel in ``f - K u + r``, in the gaps and in the slips.  No smaller error can be reached.
+
+If ``S`` itself is at the rounding level, no force acts.  The state is then accepted if the
+residuals are below rounding, and all errors are relative to the terms that cancel.
 """
 
 from __future__ import annotations
@@ -40,54 +50,70 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.contact_step import ContactStep
     from dolfinx_contact.law.friction import Friction
 
-# If rounding exceeds this part of the acting forces, it may hide that loads are not balanced.
+# Rounding relative to the acting forces above which it may hide that loads are not balanced.
 BLIND_ROUNDING = 1e-3
 
 
 class Errors(NamedTuple):
-    """Errors of a state, dimensionless; ``change`` is that of the reactions since the state before, over S, the ``scale``."""
+    """Dimensionless errors of a state.
+
+    Attributes:
+        error: Largest error of equilibrium, law and penetration.
+        slip_error: Error of the slip rule.
+        rounding: Estimated rounding error of ``error`` and ``slip_error``.
+        change: Norm of the change of the reactions since the previous state, relative to S.
+        acts: Whether the acting forces exceed rounding.
+        scale: S, the norm of the acting forces, in the unit of force of the step.
+        share: Norm of the reactions relative to S.
+        balance: Error of equilibrium alone.
+    """
 
     error: float
     slip_error: float
     rounding: float
     change: float = np.inf
-    acts: bool = True  # forces above rounding do
-    scale: float = 0.0  # S, in the unit of force of the sums
-    share: float = 1.0  # |r| / S, of the reactions in the forces that act
-    balance: float = np.inf  # of equilibrium alone
+    acts: bool = True
+    scale: float = 0.0
+    share: float = 1.0  # |r| / S
+    balance: float = np.inf
 
     @property
     def largest(self) -> float:
-        """The larger one of both errors; NaN if either is."""
+        """The larger of ``error`` and ``slip_error``; NaN if one of them is NaN."""
         return float(np.maximum(self.error, self.slip_error))
 
     def of_contact(self, forward: float) -> float:
-        """The largest of all errors over the reactions in place of all forces that act; 0 without reactions."""
+        """Return the largest error relative to the reactions; 0 without reactions.
+
+        Args:
+            forward: Forward error of the reactions, relative to S.
+        """
         return max(self.largest, forward) / self.share if self.share > 0.0 else 0.0
 
     @property
     def blind(self) -> bool:
-        """Whether rounding may hide that loads are not balanced."""
+        """Whether rounding is so large that it may hide an imbalance of the loads."""
         return not self.acts or self.rounding > BLIND_ROUNDING
 
     def within(self, tol: float) -> bool:
-        """Whether both are at most ``tol``, or as small as double precision allows."""
+        """Return whether both errors are at most ``tol``, or as small as rounding permits."""
         rounding = ROUNDING_FACTOR * self.rounding
         return self.largest <= (max(tol, rounding) if self.acts else rounding)
 
 
 def contact_defects(contact: ContactStep, state: State) -> tuple[np.ndarray, ...]:
-    """Residual of the projection equation, penetration and defect of the slip rule, as forces.
+    """Return the residuals of the contact law at each node, as forces.
 
     Args:
         contact: The contact.
-        state: Its reaction, gap and slip increment.
+        state: Reaction, gap and slip increment of its nodes.
 
     Returns:
-        ``shape=(n, gdim)``, ``(n,)`` and ``(n, gdim - 1)``, local frame, force units.
+        Residual of the projection equation, ``shape=(n, gdim)``; penetration, ``(n,)``; residual of
+        the slip rule, ``(n, gdim - 1)``; local frame, force units.
     """
     law, stiffness = contact.law, contact.stiffness
-    felt = _felt(state, contact.friction)
+    felt = _weighted_slip(state, contact.friction)
     projected, _ = law.bipotential_map(state.reaction, state.gap, felt, stiffness.normal)
     penetration = stiffness.normal * np.maximum(-state.gap, 0.0)
     defect = law.slip_defect(state.reaction, state.slip_increment, state.status)
@@ -95,11 +121,12 @@ def contact_defects(contact: ContactStep, state: State) -> tuple[np.ndarray, ...
     return state.reaction - projected, penetration, slip
 
 
-def _felt(state: State, friction: Friction) -> np.ndarray:
-    """Slips as the law's residual has them, ``shape=(n, gdim - 1)``: of nodes that stick over mu, where it exceeds 1.
+def _weighted_slip(state: State, friction: Friction) -> np.ndarray:
+    """Return slip increments for the residual of the law, ``shape=(n, gdim - 1)``, length.
 
-    The residual has ``kappa mu |Delta u_t|``.  Where the law asks for no slip, what there is counts by the force that it makes,
-    not mu times.
+    At sticking nodes with mu > 1, the slip is divided by mu.  The residual contains
+    ``kappa mu |Delta u_t|``; the division makes the spurious slip of a sticking node count as
+    ``kappa |Delta u_t|`` instead.
     """
     slip, mu = state.slip_increment, friction.mu.max(axis=-1, initial=0.0)
     if not (mu > 1.0).any():
@@ -109,29 +136,31 @@ def _felt(state: State, friction: Friction) -> np.ndarray:
 
 
 def contact_rounding(contact: ContactStep, state: State, u: np.ndarray) -> np.ndarray:
-    """What rounding leaves in gaps and slips, as forces on the nodes, ``shape=(n, gdim)``, local frame.
+    """Return rounding errors of gaps and slips as forces, ``shape=(n, gdim)``, local frame.
 
     Args:
         contact: The contact.
-        state: Its state at ``u``.
+        state: State of the contact at ``u``.
         u: Displacement of owned degrees of freedom, length units.
     """
     normal, tangential = contact.motion_rounding(u, state)
     stiffness = contact.stiffness
     stiff = np.abs(stiffness.tangential).sum(axis=2)
     mu = contact.friction.mu[..., : tangential.shape[1]]
-    if (mu > 1.0).any():  # the law's residual has mu times the slip
+    if (mu > 1.0).any():  # the residual of the law contains mu times the slip
         slips = state.status == int(Status.SLIP)
         normal = normal + slips * (mu * tangential).sum(axis=1)
     return np.column_stack((stiff * tangential, stiffness.normal * normal))
 
 
 def as_errors(balance: np.ndarray, contacts: np.ndarray | None = None) -> Errors:
-    """Errors from squares of norms, in any unit of force.
+    """Return the errors of a state from squared norms, in any unit of force.
 
     Args:
-        balance: Of equilibrium, reactions, external forces, supports, rounding of the body, and change of the reactions.
-        contacts: Of law, penetration, slip rule and rounding at the contacts; None where equilibrium alone is asked for.
+        balance: Squared norms of the residual of equilibrium, reactions, external forces, support
+            forces, rounding error of the body, and change of the reactions; ``shape=(6,)``.
+        contacts: Squared norms of the residuals of law, penetration and slip rule, and of the
+            rounding error at the contacts, ``shape=(4,)``; None for errors of equilibrium alone.
     """
     equilibrium, r, f, R, body, change = np.sqrt(balance)
     law, penetration, slip, contact = np.zeros(4) if contacts is None else np.sqrt(contacts)
@@ -139,12 +168,12 @@ def as_errors(balance: np.ndarray, contacts: np.ndarray | None = None) -> Errors
     acts = bool(acting > ROUNDING_FACTOR * rounding)
     if not acts:
         acting = rounding / UNIT_ROUNDOFF
-    left = np.array([max(equilibrium, law, penetration), slip, rounding, change])
+    residuals = np.array([max(equilibrium, law, penetration), slip, rounding, change])
     if acting > 0.0:
-        left /= acting
-    elif not np.isnan(left).any():
-        left = np.where(left > 0.0, np.inf, 0.0)
-    error, slip_error, rounding, change = map(float, left)
+        residuals /= acting
+    elif not np.isnan(residuals).any():
+        residuals = np.where(residuals > 0.0, np.inf, 0.0)
+    error, slip_error, rounding, change = map(float, residuals)
     if np.isnan([equilibrium, law, penetration]).any():
         error = np.nan
     share = float(r / acting) if acts else 0.0

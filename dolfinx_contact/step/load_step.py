@@ -1,6 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A load step as a value: ``evaluate`` is the only way to a state, and changes nothing."""
+"""A load step and its states, both immutable.
+
+``LoadStep.evaluate`` computes the state at a displacement, without side effects.
+"""
 
 from __future__ import annotations
 
@@ -30,61 +33,80 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.held import HeldSurfaces
 
 
-new_stamp = count(1).__next__  # one source, which all ranks ask alike
+# Return a new number, the same on all ranks if all ranks call it equally often.
+new_stamp = count(1).__next__
 
 
 class Stamps(NamedTuple):
-    """Numbers by which bound solvers see what is another one than in the step before, the same on all ranks."""
+    """Version numbers of the parts of a step, the same on all ranks.
 
-    stiffness: int = 0  # how often K was assembled
-    rows: int = 0  # of the contacts' frames
+    Bound solvers compare them with the numbers of the previous step to find out what has changed.
+
+    Attributes:
+        stiffness: Number of times that ``K`` has been assembled.
+        rows: Version of the contact frames.
+        law: Version of the friction laws.
+        parts: Version of the free motions of surfaces, and of their springs.
+        step: Version of the problem's load step; it stays the same if a step is repeated.
+    """
+
+    stiffness: int = 0
+    rows: int = 0
     law: int = 0
-    parts: int = 0  # which motions of surfaces are free, and their springs
-    step: int = 0  # of the problem, not of its repetitions
+    parts: int = 0
+    step: int = 0
 
 
 class Monitor:
-    """What tells the user of every iterate.
+    """Caller of the user's function ``monitor`` for every iterate.
 
     Args:
-        function: Of iteration, largest error and ``Counts``.
+        function: User function of the iteration number, the largest error and ``Counts``.
         comm: MPI communicator.
     """
 
     def __init__(self, function: Callable, comm: MPI.Comm):
-        self._function, self._comm, self._told = function, comm, 0
+        self._function, self._comm, self._iterations = function, comm, 0
 
     def tell(self, error: float, nodes: Sequence[int]) -> None:
-        """Tell the error of another iterate, and its nodes by status.  Collective."""
+        """Call the user's function for the next iterate.  Collective.
+
+        Args:
+            error: Largest error of the iterate.
+            nodes: Numbers of open, sticking and slipping nodes.
+        """
         with raised_together(self._comm):
-            self._function(self._told, error, Counts(*nodes))
-        self._told += 1
+            self._function(self._iterations, error, Counts(*nodes))
+        self._iterations += 1
 
 
 @dataclass(frozen=True, eq=False)
 class LoadStep:
-    """Equilibrium of a body under new loads with its contacts.
+    """Equilibrium of a body with its contacts under the loads of one load step.
 
-    Displacements and forces are arrays of owned degrees of freedom.  Maps are one of ``law/maps.py`` for each contact.  Motions of
-    surfaces that force drives are unknowns ``c``, ``shape=(m,)``, none of them where there are no such surfaces.
+    Displacements and forces are arrays of owned degrees of freedom.  Arguments ``maps`` contain one
+    map of ``law/maps.py`` for each contact.  The motions of surfaces driven by force are unknowns
+    ``c``, ``shape=(m,)``, with ``m = 0`` if there are no such surfaces.
 
     Attributes:
-        body: The body, its stiffness assembled.
+        body: The body, with assembled stiffness.
         contacts: ``ContactStep`` of each contact.
-        b: ``b - K u`` are the forces out of balance for a ``u`` with the boundary values, which ``b`` holds.
+        b: Load vector with the boundary values at fixed degrees of freedom.  For a ``u`` with these
+            boundary values, ``b - K u`` are the out-of-balance forces.
         external: External forces.
-        starts: Displacements near which the solution may lie.
-        tol: Largest error.
-        unit: Of force, any that keeps squares within the range of double precision.
-        last: Displacement of the last step that converged.
-        surfaces: The ``DrivenSurfaces``, None where force drives none.
-        holding: ``HeldSurfaces``, None where held nodes hold none of them.
-        statics: ``Statics`` of a body that contact alone holds, else None.
-        shared: ``SharedNodes``, None where no node belongs to several contacts.
-        monitor: None, or the ``Monitor``.
-        stamps: Numbers of what it consists of.
-        continues: Whether it starts from what was found for the same step, so that tangents there are still good.
-        motions: Where the motions of surfaces begin.
+        starts: Initial guesses of the displacement.
+        tol: Largest error of a solution.
+        unit: Unit of force, chosen such that squares stay within the range of double precision.
+        last: Displacement of the last converged step.
+        surfaces: The ``DrivenSurfaces``; None if no surface is driven by force.
+        holding: ``HeldSurfaces``; None if no driven surface is held by nodes that supports hold.
+        statics: ``Statics`` of a body held by contact alone; else None.
+        shared: ``SharedNodes``; None if no node belongs to several contacts.
+        monitor: The ``Monitor``; None if the user has set none.
+        stamps: Version numbers of the parts of the step.
+        continues: Whether the step starts from a solution of the same step, so that tangents
+            computed there can be reused.
+        motions: Initial values of ``c``; None is zero.
     """
 
     body: ElasticBody
@@ -105,30 +127,30 @@ class LoadStep:
     motions: np.ndarray | None = None
 
     def but(self, **parts: Any) -> LoadStep:
-        """The step with some things replaced."""
+        """Return a copy of the step with some attributes replaced."""
         return replace(self, **parts)
 
     def with_contacts(self, contacts: Sequence[ContactStep], **parts: Any) -> LoadStep:
-        """The step with other contacts on the same rows."""
+        """Return a copy of the step with other contacts that have the same frames."""
         return self.but(contacts=tuple(contacts), **parts)
 
     def with_laws(self, contacts: Sequence[ContactStep]) -> LoadStep:
-        """The step with contacts of other laws, on all ranks."""
+        """Return a copy of the step with contacts that have other laws.  Call it on all ranks."""
         return self.with_contacts(contacts, stamps=self.stamps._replace(law=new_stamp()))
 
     @property
     def may_slide(self) -> bool:
-        """Whether a plane, or the body, is held by contact along some direction."""
+        """Whether the body, or a surface driven by force, may have to be held by contact."""
         return self.surfaces is not None or self.statics is not None
 
     def may_land(self) -> bool:
-        """Whether nodes that are open may land with friction.  Collective."""
+        """Return whether open nodes with friction may close in this step.  Collective."""
         may = [contact.may_land(self.last) for contact in self.contacts]
         return bool(self.body.comm.allreduce(any(may)))
 
     @cached_property
     def was_pressed(self) -> bool:
-        """Whether contact alone holds the body, and did so at the end of the last step.  Collective."""
+        """Whether contact alone holds the body and did so at the last step's end.  Collective."""
         if self.statics is None:
             return False
         pressed = [contact.last.reaction[:, -1] for contact in self.contacts]
@@ -136,12 +158,12 @@ class LoadStep:
 
     @cached_property
     def measuring_maps(self) -> list[NodalMap]:
-        """The maps by which states are measured."""
+        """The return map of each contact, by which errors of states are measured."""
         return [contact.measuring_map() for contact in self.contacts]
 
     @property
     def no_motions(self) -> np.ndarray:
-        """Where the motions of surfaces begin, zero at first."""
+        """Initial values of the motions of surfaces, ``shape=(m,)``; zero by default."""
         if self.motions is not None:
             return self.motions
         return np.zeros(0 if self.surfaces is None else self.surfaces.count)
@@ -159,23 +181,28 @@ class LoadStep:
         near: Sequence[np.ndarray] | None = None,
         exact: bool | None = None,
     ) -> StepState:
-        """The state of a displacement: every node has the reaction that its map makes of the one which the body asks for.  Collective.
+        """Return the state at a displacement.  Collective.
+
+        The body determines the reaction required at each contact node for equilibrium; the map of
+        the contact turns it into a reaction that satisfies the law.
 
         Args:
             x: Displacement.
-            maps: Of the contacts.
-            forces: ``forces(x)``, where they are known.
-            c: Where motions of surfaces may be; they are balanced from there.
-            before: The state before, for the change of the reactions since and what it knows of shared nodes.
-            near: Reactions of each contact that a solver knows better than the body tells, at shared nodes.
-            exact: Whether ``forces`` are those of F itself; None as ``forces(x)`` are.
+            maps: Map of each contact.
+            forces: ``forces(x)``, if already computed.
+            c: Initial values for the motions of surfaces, which are then brought into equilibrium.
+            before: The previous state; used for the change of the reactions and for the split of
+                reactions at nodes that several contacts share.
+            near: Reactions of each contact as additional initial guesses at shared nodes.
+            exact: Whether ``forces`` are computed from the residual form F; None is the value of
+                ``exact_forces``, as for ``forces(x)``.
         """
         forces = self.forces(x) if forces is None else forces
         exact = self.exact_forces if exact is None else exact
         c, required, split = self._balanced(x, maps, self.free(forces), c, before, near)
         given = zip(self.contacts, required, maps)
         nodes = tuple(contact.respond(x, reaction, map, c) for contact, reaction, map in given)
-        nodes = self._with_shares(nodes)
+        nodes = self._with_held_reactions(nodes)
         return StepState(self, x, c, forces, nodes, required, exact, split, before)
 
     def measure(
@@ -186,22 +213,28 @@ class LoadStep:
         before: StepState | None = None,
         near: Sequence[np.ndarray] | None = None,
     ) -> StepState:
-        """The state of a displacement by F itself, with reactions by the return map.  Collective.
+        """Return the state at a displacement, with forces by F and the return map.  Collective.
 
-        Beside large slip their direction is that of the slip, not that of rounding in forces.
+        With the return map, the direction of friction at large slip follows from the slip and is
+        insensitive to rounding in the forces.  For arguments see ``evaluate``.
         """
         given: dict[str, Any] = dict(forces=self.by_form(x), c=c, before=before, near=near)
         return self.evaluate(x, self.measuring_maps, exact=True, **given)
 
     def open(self, x: np.ndarray, c: np.ndarray | None = None) -> StepState:
-        """The state of a displacement without reactions, by F itself.  Collective."""
+        """Return the state at a displacement with zero reactions, with forces by F.  Collective."""
         c = self.no_motions if c is None else c
         nodes = tuple(contact.at(x, c) for contact in self.contacts)
         required = tuple(state.reaction for state in nodes)
         return StepState(self, x, c, self.by_form(x), nodes, required, True)
 
     def derivatives(self, state: StepState, maps: Sequence[NodalMap]) -> list[tuple]:
-        """Of the new reactions of each contact, by the reactions before and by the motion, ``shape=(n, gdim, gdim)``.  Collective."""
+        """Return the derivatives of the reactions of each contact.  Collective.
+
+        Returns:
+            For each contact, derivatives by the required reactions and by slip and gap, in the
+            local frame, ``shape=(n, gdim, gdim)`` each.
+        """
         return self._linearised(state.x, state.c, state.required, maps, state.split)[1]
 
     def linearise(
@@ -213,7 +246,10 @@ class LoadStep:
         c: np.ndarray | None = None,
         before: StepState | None = None,
     ) -> tuple[StepState, list[tuple]]:
-        """``evaluate`` and ``derivatives`` there, by one call of the law.  Collective."""
+        """Return the state at a displacement, and its ``derivatives``.  Collective.
+
+        Both are computed with one call of the law.  For arguments see ``evaluate``.
+        """
         free = self.free(forces)
         c, required, split = self._balanced(x, maps, free, c, before, None)
         nodes, derivatives = self._linearised(x, c, required, maps, split)
@@ -227,7 +263,7 @@ class LoadStep:
         derivatives = [derivative for _, derivative in found]
         if split is not None:
             derivatives = self.shared.coupled(derivatives, split)
-        return self._with_shares(tuple(state for state, _ in found)), derivatives
+        return self._with_held_reactions(tuple(state for state, _ in found)), derivatives
 
     def _balanced(
         self,
@@ -238,7 +274,12 @@ class LoadStep:
         before: StepState | None,
         near: Sequence[np.ndarray] | None,
     ) -> tuple:
-        """Motions of surfaces in balance, the reactions that the body requires of each contact, and how those of shared nodes were split."""
+        """Return motions of surfaces in equilibrium, required reactions, and the split.
+
+        Returns:
+            ``c``, ``shape=(m,)``; the reactions required of each contact for equilibrium of the
+            body, ``shape=(n, gdim)``; the ``Split`` of reactions at shared nodes, or None.
+        """
         c = c if c is not None else self.no_motions if before is None else before.c
         alone = tuple(contact.required(free) for contact in self.contacts)
         split = None if before is None else before.split
@@ -250,7 +291,7 @@ class LoadStep:
             )
 
         def required(c: np.ndarray) -> tuple:
-            """Where nodes are shared it depends on where surfaces are."""
+            """Return the required reactions, which depend on ``c`` if contacts share nodes."""
             nonlocal split
             if self.shared is None:
                 return alone
@@ -262,96 +303,105 @@ class LoadStep:
             c = self.surfaces.balanced(self.contacts, x, c, maps, required)
         return c, required(c), split
 
-    def _with_shares(self, nodes: tuple[State, ...]) -> tuple[State, ...]:
-        """The states with what held nodes carry of the planes that they hold."""
+    def _with_held_reactions(self, nodes: tuple[State, ...]) -> tuple[State, ...]:
+        """Return the states with the reactions of held nodes on surfaces which these nodes hold."""
         return nodes if self.holding is None else self.holding.shared(self.contacts, nodes)
 
     def place_surfaces(self, state: StepState) -> None:
-        """Move the surfaces that force drives to where a state has them."""
+        """Move the surfaces driven by force to their positions in a state."""
         if self.surfaces is not None:
             self.surfaces.place(state.c)
 
     # -- forces --------------------------------------------------------------------------------
 
-    exact_forces = False  # whether ``forces`` are those of F itself
+    exact_forces = False  # whether ``forces`` evaluates the residual form F
 
     def forces(self, x: np.ndarray) -> np.ndarray:
-        """``b - K x``."""
+        """Return the out-of-balance forces of the linear body, ``b - K x``."""
         return self.b - self.body.multiply(x)
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
-        """``-F(x)``, by which errors are measured."""
+        """Return the out-of-balance forces of the residual form, ``-F(x)``."""
         return -self.body.residual(x)
 
     def supports(self, state: StepState) -> np.ndarray:
-        """What supports carry, at fixed degrees of freedom."""
+        """Return the support forces of a state, at fixed degrees of freedom."""
         if state.exact:
             return -state.forces[self.body.fixed]
         return self.body.support_forces(state.x)
 
     def free(self, forces: np.ndarray) -> np.ndarray:
-        """Forces without what supports carry."""
+        """Return a copy of forces with zeros at fixed degrees of freedom."""
         forces = forces.copy()
         forces[self.body.fixed] = 0.0
         return forces
 
     def missing(self, x: np.ndarray) -> np.ndarray:
-        """What is missing to the boundary values at a displacement, zero at free degrees of freedom."""
+        """Return boundary values minus a displacement, zero at free degrees of freedom."""
         missing, fixed = np.zeros_like(x), self.body.fixed
         missing[fixed] = self.b[fixed] - x[fixed]
         return missing
 
     def held(self, x: np.ndarray) -> bool:
-        """Whether ``x`` has the boundary values.  Collective."""
+        """Return whether a displacement satisfies the boundary values exactly.  Collective."""
         return self.body.largest(np.abs(self.missing(x))) == 0.0
 
     def size(self, forces: np.ndarray) -> float:
-        """Norm of forces at free degrees of freedom."""
+        """Return the norm of forces over the free degrees of freedom of all ranks."""
         return self.body.norm(self.free(forces))
 
     def with_reactions(self, forces: np.ndarray, nodes: Sequence[State]) -> np.ndarray:
-        """Forces plus the reactions of states of the contacts."""
+        """Return forces plus the reactions of given states of the contacts."""
         forces = forces.copy()
         for contact, state in zip(self.contacts, nodes):
             contact.points.add_forces(state.reaction, forces)
         return forces
 
     def total(self, array: Any) -> np.ndarray:
-        """Sum of an array over all ranks."""
+        """Return the sum of an array over all ranks."""
         return self.body.total(array)
 
     # -- where to start ------------------------------------------------------------------------
 
     def start(self) -> StepState:
-        """The start with the smallest imbalance, by the return map: the paper's takes extrapolations for worse than they are.  Collective."""
+        """Return the state at the initial guess nearest to equilibrium.  Collective.
+
+        The states use the return map, since the bipotential map overestimates the error of
+        extrapolated displacements.
+        """
         guesses = [start.copy() for start in self.starts]
         if self.statics is not None:
-            # a body that was placed begins there, or where this step has ended before
+            # Start at first contact or, if the step is repeated, at its previous end.
             away = self.statics.placed and len(guesses) > 1
             guesses = [*([] if away else guesses), self.statics.start.copy()]
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
         states = [self.evaluate(guess, self.measuring_maps) for guess in guesses]
-        # errors of states without forces are not relative to any
+        # Without acting forces, errors are not relative to forces: such states come last.
         strays = [self.was_pressed and not state.balance.acts for state in states]
         return min(zip(strays, states), key=lambda both: (both[0], both[1].balance.error))[1]
 
-    # -- what is said of a state ---------------------------------------------------------------
+    # -- errors and messages -------------------------------------------------------------------
 
     def errors_of(self, state: StepState, contacts: np.ndarray | None) -> Errors:
-        """Errors from sums of balance and, where they are asked for, of the contacts.  Collective."""
+        """Return the errors of a state.  Collective.
+
+        Args:
+            state: The state.
+            contacts: Its ``contact_sums``; None for errors of equilibrium alone.
+        """
         errors = as_errors(state.balance_sums, contacts)
         lost = errors.blind and self.may_slide and self._is_lost(state, errors.acts)
         return errors._replace(error=np.inf) if lost else errors
 
     def _is_lost(self, state: StepState, acts: bool) -> bool:
-        """See ``lost_far_away``.  Collective."""
+        """Return whether body or surfaces are too far away, see ``lost_far_away``.  Collective."""
         from dolfinx_contact.surfaces.sliding import lost_far_away
 
         return lost_far_away(self, state, acts)
 
     def balance_sums_of(self, state: StepState) -> np.ndarray:
-        """Sums of squares of what balances in a state, ``shape=(6,)``, see ``as_errors``.  Collective."""
+        """Return squared norms of forces, ``shape=(6,)``, see ``as_errors``.  Collective."""
         body, x = self.body, state.x
         left, acting = state.residual + body.cancelling(self.missing(x)), np.abs(self.external)
         for contact, nodes in zip(self.contacts, state.nodes):
@@ -360,14 +410,16 @@ class LoadStep:
         cancelling = UNIT_ROUNDOFF * (body.cancelling(x) + acting)
         if self.surfaces is not None:
             on_surfaces, terms = self.surfaces.left(state.nodes, state.c)
-            mine = slice(None if body.comm.rank == 0 else 0)  # they are the same on all ranks
+            mine = slice(
+                None if body.comm.rank == 0 else 0
+            )  # the same on all ranks, so count them once
             left = np.append(left, on_surfaces[mine])
             cancelling = np.append(cancelling, UNIT_ROUNDOFF * terms[mine])
         supports = self.supports(state)
         return self.sums(left, state.reactions, self.external, supports, cancelling, change)
 
     def contact_sums_of(self, state: StepState) -> np.ndarray:
-        """Sums of squares of what is left of the law in a state, ``shape=(4,)``, see ``as_errors``.  Collective."""
+        """Return squared residuals of the law, ``shape=(4,)``, see ``as_errors``.  Collective."""
         columns = [[np.zeros(0)] for _ in range(4)]
         for contact, nodes in zip(self.contacts, state.nodes):
             rounding = contact_rounding(contact, nodes, state.x)
@@ -376,17 +428,19 @@ class LoadStep:
         return self.sums(*map(np.concatenate, columns))
 
     def sums(self, *parts: np.ndarray) -> np.ndarray:
-        """Sums of squares over all ranks, in the unit of force.  Collective."""
+        """Return the squared norm of each array of forces, in units of ``unit``.  Collective."""
         return self.total([np.square(part / self.unit).sum() for part in parts])
 
     def scale(self, state: StepState) -> float:
-        """Forces that act in a state."""
+        """Return the norm of the acting forces of a state, in force units."""
         return state.errors.scale * self.unit
 
     def reaction_scale(self, state: StepState, tol: float) -> float:
-        """What forces are held against of which a part ``tol`` does not matter: the reactions of a state.
+        """Return the reference force for errors of which the fraction ``tol`` is acceptable.
 
-        Beside stiff springs they may be so small that it is told; then what the errors leave unknown does not matter either.
+        It is the norm of the reactions.  If the reactions are so small compared with the acting
+        forces that their errors are reported to the user, it is at least the error of the state
+        over ``tol``.
         """
         errors = state.errors
         unknown = max(errors.largest, ROUNDING_FACTOR * errors.rounding)
@@ -394,7 +448,11 @@ class LoadStep:
         return self.scale(state) * max(errors.share, unknown / tol if told else 0.0)
 
     def with_small_slip_as_stick(self, state: StepState) -> StepState:
-        """A state whose nodes stick that slip by less than is unknown of it, or than the tolerance of its reactions."""
+        """Return a state in which nodes with negligible slip have the status stick.
+
+        Slip is negligible if the corresponding force is below the error of the state, or below the
+        tolerance times the norm of the reactions.
+        """
         errors = state.errors
         unknown = max(self.tol * errors.share, errors.largest, ROUNDING_FACTOR * errors.rounding)
         unknown *= self.scale(state)
@@ -405,19 +463,19 @@ class LoadStep:
         return state.with_nodes(nodes)
 
     def slides(self, state: StepState) -> bool:
-        """Whether force pushes a plane, or loads a body, by more than friction carries in a state.  Collective."""
+        """Return whether a driven surface or the body slides away in a state.  Collective."""
         return self.pushed_off(state) or (self.statics is not None and self.statics.slides(state))
 
     def pushed_off(self, state: StepState) -> bool:
-        """Whether force pushes a plane by more than friction carries in a state.  Collective."""
+        """Return whether the force on a driven surface exceeds friction in a state.  Collective."""
         return self.surfaces is not None and bool(
             self.surfaces.beyond(self.contacts, state.nodes, state.c)
         )
 
     def refusal(self, state: StepState) -> str:
-        """Why it has not converged, in words, as far as anything tells.  Collective."""
+        """Return a message on why the step has not converged, and what may help.  Collective."""
         message = "" if self.statics is None else self.statics.hidden(self)
-        message = message or self._no_state(state) or self._hard()
+        message = message or self._reason_without_state(state) or self._advice()
         if any(contact.given.laws.follow_pressure for contact in self.contacts):
             message += "; friction follows the pressure, and was that of the last iterate"
         if any(contact.given.laws.wears_within for contact in self.contacts):
@@ -426,16 +484,16 @@ class LoadStep:
             )
         return message
 
-    def _hard(self) -> str:
-        """What may help where a state should exist, in words.  Collective."""
+    def _advice(self) -> str:
+        """Return advice for a step that should have a solution.  Collective."""
         from dolfinx_contact.step.stalled import slow
 
         return "; ".join(
             filter(None, ("Smaller load steps help most often", slow(self.body, self.b)))
         )
 
-    def _no_state(self, state: StepState) -> str:
-        """Why there is no static state, in words; empty where nothing tells.  Collective."""
+    def _reason_without_state(self, state: StepState) -> str:
+        """Return why no static state exists, in words; empty if unknown.  Collective."""
         message = "" if self.statics is None else self.statics.message
         if self.surfaces is not None:
             message = message or self.surfaces.beyond(
@@ -449,11 +507,11 @@ class LoadStep:
         return message
 
     def counts(self, state: StepState) -> Counts:
-        """Contact nodes open, sticking and slipping.  Collective."""
+        """Return the numbers of open, sticking and slipping contact nodes.  Collective."""
         return counts_of(self.body, state.nodes)
 
     def tell(self, state: StepState) -> None:
-        """Tell the user of a state of the body, if that is wanted.  Collective."""
+        """Pass a state to the user's ``monitor``, if there is one.  Collective."""
         if self.monitor is not None:
             known = state.balance if state.is_far else state.errors
             self.monitor.tell(known.largest, self.counts(state))
@@ -461,19 +519,24 @@ class LoadStep:
 
 @dataclass(frozen=True, eq=False)
 class StepState:
-    """A displacement in a step, and all that follows from it: ``LoadStep.evaluate`` makes it.
+    """State of a load step: displacement, forces, reactions and errors.
 
-    What is lazy is computed when it is first asked for, on all ranks together.
+    ``LoadStep.evaluate`` computes it.
+
+    Cached properties are computed at the first access, which is collective.
 
     Attributes:
         step: The step.
         x: Displacement.
-        c: Motions of surfaces that force drives.
-        forces: ``b - K x`` or ``-F(x)``, with what supports carry.
+        c: Motions of surfaces driven by force, ``shape=(m,)``.
+        forces: ``b - K x`` or ``-F(x)``, support forces included.
         nodes: ``State`` of each contact.
-        required: Reactions that the body requires of each contact, from which maps have made those of ``nodes``.
-        exact: Whether ``forces`` are those of F itself.
-        split: How reactions of shared nodes were split.
+        required: Reactions required of each contact for equilibrium of the body; the maps have
+            turned them into the reactions of ``nodes``.
+        exact: Whether ``forces`` are computed from the residual form F.
+        split: ``Split`` of reactions at nodes that several contacts share.
+        before: Reactions and contact rounding of the previous state, or None.
+        is_start: Whether the state is the start of an iteration.
     """
 
     step: LoadStep = field(repr=False)
@@ -488,7 +551,7 @@ class StepState:
     is_start: bool = False
 
     def __post_init__(self) -> None:
-        # Of the state before, its reactions and what is known of rounding: not that state itself, and all before it.
+        # Keep only data of the previous state: a reference would keep all earlier states.
         before = self.before
         if isinstance(before, StepState):
             acts = None if before.is_start else before.acts
@@ -496,36 +559,47 @@ class StepState:
 
     @property
     def as_start(self) -> StepState:
-        """The same as a start: of the next state it is not known by how much reactions have changed."""
+        """A copy of the state as the start of an iteration.
+
+        The change of the reactions of the next state is then unknown.
+        """
         return replace(self, is_start=True)
 
     @property
     def acts_before(self) -> np.ndarray | None:
-        """``acts`` of the state before."""
+        """Reactions ``acts`` of the previous state; None if unknown."""
         return None if self.before is None else self.before[0]
 
     @property
     def contact_rounding(self) -> float:
-        """Rounding at the contacts, in the unit of force, as far as any state has told; else infinite."""
+        """Rounding error at the contacts, in the unit of force of the step.
+
+        It is taken from the previous state if this state has not computed it, and is infinite if
+        neither has.
+        """
         if "contact_sums" in vars(self):
             return float(np.sqrt(self.contact_sums[-1]))
         return np.inf if self.before is None else self.before[1]
 
     @cached_property
     def reactions(self) -> np.ndarray:
-        """Reactions of all contacts, flat."""
+        """Reactions of all contacts in one array, local frames."""
         return np.concatenate([np.zeros(0), *(nodes.reaction.ravel() for nodes in self.nodes)])
 
     @cached_property
     def acts(self) -> np.ndarray:
-        """Reactions of which a change counts: where contacts share a node their sum alone, how they share it may jump."""
+        """Reactions whose change measures convergence.
+
+        If contacts share nodes, it is the vector of the reactions' sums, since their split between
+        the contacts may be discontinuous.
+        """
         if self.step.shared is None:
             return self.reactions
         return self.step.free(self.step.with_reactions(0.0 * self.x, self.nodes))
 
     @cached_property
     def residual(self) -> np.ndarray:
-        """Forces that are left once every contact node has its new reaction, zero at fixed degrees of freedom."""
+        """Out-of-balance forces, reactions included, zero at fixed degrees of freedom."""
         return self.step.free(self.step.with_reactions(self.forces, self.nodes))
 
     @cached_property
@@ -540,17 +614,20 @@ class StepState:
 
     @cached_property
     def balance(self) -> Errors:
-        """Errors of equilibrium alone, which take no other call of the law.  Collective."""
+        """Errors of equilibrium alone, without another call of the law.  Collective."""
         return self.step.errors_of(self, None)
 
     @cached_property
     def errors(self) -> Errors:
-        """All errors.  Collective."""
+        """Errors of equilibrium and of the contact law.  Collective."""
         return self.step.errors_of(self, self.contact_sums)
 
     @cached_property
     def is_far(self) -> bool:
-        """Whether equilibrium alone tells that the state is no solution, whatever the law adds, known rounding at the contacts allowed for.  Collective."""
+        """Whether the error of equilibrium alone shows that the state is no solution.  Collective.
+
+        The rounding error at the contacts is allowed for, if it is known.
+        """
         errors = self.balance
         known = self.contact_rounding / errors.scale if errors.scale > 0.0 else np.inf
         errors = errors._replace(rounding=max(errors.rounding, known))
@@ -558,25 +635,28 @@ class StepState:
 
     @property
     def within(self) -> bool:
-        """Whether its errors are at most the tolerance of the step.  Collective."""
+        """Whether the errors of the state are within the tolerance of the step.  Collective."""
         return self.errors.within(self.step.tol)
 
-    # What is lazy is never the state itself: a state that holds itself stays in memory until Python looks for such.
+    # Cached properties never store the state itself: such a reference cycle would delay freeing it.
 
     @property
     def confirmed(self) -> StepState:
-        """The same state with forces of F itself, by which it is judged.  Collective."""
+        """The state with forces computed from the residual form F.  Collective."""
         return self if self.exact else self._confirmed
 
     @cached_property
     def _confirmed(self) -> StepState:
         state = replace(self, forces=self.step.by_form(self.x), exact=True)
-        vars(state)["contact_sums"] = self.contact_sums  # of the same nodes
+        vars(state)["contact_sums"] = self.contact_sums  # the nodal states are the same
         return state
 
     @property
     def judged(self) -> StepState:
-        """The state by F itself: with its reactions where it is a solution, else with those of the return map.  Collective."""
+        """The state with forces by F, for the final assessment.  Collective.
+
+        A solution keeps its reactions.  Otherwise the reactions are computed by the return map.
+        """
         stands = self.exact or (not self.is_far and self.within)
         return self.confirmed if stands else self._measured
 
@@ -585,14 +665,14 @@ class StepState:
         return self.step.measure(self.x, c=self.c, before=self)
 
     def of(self, step: LoadStep) -> StepState:
-        """The same state in a step that differs from its own by less than counts; errors stay."""
-        return self._with_its_errors(step=step)
+        """Return the state in a step with a negligible difference; errors are not recomputed."""
+        return self._copy_with_errors(step=step)
 
     def with_nodes(self, nodes: Sequence[State]) -> StepState:
-        """The same displacement with other states of the nodes; errors stay those of this state."""
-        return self._with_its_errors(nodes=tuple(nodes))
+        """Return a copy with other nodal states; errors are not recomputed."""
+        return self._copy_with_errors(nodes=tuple(nodes))
 
-    def _with_its_errors(self, **parts: Any) -> StepState:
+    def _copy_with_errors(self, **parts: Any) -> StepState:
         state = replace(self, **parts)
         vars(state)["errors"] = self.errors
         return state

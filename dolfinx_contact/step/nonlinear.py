@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Load steps of a nonlinear body, and of the one that is linearised at a displacement."""
+"""Load steps of a nonlinear body, and of its linearisation at a displacement."""
 
 from __future__ import annotations
 
@@ -15,16 +15,20 @@ if TYPE_CHECKING:
 
 
 class NonlinearStep(LoadStep):
-    """As ``LoadStep``; forces out of balance are those of the form itself, ``-F(x)``.
+    """``LoadStep`` of a nonlinear body, with out-of-balance forces ``-F(x)``.
 
-    ``b`` has the boundary values at fixed degrees of freedom and is zero elsewhere.  The metric of the errors is the
-    tangent at the last converged displacement.
+    ``b`` contains the boundary values at fixed degrees of freedom and is zero elsewhere.  The
+    metric of the errors is the tangent stiffness at the last converged displacement.
     """
 
     exact_forces = True
 
     def start(self) -> StepState:
-        """The start from which the least is missing, as forces of the linearised body; with boundary values of its own."""
+        """Return the state at the initial guess with the smallest residual.
+
+        The residual includes the force with which the linearised body resists the missing motion of
+        supports, since a guess need not satisfy the boundary values.
+        """
         sizes, different = [], []
         for guess in self.starts:
             if any(self.body.same(guess, other.x) for other in different):
@@ -36,17 +40,17 @@ class NonlinearStep(LoadStep):
         return different[int(np.argmin(np.nan_to_num(sizes, nan=np.inf)))]
 
     def forces(self, x: np.ndarray) -> np.ndarray:
-        """``-F(x)``; at fixed degrees of freedom what supports carry."""
+        """Return ``-F(x)``; entries at fixed degrees of freedom are minus the support forces."""
         return self.by_form(x)
 
     def errors_of(self, state: StepState, contacts: np.ndarray | None) -> Errors:
-        """See ``LoadStep``; infinite where supports are not where they should be."""
+        """Return the errors of a state; infinite if boundary values are violated.  Collective."""
         errors = super().errors_of(state, contacts)
         return errors if self.held(state.x) else errors._replace(error=np.inf)
 
 
 class LinearisedStep(LoadStep):
-    """As ``LoadStep`` of a linear body; errors are measured with its ``K``, too."""
+    """``LoadStep`` of a linearised body; errors are also measured with its stiffness ``K``."""
 
     def by_form(self, x: np.ndarray) -> np.ndarray:
         """See ``LoadStep``."""

@@ -1,10 +1,12 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The outer loop of a load step: what a step takes for known is renewed until it changes no more.
+"""Outer loops of a load step: staggered iterations over lagged quantities.
 
-These quantities are lagged: a step is solved with their values of the state before.  They stand on levels, the fastest first.  After
-each solution the levels are asked in turn; all quantities of the first level that has not settled are renewed, the levels before it
-begin anew, and the step is solved again: fixed points, nested.
+A step is solved with lagged quantities, such as friction that follows the pressure, evaluated at
+the previous solution.  They are grouped into levels, the innermost loop first.  After each
+solution, the levels are checked in this order.  The quantities of the first level that has not
+converged are updated, the levels inside it are restarted, and the step is solved again: nested
+fixed-point loops.
 """
 
 from __future__ import annotations
@@ -21,70 +23,85 @@ Search = Callable[["LoadStep"], "SolverResult"]
 
 
 class Change(NamedTuple):
-    """How far a lagged quantity is from that of the state found."""
+    """Difference between the value of a lagged quantity and its value at the solution found.
+
+    Attributes:
+        settled: Whether the difference is within the tolerance.
+        state: State to continue with; its step is the step to continue with.
+        size: Norm of the forces due to the difference, relative to the reactions.
+        forward: Forward error due to the difference.
+        tol: Tolerance of the next solution; 0 is the default of the level.
+        refused: Why no other value helps, in words; empty otherwise.
+    """
 
     settled: bool
-    state: StepState  # the one to go on with; of its step
-    size: float = 0.0  # of the forces that it makes, over the reactions
-    forward: float = 0.0  # the part of the forward error that it makes
-    tol: float = 0.0  # to which the step is solved next, 0 is that of the level
-    refused: str = ""  # why no other value helps, in words
+    state: StepState
+    size: float = 0.0
+    forward: float = 0.0
+    tol: float = 0.0
+    refused: str = ""
 
 
 class Lagged:
-    """A quantity that a step takes for known.
+    """Base class of lagged quantities, which are constant while a step is solved.
 
     Attributes:
-        limit: How often it is renewed at most, until a slower one is.
-        first_tol: Tolerance of the first solution.
+        limit: Largest number of updates between two updates of an outer level.
+        first_tol: Tolerance of the first solution after a restart, at least.
     """
 
     limit, first_tol = 5, 0.0
 
     def restarted(self, step: LoadStep) -> LoadStep:
-        """The step with a first value, once a slower quantity has another one.  Collective."""
+        """Return the step with the initial value; an outer level was updated.  Collective."""
         return step
 
     def change(self, found: SolverResult, goal: float) -> Change:
-        """What has become of it in the state found.  Collective.
+        """Return the difference between the value used and the solution found.  Collective.
 
         Args:
-            found: With the state.
-            goal: The tolerance of the step.
+            found: Result of the solver, with the state found.
+            goal: Tolerance of the step.
         """
         raise NotImplementedError
 
     def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
-        """The step with the value of the state found, to be solved again.  Collective."""
+        """Return the step with the value at a state, to be solved again.  Collective."""
         raise NotImplementedError
 
     def not_settled(self, change: Change) -> str:
-        """What to say where the limit is reached, in words; empty where errors tell."""
+        """Return the error message if the limit is reached; empty if the errors suffice."""
         return ""
 
     def message(self, solutions: int) -> str:
-        """What a record says of so many solutions, in words."""
+        """Return the remark for the record of a step after this number of solutions."""
         return ""
 
 
 class Staggered(NamedTuple):
-    """What the loop ends with."""
+    """Result of the outer loops.
+
+    Attributes:
+        found: Result of the last solution.
+        changes: Last ``Change.size`` of each lagged quantity, by class name.
+        refused: Why the result is no solution, in words; empty if it is one.
+    """
 
     found: SolverResult
-    changes: dict  # sizes, by names of classes
-    refused: str  # why it is no solution, in words
+    changes: dict
+    refused: str
 
 
 def solve_staggered(
     step: LoadStep, levels: Sequence[Level], search: Search, goal: float
 ) -> Staggered:
-    """Solve a step with all lagged quantities those of the state found.  Collective.
+    """Solve a step until all lagged quantities agree with the solution.  Collective.
 
     Args:
-        step: The step, to be solved to its tolerance until all is settled.
-        levels: Of lagged quantities, the fastest first.
-        search: What a solver finds.
-        goal: The tolerance in the end.
+        step: The step, solved to its own tolerance until all lagged quantities have converged.
+        levels: Lagged quantities by levels, the innermost loop first.
+        search: Function that solves a step with fixed lagged quantities.
+        goal: Tolerance of the final solution, to which the step is then solved.
     """
     loop = _Loop(levels, step.tol, goal)
     step = loop.begun(step, len(levels))
@@ -92,7 +109,7 @@ def solve_staggered(
         found = search(step)
         loop.count(found)
         if not found.state.within:
-            break  # no state with these values
+            break  # no solution with these values
         late, found = loop.first_unsettled(found)
         step = found.state.step
         if late == len(levels):
@@ -105,12 +122,12 @@ def solve_staggered(
             break
         else:
             step = loop.renewed(step, found.state, late)
-        found = None  # of states the next search has its own
+        found = None  # free the state before the next search
     return Staggered(loop.result(found), loop.sizes, loop.refused)
 
 
 class _Loop:
-    """What the loop counts: renewals and solutions of each level, iterations, the forward error."""
+    """Updates and solutions of each level, total iterations, and forward error of the loops."""
 
     def __init__(self, levels: Sequence[Level], aim: float, goal: float):
         self._levels, self.aim, self._goal = levels, aim, goal
@@ -121,7 +138,13 @@ class _Loop:
         self.refused = ""
 
     def begun(self, step: LoadStep, slower: int, tol: float = 0.0) -> LoadStep:
-        """The step with the tolerance of its next solution, once levels before ``slower`` begin anew.  Collective."""
+        """Return the step with the inner levels restarted, and its next tolerance.  Collective.
+
+        Args:
+            step: The step.
+            slower: Number of inner levels to restart.
+            tol: Tolerance of the next solution; 0 is ``aim``.
+        """
         quantities = [quantity for level in self._levels[:slower] for quantity in level]
         for quantity in quantities:
             step = quantity.restarted(step)
@@ -130,12 +153,17 @@ class _Loop:
         return step.but(tol=tol)
 
     def count(self, found: SolverResult) -> None:
-        """Count a solution."""
+        """Add a solution to the counters."""
         self._iterations, self._forward = self._iterations + found.iterations, found.forward_error
         self._solutions = [count + 1 for count in self._solutions]
 
     def first_unsettled(self, found: SolverResult) -> tuple[int, SolverResult]:
-        """The first level that has not settled, or their number, and the state as the quantities leave it.  Collective."""
+        """Return the first level that has not converged.  Collective.
+
+        Returns:
+            Its index, or the number of levels if all have converged; the result with the state to
+            continue with.
+        """
         for k, level in enumerate(self._levels):
             self._changes = []
             for quantity in level:
@@ -151,7 +179,7 @@ class _Loop:
         return len(self._levels), found
 
     def at_its_limit(self, k: int) -> bool:
-        """Whether a level cannot be renewed any more; ``refused`` says why."""
+        """Return whether a level must not be updated again, and set ``refused`` to the reason."""
         self.refused = next((change.refused for change in self._changes if change.refused), "")
         if not self.refused and self._renewals[k] < max(
             quantity.limit for quantity in self._levels[k]
@@ -163,7 +191,7 @@ class _Loop:
         return True
 
     def renewed(self, step: LoadStep, state: StepState, k: int) -> LoadStep:
-        """The step with all quantities of a level renewed.  Collective."""
+        """Return the step with all quantities of a level updated.  Collective."""
         self._renewals[k] += 1
         for quantity in self._levels[k]:
             step = quantity.renewed(step, state)
@@ -171,7 +199,7 @@ class _Loop:
         return self.begun(step, k, tol)
 
     def result(self, found: SolverResult) -> SolverResult:
-        """What was found, with all iterations, and the reasons of all levels."""
+        """Return the last result with the total iterations and the remarks of all levels."""
         both = zip(self._levels, self._solutions)
         message = [quantity.message(count) for level, count in both for quantity in level]
         reason = "; ".join(filter(None, (found.reason, *message)))

@@ -1,6 +1,10 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What is known of a search that ended without a solution, in words: where its error is, nodes that change status, tall elements."""
+"""Messages about a search that ended without a solution.
+
+They name the location of the largest error, the number of nodes that change status, elements with a
+large aspect ratio, and slow linear solves.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +21,17 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.contact.contact_step import ContactStep
 
-# Height over width of elements at the surface from which on they are called tall, and the part of the nodes that then change status:
-# where few do, it is not that.
+# Mean height over width of elements at the surface above which the message mentions it.
 TALL_RATIO = 2.0
+
+# Fraction of nodes that change status above which tall elements are a likely cause.
 MANY_CHANGE = 0.05
 
-# The error is where its largest parts make up so much of its square.
+# Fraction of the squared residual that the nodes counted as violating the law contribute together.
 ERROR_PART = 0.9
 
-# Iterations of an elastic solve from which on its preconditioner is called a bad one; even meshes need 25 to 40.
+# Iterations of a linear solve without contact above which the preconditioner is reported as poor;
+# uniform meshes need 25 to 40.
 MANY_ITERATIONS = 60
 
 
@@ -35,13 +41,17 @@ def stalled(
     changes: tuple[int, int],
     wrong: Sequence[np.ndarray],
 ) -> list[str]:
-    """At how many nodes the law is not met, where most, how many have changed status in the last states, and what may help.  Collective.
+    """Return messages about the nodes that violate the contact law.  Collective.
+
+    They give the number of these nodes, the location of the largest residual, the number of nodes
+    that changed status in the last states, and what may help.
 
     Args:
         body: The body.
         contacts: Its contacts.
-        changes: Nodes of this rank that have changed their status, and in how many states, see ``Search``.
-        wrong: Forces by which the nodes of each miss the law, ``shape=(n,)``.
+        changes: Number of nodes of this rank that have changed status, and the number of states in
+            which they were observed, see ``Search``.
+        wrong: Residual of the law at the nodes of each contact, ``shape=(n,)``, force.
     """
     x, amount = np.concatenate([contact.x for contact in contacts]), np.concatenate(wrong)
     changed, nodes = body.total(np.array([changes[0], amount.size])).astype(int)
@@ -59,8 +69,8 @@ def stalled(
 
 
 def tall(body: ElasticBody, contacts: Sequence[ContactStep]) -> list[str]:
-    """That elements at the surface are tall, in the mean, and what to do; nothing if they are not.  Collective."""
-    ratios = np.concatenate([np.zeros(0), *(_ratios(contact) for contact in contacts)])
+    """Return a message if elements at the surface are tall on average.  Collective."""
+    ratios = np.concatenate([np.zeros(0), *(_aspect_ratios(contact) for contact in contacts)])
     total, count = body.total(np.array([ratios.sum(), ratios.size]))
     if total <= TALL_RATIO * count:
         return []
@@ -71,13 +81,18 @@ def tall(body: ElasticBody, contacts: Sequence[ContactStep]) -> list[str]:
 
 
 def slow(body: ElasticBody, forces: np.ndarray) -> str:
-    """That the body alone is hard for its preconditioner, and what to do; empty if it is not, or if solves are exact.  Collective."""
+    """Return a message if the preconditioner of the body is poor, else "".  Collective.
+
+    Args:
+        body: The body; with a direct solver, the message is empty.
+        forces: Right-hand side of the test solve without contact, owned degrees of freedom.
+    """
     if body.exact:
         return ""
     try:
         body.solve(forces)
     except LinearSolverError:
-        pass  # it has counted, too
+        pass  # the number of iterations is still available
     count = body.ksp.getIterationNumber()
     if count <= MANY_ITERATIONS:
         return ""
@@ -87,8 +102,8 @@ def slow(body: ElasticBody, forces: np.ndarray) -> str:
     )
 
 
-def _ratios(contact: ContactStep) -> np.ndarray:
-    """Height over width of this rank's cells that have a facet of contact nodes."""
+def _aspect_ratios(contact: ContactStep) -> np.ndarray:
+    """Return height over width of this rank's cells that have a facet with contact nodes only."""
     V, dim = contact.displacements.V, contact.points.dim
     nodes, x = compat.cell_nodes(V), V.tabulate_dof_coordinates()[:, :dim]
     row = np.full(len(x), -1)

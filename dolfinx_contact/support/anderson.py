@@ -1,6 +1,9 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Anderson acceleration (type II) of a fixed point x <- x + g(x), one global reduction per iteration."""
+"""Anderson acceleration (type II) of a fixed-point iteration x <- x + g(x).
+
+It needs one global reduction per iteration.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,11 @@ import numpy as np
 
 
 class Anderson:
-    """Mixes the last corrections so that their combination is as small as possible in norm.
+    """Anderson acceleration: combines the last corrections so that their norm is minimal.
 
     Equations as in H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49 (2011), Section 2: with the
-    differences dX, dG of iterates and corrections, x <- x + g - (dX + dG) gamma, gamma the least
-    squares solution of dG gamma = g.
+    differences dX, dG of iterates and corrections, x <- x + g - (dX + dG) gamma, where gamma is the
+    least-squares solution of dG gamma = g.
 
     Args:
         size: Number of unknowns of this rank.
@@ -30,12 +33,12 @@ class Anderson:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all differences: the next step is a plain one."""
+        """Discard all differences: the next step is a plain fixed-point step."""
         self._count = 0
         self._last = None
 
     def step(self, x: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, float]:
-        """The next iterate after ``x`` with the correction ``g``, and the global norm of ``g``."""
+        """Return the next iterate, given ``x`` and correction ``g``, and the norm of ``g``."""
         depth = self._dg.shape[0]
         row = None
         if self._last is not None:
@@ -58,9 +61,9 @@ class Anderson:
 
 
 def _solve(gram: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """Least squares from its normal equations, columns scaled to length one.
+    """Solve a least-squares problem by its normal equations, with columns scaled to unit length.
 
-    Directions that the other columns give up to the rounding of the Gram matrix are left out.
+    Directions in which the Gram matrix is singular to rounding are left out.
     """
     length = np.sqrt(np.diag(gram))
     if not np.isfinite(gram).all() or (length == 0.0).all():

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Attributes of the user's objects: those that may be set, and read-only arrays."""
+"""Guarded attributes of the user's objects, and read-only arrays."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ if TYPE_CHECKING:
 
 
 def frozen(array: np.ndarray) -> np.ndarray:
-    """The array itself, from now on read-only: what is computed from it cannot be changed behind its back."""
+    """Make an array read-only and return it: results computed from it then remain valid."""
     array.flags.writeable = False
     return array
 
 
 class Whole(np.ndarray):
-    """A read-only array of an attribute that is assigned as a whole, and says so; what is computed from it is a plain array.
+    """A read-only array attribute that can only be assigned as a whole.
 
-    ``surface.displacement += way`` assigns a new one.
+    Setting an entry raises a ``ValueError`` that explains this.  Results of arithmetic are plain
+    arrays.  ``surface.displacement += d`` assigns a new array.
     """
 
     message: str = ""  # what to do instead of setting an entry
@@ -35,7 +36,7 @@ class Whole(np.ndarray):
         return array[()] if array.ndim == 0 else array.view(np.ndarray)
 
     def __setitem__(self, key: Any, value: ArrayLike) -> None:
-        if self.flags.writeable:  # a copy of it
+        if self.flags.writeable:  # a copy of the attribute
             super().__setitem__(key, value)
             return
         raise ValueError(self.message)
@@ -50,7 +51,7 @@ class Whole(np.ndarray):
         return super().__imul__(other) if self.flags.writeable else self * other
 
     def copy(self, order: Any = "C") -> np.ndarray:
-        """A plain array that may be changed."""
+        """Return a writable plain array."""
         return np.array(self, order=order)
 
     def __repr__(self) -> str:
@@ -58,7 +59,13 @@ class Whole(np.ndarray):
 
 
 def whole(name: str, array: np.ndarray | None, instead: str = "") -> Any:
-    """A view of a read-only array that is the attribute ``name``, and says what to do instead of setting its entries; None stays None."""
+    """Return a read-only view of an array attribute, whose entries cannot be set; None for None.
+
+    Args:
+        name: Name of the attribute in the error message.
+        array: Read-only array, or None.
+        instead: What to do instead of setting an entry, for the error message.
+    """
     if array is None:
         return None
     view = array.view(Whole)
@@ -70,14 +77,15 @@ def whole(name: str, array: np.ndarray | None, instead: str = "") -> Any:
 
 
 class Guarded:
-    """An object that, once made, takes no attributes but those it has room for.
+    """Base class of objects that reject unknown and read-only attributes once they are complete.
 
-    A misspelt one would be kept and never read, and one that results were computed from would no longer fit them.
+    This catches misspelt names, which would have no effect, and changes that would make results
+    outdated.
     """
 
     _settable: tuple[str, ...] = ()
-    _checked: Mapping[str, Callable] = {}  # what is kept of values given, or raises
-    _remedy: str = ""  # what to do instead of setting one of the others
+    _checked: Mapping[str, Callable] = {}  # functions that convert assigned values, or raise
+    _remedy: str = ""  # what to do instead of setting a read-only attribute, for the message
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in self._settable or name.startswith("_") or "_made" not in self.__dict__:
@@ -96,5 +104,5 @@ class Guarded:
 
 
 def surfaces_of(contacts: Iterable[Any]) -> list[Any]:
-    """The surfaces of contacts, each once."""
+    """List of the surfaces of contacts, each surface once."""
     return list({id(contact.surface): contact.surface for contact in contacts}.values())

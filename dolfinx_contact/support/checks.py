@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Numbers and arrays that users give, checked once."""
+"""Checks of numbers and arrays given by users."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-# Part of a coordinate, over the largest one, that is rounding of a mesh generator.
+# Coordinates below this fraction of the largest one are rounding errors of a mesh generator.
 COORDINATE_ROUNDING = 1e-12
 
 
-UNIT_ROUNDOFF = np.finfo(float).eps / 2  # of one operation
+# Largest relative rounding error of one floating-point operation.
+UNIT_ROUNDOFF = np.finfo(float).eps / 2
 
-# Rounding is an estimate: up to this factor, errors may be rounding alone.
+# Rounding errors are only estimated: errors up to this multiple of the estimate may be rounding.
 ROUNDING_FACTOR = 2.0
 
-# Part of a length, or of a motion, that is none.
+# A length or displacement is treated as zero below this fraction of its scale.
 NEGLIGIBLE_LENGTH = 64 * UNIT_ROUNDOFF
 
 
@@ -35,7 +36,10 @@ class RoundingWarning(UserWarning):
 
 
 def valued(name: str, value: Any) -> Any:
-    """The value itself; a ``ValueError`` of an expression of UFL, which NumPy would read without end."""
+    """Return a user's value; raise a ``ValueError`` if it is a UFL expression.
+
+    NumPy would not terminate when converting a UFL expression to an array.
+    """
     if hasattr(value, "ufl_shape") and not hasattr(value, "function_space"):
         raise ValueError(
             f"{name} is an expression of UFL, {str(value):.60}, and has no values at nodes: interpolate it into a Function before each "
@@ -45,21 +49,27 @@ def valued(name: str, value: Any) -> Any:
 
 
 def a_problem(given: Any) -> Any:
-    """What was given as ``problem``, if it has contacts; a ``ValueError`` of what has none, such as a contact."""
+    """Return an object given as ``problem``; raise a ``ValueError`` if it has no contacts."""
     if not hasattr(given, "contacts"):
         raise ValueError(f"problem must be a ContactProblem, got {given!r}.")
     return given
 
 
 def a_field(name: str, given: Any) -> Any:
-    """What was given as a field, if UFL knows it, or a ``ValueError``."""
+    """Return an object given as a field; raise a ``ValueError`` if it is not a UFL expression."""
     if not hasattr(given, "ufl_shape"):
         raise ValueError(f"{name} must be a Function or another UFL expression, got {given!r}.")
     return given
 
 
 def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
-    """A float64 array of finite numbers, a new one if ``copy``, or a ``ValueError``."""
+    """Return a value as a float64 array; raise a ``ValueError`` unless it is real and finite.
+
+    Args:
+        name: Name of the value in error messages.
+        value: Array or number.
+        copy: Whether the array is always a new one.
+    """
     if np.ma.is_masked(valued(name, value)):
         raise ValueError(f"{name} has masked entries: give numbers for them, {name}.filled(...).")
     try:
@@ -78,7 +88,13 @@ def finite(name: str, value: Any, copy: bool = True) -> np.ndarray:
 
 
 def vector(name: str, value: ArrayLike, size: int | None = None) -> np.ndarray:
-    """A vector of finite real numbers, as floats."""
+    """Return a value as a float64 vector; raise a ``ValueError`` unless it is a finite real vector.
+
+    Args:
+        name: Name of the value in error messages.
+        value: Vector.
+        size: Required size; None means 2 or 3.
+    """
     try:
         array = np.asarray(value)
         real = np.issubdtype(array.dtype, np.number) and not np.iscomplexobj(array)
@@ -93,13 +109,21 @@ def vector(name: str, value: ArrayLike, size: int | None = None) -> np.ndarray:
 
 
 def place(x: np.ndarray, node: int) -> str:
-    """The position of one of some nodes, ``shape=(n, 2 or 3)``, in words: coordinates that are rounding beside theirs are zero."""
+    """Return the position of a node as text, with coordinates that are rounding errors set to zero.
+
+    Args:
+        x: Positions of all nodes, ``shape=(n, 2 or 3)``.
+        node: Index of the node.
+    """
     at = np.where(np.abs(x[node]) < COORDINATE_ROUNDING * np.abs(x).max(), 0.0, x[node])
     return f"({', '.join(f'{c:.6g}' for c in at)})"
 
 
 def number(name: str, value: Any) -> float:
-    """One finite real number, alone or in an array of one, or a ``ValueError``."""
+    """Return a value as a float; raise a ``ValueError`` unless it is one finite real number.
+
+    An array with one entry is accepted.
+    """
     array = np.asarray(value)
     if array.size != 1 or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         raise ValueError(f"{name} must be one finite real number, got {value!r}.")
@@ -107,10 +131,17 @@ def number(name: str, value: Any) -> float:
 
 
 def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -> float:
-    """A positive number, or a ``ValueError``; a whole number must be finite."""
+    """Return a value as a positive float; raise a ``ValueError`` if it is not positive.
+
+    Args:
+        name: Name of the value in the error message.
+        value: Number.
+        whole: Whether it must be a finite whole number.
+        finite: Whether it must be finite.
+    """
     try:
         number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):  # of 10**400, too
+    except (TypeError, ValueError, OverflowError):  # such as 10**400
         number = math.nan
     fits = number > 0 and not ((whole or finite) and math.isinf(number))
     if not fits or whole and number != int(number):
@@ -120,7 +151,7 @@ def positive(name: str, value: Any, whole: bool = False, finite: bool = False) -
 
 
 def free_memory() -> float:
-    """Bytes of memory that this machine can give, what its cache of files holds among them; infinite where it does not say."""
+    """Return available memory in bytes, file caches included; infinite if it is unknown."""
     try:
         with open("/proc/meminfo") as file:
             message = dict(line.split(":") for line in file)

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What all ranks do together: mistakes are raised on all, so that none waits for another for ever; sums and norms."""
+"""Collective operations: errors raised on all ranks, so that none waits forever; sums and norms."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-# Seconds that a rank that failed waits for the others, which may be busy with work of their own.
+# Time in seconds that a failed rank waits for the others, which may still be computing.
 WAITING_SECONDS = 60.0
 
 
 class raised_together:
-    """Raise on every rank of ``comm`` what the block raised on any of them.
+    """Context manager that raises an exception of any rank on every rank of ``comm``.  Collective.
 
-    One shared flag is exchanged after the block; only if it is up does the first rank that failed send its message to the
-    others.  A block that communicates may leave the others in its midst, where they wait for the rank that failed: if they
-    have not come to the end of the block ``PATIENCE`` seconds later, that rank prints its error and ends all of them.
+    Ranks exchange one flag after the block.  Only if it is set, the first rank that failed sends
+    its message to the others.  If the block itself communicates, other ranks may wait inside it for
+    the rank that failed.  If they do not reach the end of the block within ``WAITING_SECONDS``,
+    that rank prints its error and aborts all ranks.
     """
 
     def __init__(self, comm: MPI.Comm):
@@ -37,37 +38,42 @@ class raised_together:
 
     def __exit__(
         self, _: type[BaseException] | None, error: BaseException | None, __: object
-    ) -> None:  # Ctrl-C, too, must not leave the others waiting
+    ) -> None:  # Ctrl-C on one rank must not leave the others waiting, either
         comm = self._comm
         if comm.size == 1 or (first := _first_to_fail(comm, error)) == comm.size:
             return
-        kind, message = comm.bcast(_told(error) if comm.rank == first else None, root=first)
+        kind, message = comm.bcast(_sendable(error) if comm.rank == first else None, root=first)
         if error is None:
             raise kind(f"{message} (found on rank {first})")
 
 
 class uninterrupted:
-    """Ctrl-C in the block is answered after it; in the main thread, which alone receives it."""
+    """Context manager that delays Ctrl-C until the end of the block.
+
+    It acts in the main thread only, where Python handles signals.
+    """
 
     def __enter__(self) -> None:
-        self._came: tuple = ()
+        self._signal_arguments: tuple = ()
         self._handler: Any = signal.getsignal(signal.SIGINT)
-        self._holds = current_thread() is main_thread() and callable(self._handler)
-        if self._holds:
+        self._delays = current_thread() is main_thread() and callable(self._handler)
+        if self._delays:
             signal.signal(signal.SIGINT, self._wait)
 
     def _wait(self, *came: Any) -> None:
-        self._came = came
+        self._signal_arguments = came
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        if self._holds:
+        if self._delays:
             signal.signal(signal.SIGINT, self._handler)
-            if self._came and error is None:
-                self._handler(*self._came)
+            if self._signal_arguments and error is None:
+                self._handler(*self._signal_arguments)
 
 
 def _first_to_fail(comm: MPI.Comm, error: BaseException | None) -> int:
-    """The lowest rank with an error, or the number of ranks."""
+    """Return the lowest rank with an error, or the number of ranks if there is none.
+    Collective.
+    """
     mine, first = np.array([comm.size if error is None else comm.rank]), np.empty(1, dtype=int)
     request = comm.Iallreduce(mine, first, op=MPI.MIN)
     if error is None:
@@ -88,10 +94,14 @@ def _first_to_fail(comm: MPI.Comm, error: BaseException | None) -> int:
 
 
 def by_first_rank(comm: MPI.Comm, work: Callable, tell: Callable | None = None):
-    """What ``work(monitor)`` returns on rank 0, or its error, on all ranks.
+    """Run ``work(monitor)`` on rank 0, and return its result or raise its error on all ranks.
+    Collective.
 
-    Every ``line`` that it gives its monitor becomes ``tell(*line)`` on all ranks, whose error ends the work; without
-    ``tell`` it has no monitor.  Collective.
+    Args:
+        comm: MPI communicator.
+        work: Function of a monitor, called on rank 0 only.
+        tell: Function that is called on all ranks with the arguments of each call of the monitor;
+            an error in it ends the work.  If None, ``work`` receives None as monitor.
     """
     failed = result = None
 
@@ -118,12 +128,14 @@ def by_first_rank(comm: MPI.Comm, work: Callable, tell: Callable | None = None):
 
 
 def from_first(comm: MPI.Comm, value: Any):
-    """A value of rank 0, on all ranks.  On one rank it is not taken apart for it."""
+    """Return the value of rank 0 on all ranks; on one rank, the same object.  Collective."""
     return value if comm.size == 1 else comm.bcast(value, root=0)
 
 
 def agree(comm: MPI.Comm, **values: object) -> None:
-    """Raise a ``ValueError`` on every rank if a value that all ranks should have the same differs."""
+    """Raise a ``ValueError`` on every rank if one of the values differs between ranks.
+    Collective.
+    """
     if comm.size == 1:
         return
     mine = {name: described(value) for name, value in values.items()}
@@ -137,15 +149,22 @@ def agree(comm: MPI.Comm, **values: object) -> None:
 
 
 def described(value: object) -> str:
-    """A value in words that are the same on all ranks, which an object's address is not."""
+    """Return a text that describes a value and is the same on all ranks.
+
+    Objects without their own ``__repr__`` are described by type and plain attributes, not by
+    address.
+    """
     if type(value).__repr__ is not object.__repr__:
         return repr(value)
     plain = {k: v for k, v in vars(value).items() if isinstance(v, (bool, int, float, str))}
     return f"{type(value).__name__}({', '.join(f'{k}={v!r}' for k, v in sorted(plain.items()))})"
 
 
-def _told(error: BaseException) -> tuple[type, str]:
-    """Type and message of an error for the other ranks: the nearest of its types that can be sent, and made from a message."""
+def _sendable(error: BaseException) -> tuple[type, str]:
+    """Return type and message of an error, to be sent to other ranks.
+
+    The type is the nearest base class that can be pickled and be constructed from a message.
+    """
     for kind in type(error).__mro__:
         try:
             pickle.dumps(kind)
@@ -159,31 +178,31 @@ def _told(error: BaseException) -> tuple[type, str]:
 
 
 class OverRanks:
-    """Sums, norms and comparisons over the ranks of ``self.comm``.  Collective."""
+    """Base class with sums, norms and comparisons over the ranks of ``self.comm``.  Collective."""
 
     comm: MPI.Comm
 
     def total(self, array: ArrayLike) -> np.ndarray:
-        """Sum of an array over all ranks."""
+        """Return the sum of an array over all ranks."""
         result = np.array(array, dtype=np.float64)
         self.comm.Allreduce(MPI.IN_PLACE, result, op=MPI.SUM)
         return result
 
     def largest(self, x: np.ndarray) -> float:
-        """Largest entry over all ranks, at least zero."""
+        """Return the largest entry over all ranks, or zero if all are negative."""
         return self.comm.allreduce(float(x.max(initial=0.0)), op=MPI.MAX)
 
     def highest(self, x: np.ndarray) -> float:
-        """Largest entry over all ranks, which may be below zero."""
+        """Return the largest entry over all ranks, of any sign; minus infinity without entries."""
         return self.comm.allreduce(float(x.max(initial=-np.inf)), op=MPI.MAX)
 
     def norm(self, x: np.ndarray) -> float:
-        """Euclidean norm over all ranks, safe against under- and overflow of squares."""
+        """Return the Euclidean norm over all ranks, without underflow or overflow of squares."""
         largest = self.largest(np.abs(x))
         if largest == 0.0 or not np.isfinite(largest):
             return largest
         return largest * float(np.sqrt(self.total(np.sum((x / largest) ** 2))))
 
     def same(self, x: np.ndarray, y: np.ndarray | None) -> bool:
-        """Whether two arrays are equal on all ranks; None equals none."""
+        """Whether two arrays are equal on all ranks; False if ``y`` is None."""
         return self.comm.allreduce(np.array_equal(x, y), op=MPI.LAND)

@@ -1,17 +1,18 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What part of a step is taken: the largest half, quarter, ... that helps."""
+"""Line search by halving: step lengths, and the condition of sufficient decrease."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-# Part of a step's length by which what is left has to fall [L. Armijo, Pacific J. Math. 16 (1966) 1].
+# Relative decrease of the residual norm required per unit step length
+# [L. Armijo, Pacific J. Math. 16 (1966) 1].
 ARMIJO_FACTOR = 1e-4
 
 
 def halves(shortest: float) -> Iterator[float]:
-    """1, 1/2, 1/4, ..., no less than ``shortest``."""
+    """Yield the step lengths 1, 1/2, 1/4, ..., not below ``shortest``."""
     length = 1.0
     while length >= shortest:
         yield length
@@ -19,5 +20,5 @@ def halves(shortest: float) -> Iterator[float]:
 
 
 def enough(length: float) -> float:
-    """Part of what is left that may be left after a step of this length."""
+    """Return the largest accepted ratio of residual norms for a step length (Armijo condition)."""
     return 1 - ARMIJO_FACTOR * length

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Names of cells and nodes that do not depend on how ranks share the mesh."""
+"""Numbering of cells and nodes that does not depend on the partition of the mesh."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def original_cells(mesh: Mesh) -> np.ndarray:
-    """Index of each owned cell in the mesh as it was read or made, whatever the ranks.
+    """Return the index of each owned cell in the mesh as it was read or created, for any partition.
 
     Raises:
-        ValueError: DOLFINx does not know it, as of submeshes.
+        ValueError: DOLFINx does not store it, for example for submeshes.
     """
     count = mesh.topology.index_map(mesh.topology.dim).size_local
     known = compat.read_cells(mesh)
@@ -33,10 +33,17 @@ def original_cells(mesh: Mesh) -> np.ndarray:
 
 
 def original_nodes(V: fem.FunctionSpace) -> np.ndarray:
-    """A number for each owned node by the mesh as it was read or made, whatever the ranks; ``V`` of degree 1 or 2.
+    """Return a number of each owned node that does not depend on the partition of the mesh.
 
-    That of a vertex is its index there. The node of an edge, face or cell is named by two of its vertices that face each
-    other, the lowest and its opposite: two entities of a mesh do not share both.
+    For a vertex, it is the vertex's index in the mesh as it was read or created.  The node of an
+    edge, face or cell is identified by two opposite vertices, one of which has the lowest index: no
+    two entities of a mesh have both in common.
+
+    Args:
+        V: Function space of degree 1 or 2.
+
+    Raises:
+        ValueError: the degree is higher.
     """
     nodes, topology = compat.cell_nodes(V), V.mesh.topology
     index_map, layout = V.dofmap.index_map, V.dofmap.dof_layout
@@ -51,12 +58,17 @@ def original_nodes(V: fem.FunctionSpace) -> np.ndarray:
                 raise ValueError("nodes are named by their mesh for spaces of degree 1 and 2 only.")
             if len(own) == 1 and len(nodes) > 0:  # a rank may have no cells
                 corners = [k for k in layout.entity_closure_dofs(dim, entity) if k < count]
-                original[nodes[:, own[0]]] = _name_of(vertices[:, corners])
+                original[nodes[:, own[0]]] = _entity_numbers(vertices[:, corners])
     return original[: index_map.size_local]
 
 
-def _name_of(vertices: np.ndarray) -> np.ndarray:
-    """One number from the vertices of an entity, ``shape=(n, m)``, which face each other from both ends of a row."""
+def _entity_numbers(vertices: np.ndarray) -> np.ndarray:
+    """Return one number for each entity, computed from the indices of its vertices.
+
+    Args:
+        vertices: ``shape=(n, m)``, ordered so that columns ``k`` and ``m - 1 - k`` are opposite
+            vertices.
+    """
     low, rows = vertices.argmin(axis=1), np.arange(len(vertices))
     if vertices.shape[1] == 1:
         return vertices[:, 0]

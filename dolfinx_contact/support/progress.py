@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A progress bar with the time left, on a terminal and if tqdm is installed."""
+"""A progress bar with the remaining time, shown on a terminal if tqdm is installed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(rank: int, total: float, start: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """Context of a function that shows how far a load history is on its way from ``start`` to ``total``.
+    """Context manager that yields a function to show the progress of a load history.
 
     Args:
-        rank: Of this process; rank 0 shows.
-        total: Where it ends.
-        start: Where it begins.
+        rank: Rank of this process; only rank 0 shows the bar.
+        total: Load parameter at the end.
+        start: Load parameter at the beginning.
     """
     bar = None
     if rank == 0 and sys.stderr.isatty():

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Where planes go that force drives: until the reactions at a displacement of the body are in balance with the force."""
+"""Newton's method for the equilibrium of force-driven surfaces at a given body displacement."""
 
 from __future__ import annotations
 
@@ -18,36 +18,42 @@ if TYPE_CHECKING:
     from dolfinx_contact.law.maps import NodalMap
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
-# Steps of Newton's method, and lengths of one that are tried.
+# Maximum numbers of Newton steps, and of lengths tried in the line search along one step.
 NEWTON_STEPS = 30
 LENGTHS_TRIED = 40
 
-# What may be left of the forces on a plane, over the sum of their magnitudes: rounding.
+# Residual of converged motions over the sum of magnitudes of its terms: rounding.
 BALANCE_ROUNDING = 16 * np.finfo(float).eps
 
-# Part of what is left that may come back with the other sign.
+# Fraction of the residual that a Newton step may reverse; beyond it, the step is shortened.
 REVERSED_PART = 0.1
 
-# Motion over that with which the last node begins to slip, after which all slip in its direction.
+# Upper bound of a motion in 3-D, over the motion at which the last node starts to slip: directions
+# of slip are then parallel to three digits.
 TURNING_RATIO = 1e3
 
-# Part of a motion that carries a node along its surface; of less the node says nothing about where all slip.
+# Tangential component of a node's motion above which the node contributes to the bounds of motions.
 CARRIED_PART = 0.5
 
-# Part of the nodes' stiffness that is added to tangents: where all nodes slip, or too few touch, these have none.
+# Fraction of the nodes' stiffness added to tangents as regularisation: they are singular where all
+# nodes slip, or too few are in contact.
 REGULAR_STIFFNESS = 1e-10
 
 
 class SurfaceBalance:
-    """The equilibrium of planes at a displacement, in their motions alone: a few unknowns, products at contact nodes.
+    """Equilibrium equations of force-driven surfaces at a fixed displacement of the body.
+
+    The unknowns are the free rigid motions of the surfaces: a few numbers.  One residual evaluation
+    costs products at the contact nodes only.
 
     Args:
         surfaces: The ``DrivenSurfaces``.
         body: The body, for sums over ranks.
         contacts: ``ContactStep`` of each contact.
-        x: Displacement of owned degrees of freedom.
-        maps: Of the contacts, see ``law/maps.py``.
-        required: Of motions, the reactions that the body asks of each contact.
+        x: Displacement, owned degrees of freedom.
+        maps: Nodal contact law of each contact, see ``law/maps.py``.
+        required: Function of the motions that returns, for each contact, the nodal reactions
+            required by equilibrium of the body.
     """
 
     def __init__(
@@ -63,14 +69,18 @@ class SurfaceBalance:
         self._x, self._maps, self._required = x, maps, required
 
     def reached(self, c: np.ndarray) -> np.ndarray:
-        """Motions in equilibrium, or as near as Newton's method comes, from others.  Collective."""
+        """Return motions ``c``, ``shape=(m,)``, in equilibrium, by Newton's method from a guess.
+        Collective.
+
+        Without convergence, the last iterate is returned.
+        """
         surfaces, limits = self._surfaces, None
         if surfaces.plain:
             for motion in np.flatnonzero(surfaces.pressing):
-                c = self._pressed(c, motion)
+                c = self._balanced_along_normal(c, motion)
         elif surfaces.pressing.any():
-            c = self._pressed_together(c)
-        left, size = self._left(c)
+            c = self._balanced_along_normals(c)
+        left, size = self._residual(c)
         for _ in range(NEWTON_STEPS):
             if (np.abs(left) <= BALANCE_ROUNDING * size).all():
                 return c
@@ -81,34 +91,44 @@ class SurfaceBalance:
             within = np.divide(room, np.abs(change), np.ones(surfaces.count), where=change != 0)
             change *= min(max(within.min(), 0.0), 1.0)
             before = np.linalg.norm(left)
-            c, left, size = self._step(c, change, left)
+            c, left, size = self._line_search(c, change, left)
             if np.linalg.norm(left) >= before:
                 return c
         return c
 
-    def _at(self, c: np.ndarray) -> Iterator[tuple]:
-        """Each contact with the reactions that the body asks for, its map and its columns."""
+    def _contact_terms(self, c: np.ndarray) -> Iterator[tuple]:
+        """Yield each contact, its reactions required by the body, its law and columns of ``D``."""
         return zip(self._contacts, self._required(c), self._maps, self._surfaces.axes)
 
     def _tangent(self, c: np.ndarray) -> np.ndarray:
-        found = [contact.linearised(self._x, r, map, c)[1] for contact, r, map, _ in self._at(c)]
+        found = [
+            contact.linearised(self._x, r, map, c)[1]
+            for contact, r, map, _ in self._contact_terms(c)
+        ]
         return self._surfaces.tangent(self._contacts, found)
 
-    def _left(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What is left of the forces on planes, and the size of its terms."""
-        nodes = [contact.respond(self._x, r, map, c) for contact, r, map, _ in self._at(c)]
+    def _residual(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return residual forces of the surfaces, and the sums of magnitudes of their terms."""
+        nodes = [
+            contact.respond(self._x, r, map, c) for contact, r, map, _ in self._contact_terms(c)
+        ]
         return self._surfaces.left(nodes, c)
 
-    def _step(self, start: np.ndarray, change: np.ndarray, before: np.ndarray) -> tuple:
-        """Go along a change as far as what is left falls and does not turn round: motions, and what is left then.
+    def _line_search(self, start: np.ndarray, change: np.ndarray, before: np.ndarray) -> tuple:
+        """Line search along a Newton step: bisect until the residual decreases without reversing.
 
-        Where nodes slip reactions do not grow with the motion, and a whole step would go far beyond the solution.
+        Reactions of slipping nodes do not grow with the motion, so that a full Newton step would go
+        far beyond the solution.
+
+        Returns:
+            The motions, their residual, and the size of its terms; at ``start`` if no length is
+            accepted.
         """
         size_before = np.linalg.norm(before)
         low, high, length = 0.0, 1.0, 1.0
         for _ in range(LENGTHS_TRIED):
             c = start + length * change
-            left, size = self._left(c)
+            left, size = self._residual(c)
             turned = before @ left < -REVERSED_PART * size_before**2
             if not turned and np.linalg.norm(left) < size_before:
                 return c, left, size
@@ -116,17 +136,21 @@ class SurfaceBalance:
                 break
             low, high = (low, length) if turned else (length, high)
             length = (low + high) / 2
-        return start, *self._left(start)
+        return start, *self._residual(start)
 
     def _limits(self, c: np.ndarray) -> np.ndarray:
-        """Smallest and largest motions along planes, beyond which all nodes slip (nearly) the same way.  Collective.
+        """Return bounds on tangential motions, beyond which all nodes slip in one direction.
+        Collective.
+
+        In three dimensions, directions of slip at the bound are nearly parallel.
 
         Returns:
-            ``shape=(2, m)``, infinite along normals and where a spring holds.
+            Lower and upper bounds, ``shape=(2, m)``; infinite for motions along normals or with a
+            spring.
         """
         surfaces = self._surfaces
         limits = np.full((2, surfaces.count), -np.inf)
-        for contact, reaction, map, axes in self._at(c):
+        for contact, reaction, map, axes in self._contact_terms(c):
             state = contact.at(self._x, c)
             springs = map.springs(contact.friction, contact.points.dim)[:, :-1]
             pressure = np.maximum(reaction[:, -1] - map.normal * state.gap, 0.0)
@@ -135,7 +159,7 @@ class SurfaceBalance:
             node, row, motion = np.nonzero(carried * (springs * bound[:, None] > 0)[:, :, None])
             rate, way = springs[node, row], carried[node, row, motion]
             middle = (state.slip_increment[node, row] - reaction[node, row] / rate) / way
-            # In three dimensions directions go on turning to that of the motion.
+            # In three dimensions, slip directions approach the motion's direction only gradually.
             width = (
                 (1.0 if contact.points.dim == 2 else TURNING_RATIO)
                 * bound[node]
@@ -150,14 +174,16 @@ class SurfaceBalance:
         limits[:, endless] = np.array([[-np.inf], [np.inf]])
         return limits
 
-    def _pressed(self, c: np.ndarray, motion: int) -> np.ndarray:
-        """Motions with a plane along its normal where predictors ``max(r_n - rho x_n, 0)`` are in balance.
+    def _balanced_along_normal(self, c: np.ndarray, motion: int) -> np.ndarray:
+        """Return motions with one plane moved along its normal into equilibrium.
 
-        Their sum grows with the motion, piecewise linear and convex: Newton's method comes down to the only solution.
+        The reactions are the predictors ``max(r_n - rho x_n, 0)``.  Their sum is a convex,
+        piecewise linear function of the motion, so that Newton's method converges to the unique
+        solution.
         """
         surfaces, total = self._surfaces, self._body.total
         parts = [np.zeros((2, 0))]
-        for contact, reaction, map, axes in self._at(c):
+        for contact, reaction, map, axes in self._contact_terms(c):
             pressure = reaction[:, -1] - map.normal * contact.at(self._x, c).gap
             parts.append(np.array([pressure, map.normal])[:, axes[:, -1, motion] > 0])
         at_first, rho = np.concatenate(parts, axis=1)
@@ -165,7 +191,7 @@ class SurfaceBalance:
         for _ in range(NEWTON_STEPS):
             pressure = np.maximum(at_first + rho * moved, 0.0)
             force, slope = total([pressure.sum(), rho[pressure > 0].sum()])
-            if slope + spring == 0.0:  # nothing touches: as far as one node alone would need
+            if slope + spring == 0.0:  # no contact: move until one node alone would carry the force
                 alone = ((target - at_first) / rho).min(initial=np.inf)
                 moved = self._body.comm.allreduce(float(alone), op=MPI.MIN)
                 continue
@@ -175,16 +201,17 @@ class SurfaceBalance:
             moved -= left / (slope + spring)
         return c + moved * np.eye(surfaces.count)[motion]
 
-    def _pressed_together(self, c: np.ndarray) -> np.ndarray:
-        """Motions of planes where predictors ``max(r_n - rho x_n, 0)`` are in balance along all that these resist.
+    def _balanced_along_normals(self, c: np.ndarray) -> np.ndarray:
+        """Return motions in equilibrium along all directions that normal reactions resist.
 
-        The forces are the gradient of a convex function, the energy of springs ``rho``: Newton's method, in steps along
-        which it falls.
+        The reactions are the predictors ``max(r_n - rho x_n, 0)``: the gradient of a convex energy,
+        of springs ``rho`` in compression.  Newton's method minimises this energy, with a line
+        search.
         """
         surfaces, total = self._surfaces, self._body.total
         which = np.flatnonzero(surfaces.pressing)
         parts, columns = [np.zeros((2, 0))], [np.zeros((0, which.size))]
-        for contact, reaction, map, axes in self._at(c):
+        for contact, reaction, map, axes in self._contact_terms(c):
             pressure = reaction[:, -1] - map.normal * contact.at(self._x, c).gap
             parts.append(np.array([pressure, map.normal]))
             columns.append(axes[:, -1, which])

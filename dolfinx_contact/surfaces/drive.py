@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Rigid surfaces driven by force: free motions, and the forces, moments and springs in equilibrium along them."""
+"""Rigid surfaces driven by force: free motions, and the prescribed forces, moments and springs."""
 
 from __future__ import annotations
 
@@ -18,70 +18,75 @@ from dolfinx_contact.support.checks import finite, vector
 if TYPE_CHECKING:
     from dolfinx_contact.surfaces.surface import Surface
 
-# Part by which guides may miss unit length and right angles: half of the digits.
+# Tolerance of the guides' unit length and right angles, relative: half of the digits.
 GUIDE_DEFECT = 1e-8
 
 
 class Motion(NamedTuple):
-    """One free motion of a surface."""
+    """One free rigid motion of a surface: a translation or a rotation."""
 
     name: str
-    axis: np.ndarray  # unit vector, global frame; of a rotation in two dimensions one
-    turns: bool
+    axis: np.ndarray  # unit vector, global frame; [1.0] for a rotation in two dimensions
+    turns: bool  # whether it is a rotation
     spring: float  # force per length, moment per radian
 
 
 class Drive:
-    """Forces, moments and springs that drive a surface along its free motions.
+    """Prescribed forces, moments and springs that drive a rigid surface along its free motions.
 
-    sum of the reactions = force + stiffness (drive - displacement),
-    sum of their moments about the point = moment - stiffness rotation.
+        sum of the reactions = force + stiffness (drive - displacement),
+        sum of their moments about the point = moment - stiffness rotation.
 
     Args:
-        surface: The ``Surface``, whose ``directions`` and ``drive_axes`` are those of the free motions.
+        surface: The ``Surface``.  Its ``drive_axes``, named by ``directions``, are the axes of the
+            free motions.
     """
 
     def __init__(self, surface: Surface) -> None:
         self._surface, self._size = surface, surface.point.size
-        self._angles = 3 if self._size == 3 else 1
+        self._rotation_size = 3 if self._size == 3 else 1
         self._drive = frozen(np.zeros(self._size))
         self._guides = frozen(np.eye(self._size))
         self._free: tuple[str, ...] = ()
         self._held: tuple[str, ...] = ()
         self._past_held = 0.0
-        self._ever_free = False  # or said that it is not, although a force is given
+        self._ever_free = False  # also true once the warning about this has been issued
         self._force: np.ndarray | None = None
         self._moment: np.ndarray | None = None
         self._stiffness = frozen(np.zeros(1))
-        self._taken = self._since = 0  # the problem that drove it last, and when
+        self._last_problem = self._last_use = (
+            0  # problem that drove it last, and the counter at that time
+        )
 
     def of(self, surface: Surface) -> Drive:
-        """A copy that drives another surface."""
+        """Return a copy of this ``Drive`` for another surface."""
         other = copy(self)
         vars(other)["_surface"] = surface
         return other
 
     def take(self, problem: int, now: int) -> None:
-        """Register the problem that solves a step with this surface; only the one that drove it last may continue.
+        """Register the problem that solves a step with this surface.
+
+        Only the problem that drove the surface last, or a newer one, may use it.
 
         Args:
-            problem: Number of the problem; problems made later have larger ones.
-            now: A number larger than that of any problem so far.
+            problem: Number of the problem; problems created later have larger numbers.
+            now: A number larger than the number of any existing problem.
 
         Raises:
-            ValueError: another problem has driven the surface since this one was made.
+            ValueError: another problem has driven the surface since this problem was created.
         """
-        if problem != self._taken and problem < self._since:
+        if problem != self._last_problem and problem < self._last_use:
             raise ValueError(
                 f"{self._surface} is driven by force in another ContactProblem, whose motion this one would take for its own: "
                 "make a surface and a Contact for each problem."
             )
-        if self._free or self._taken:
-            self._taken, self._since = problem, now
+        if self._free or self._last_problem:
+            self._last_problem, self._last_use = problem, now
 
     @property
     def turnings(self) -> tuple[str, ...]:
-        """Names of the rotations about the surface's ``directions``, which may be free."""
+        """Names of the rotations about ``drive_axes`` that can be in ``free``, such as "rx"."""
         return ("r",) if self._size == 2 else tuple(f"r{name[-1]}" for name in self._directions)
 
     @property
@@ -90,7 +95,10 @@ class Drive:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Motions driven by force, see docs/force.md: names from ``directions`` and ``turnings``, in the order given; empty at first."""
+        """Names of the motions driven by force, from ``directions`` and ``turnings``.
+
+        Initially empty.  They keep the order in which they were assigned, see docs/force.md.
+        """
         return self._free
 
     @free.setter
@@ -105,7 +113,10 @@ class Drive:
 
     @property
     def force(self) -> np.ndarray | None:
-        """Force of the surface on the bodies at its point, ``shape=(gdim,)``, global frame; None is no force."""
+        """Force of the surface on the bodies, ``shape=(gdim,)``, global frame; None means no force.
+
+        It acts at the surface's ``point``.
+        """
         return whole("surface.force", self._force)
 
     @force.setter
@@ -115,20 +126,25 @@ class Drive:
 
     @property
     def moment(self) -> np.ndarray | None:
-        """Moment of the surface on the bodies about its point, ``shape=(3,)``, in 2-D one number; None is zero."""
+        """Moment of the surface on the bodies about ``point``, global frame; None means no moment.
+
+        ``shape=(3,)``, or in two dimensions one number.
+        """
         return whole("surface.moment", self._moment)
 
     @moment.setter
     def moment(self, value: ArrayLike | None) -> None:
         if value is not None:
-            size = self._angles
+            size = self._rotation_size
             value = frozen(vector("surface.moment", np.atleast_1d(value), size))
         self._moment = value
 
     @property
     def stiffness(self) -> np.ndarray | dict[str, float]:
-        """Stiffness of the springs that pull the surface, force per length or moment per radian: a dictionary by the name of the
-        free motion, one number for all, or one for each in the order of ``free``.  Zero, a dead load, by default.
+        """Stiffness of the springs along free motions, force per length or moment per radian.
+
+        A dictionary by the names of motions, one number for all free motions, or one number for
+        each in the order of ``free``.  Zero by default: the force is then a dead load.
         """
         return dict(self._stiffness) if isinstance(self._stiffness, dict) else self._stiffness
 
@@ -152,7 +168,7 @@ class Drive:
 
     @property
     def drive(self) -> np.ndarray:
-        """Displacement of the springs' far end, ``shape=(gdim,)``, global frame."""
+        """Prescribed displacement of the springs' far end, ``shape=(gdim,)``, global frame."""
         return whole("surface.drive", self._drive)
 
     @drive.setter
@@ -161,9 +177,10 @@ class Drive:
 
     @property
     def guides(self) -> np.ndarray:
-        """Directions that "x", "y", "z" in ``free`` denote, one per row, ``shape=(gdim, gdim)``, orthonormal; at first the global axes.
+        """Unit vectors of the directions "x", "y", "z" in ``free``, one per row, global frame.
 
-        They do not turn with the surface.
+        Orthonormal, ``shape=(gdim, gdim)``; the coordinate axes by default.  They do not rotate
+        with the surface.
         """
         return whole("surface.guides", self._guides)
 
@@ -173,23 +190,35 @@ class Drive:
 
     @property
     def springs(self) -> np.ndarray:
-        """Stiffness of the spring of each free motion, in the order of ``free``, ``shape=(m,)``, force per length or moment per radian."""
+        """Spring stiffness of each motion in ``free``, ``shape=(m,)``.
+
+        Force per length, for rotations moment per radian.
+        """
         if isinstance(self._stiffness, dict):
             return np.array([self._stiffness.get(name, 0.0) for name in self._free])
         return np.broadcast_to(self._stiffness, len(self._free))
 
     @property
     def spins(self) -> bool:
-        """Whether a rotation is free."""
+        """Whether a rotation of the surface is free."""
         return any(name in self.turnings for name in self._free)
 
     def hold(self, names: tuple[str, ...] = (), past: float = 0.0) -> None:
-        """Let contact nodes hold these free motions, or let the surface slide ``past`` them, see ``held.py``."""
+        """Set the free motions that constrained contact nodes prevent, or the direction of sliding.
+
+        Args:
+            names: Free motions that constrained contact nodes prevent by friction, see ``held.py``.
+            past: Sign of the motion if the surface slides relative to these nodes; zero if it does
+                not.
+        """
         self._held, self._past_held = names, past
 
     @property
     def motions(self) -> list[Motion]:
-        """The free motions that are not held by contact nodes, rotations first."""
+        """Free motions that are unknowns of the step, rotations first.
+
+        Motions that constrained contact nodes prevent by friction are left out, see ``hold``.
+        """
         if not self._free:
             return []
         axes = self._surface.drive_axes
@@ -209,23 +238,34 @@ class Drive:
 
     @property
     def freedom(self) -> tuple:
-        """Free motions and springs, on which a solver's set-up depends; empty without free motions."""
+        """Free motions and their springs, as a tuple to compare; empty if there are none.
+
+        A solver must be set up again when this tuple changes.
+        """
         motions = [(motion.name, motion.spring) for motion in self.motions]
         return (motions, self._guides.tolist(), self._past_held) if motions else ()
 
     @property
     def radial(self) -> bool:
-        """Whether a free translation has a component along the first coordinate."""
+        """Whether a free translation has a component along the first coordinate axis."""
         along = [motion.axis[0] for motion in self.motions if not motion.turns]
         return any(abs(part) > GUIDE_DEFECT for part in along)
 
     def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
-        """Force or moment, springs included, that drives each motion in the present position; or the sum of the magnitudes of its terms."""
+        """Return the prescribed force or moment along each motion, springs included.
+
+        Args:
+            motions: The motions, ``m`` of them.
+            magnitudes: Return sums of the magnitudes of the terms instead, to estimate rounding.
+
+        Returns:
+            ``shape=(m,)``, in the present position, force or moment units.
+        """
         size = np.abs if magnitudes else np.asarray
         less = np.add if magnitudes else np.subtract
         displacement, rotation, spin = self._surface.stands
         force = np.zeros(self._size) if self._force is None else self._force
-        moment = np.zeros(self._angles) if self._moment is None else self._moment
+        moment = np.zeros(self._rotation_size) if self._moment is None else self._moment
         stretched = less(size(self._drive), size(displacement))
         turned = size(rotation) + (0.0 if spin is None else size(spin))
         back = less(np.zeros_like(turned), turned)
@@ -238,14 +278,21 @@ class Drive:
         )
 
     def driven(self) -> str:
-        """A description of what drives the surface."""
+        """Return a text that identifies free motions, force, moment, stiffness and drive.
+
+        The moment is included only if a rotation is free.
+        """
         given = (self._free, self._force, self._stiffness, self._drive)
         if self.spins:
             given += (self._moment,)
         return repr(tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in given))
 
     def check(self) -> None:
-        """Raise a ``ValueError`` if a free motion has neither force nor spring, or a plane would leave the body."""
+        """Raise a ``ValueError`` if the prescribed forces do not determine the free motions.
+
+        This is so if a free motion has neither force nor spring, or if the force pulls a plane off
+        the body.  Warn if force or moment are given, but no motion has ever been free.
+        """
         self._check_springs()
         if not self._ever_free and not (self._force is None and self._moment is None):
             self._ever_free = True
@@ -283,7 +330,15 @@ class Drive:
 
 
 def check_guides(value: ArrayLike, size: int) -> np.ndarray:
-    """The user's directions, ``shape=(size, size)``, made orthonormal to rounding; a ``ValueError`` if they are not nearly so."""
+    """Return the user's directions as a read-only orthonormal matrix, one per row.
+
+    Args:
+        value: Directions, ``shape=(size, size)``.
+        size: Dimension.
+
+    Raises:
+        ValueError: the rows are not orthonormal to within ``GUIDE_DEFECT``.
+    """
     rows = finite("surface.guides", value)
     square = rows.shape == (size, size)
     if not square or np.abs(rows @ rows.T - np.eye(size)).max() > GUIDE_DEFECT:

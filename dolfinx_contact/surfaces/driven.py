@@ -1,10 +1,11 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Surfaces driven by force: their motions are unknowns, each with the equilibrium of its surface as equation.
+"""Force-driven surfaces: their rigid motions as unknowns, and one equilibrium equation for each.
 
-Of all surfaces together there are ``m`` free motions ``c``, lengths along free axes, and angles about them times a length
-of the contact.  A node at ``B u`` moves relative to its surface by ``B u - D c``, local components, and surfaces are in
-equilibrium where ``D^T r = F + k (drive - c)``.
+All surfaces together have ``m`` free motions ``c``: translations along free axes, and rotations
+about them, multiplied by a length of the contact.  A node at ``B u`` moves relative to its surface
+by ``B u - D c``, local components.  The surfaces are in equilibrium if
+``D^T r = F + k (drive - c)``.
 """
 
 from __future__ import annotations
@@ -25,24 +26,28 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.state import State
     from dolfinx_contact.law.maps import NodalMap
 
-# Part of a motion that has to be along normals for these to resist it.
+# Smallest fraction of a motion along normals for which normal reactions resist it.
 RESISTING_PART = 1e-8
 
-# Stiffness of a spring over that of the contact nodes, beyond which rounding of its force hides theirs.
+# Largest stiffness of a spring over the stiffness of the contact nodes; beyond it, rounding of the
+# spring's force hides the contact forces.
 STIFFEST_SPRING = 1e10
 
-# Times that a curved surface far from the body comes nearer.
-MOST_APPROACHES = 20  # part of the body's extent that is near enough
+# Maximum number of corrections by which a curved surface approaches the body.
+MOST_APPROACHES = 20
+
+# Distance from the body, over the body's extent, at which a surface counts as being in contact.
 NEAR_PART = 1e-12
 
 
 def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.ndarray) -> None:
-    """Move curved surfaces that force drives and no node touches to the body, before a step.  Collective.
+    """Move force-driven curved surfaces without contact up to the body, before a step.  Collective.
 
     Args:
         body: The body.
-        in_step: Returns their contacts as a step has them that begins where the surfaces stand.
-        u: Last displacement, owned degrees of freedom.
+        in_step: Function that returns the ``ContactStep`` of each contact with these surfaces, for
+            a step that starts from the surfaces' present positions.
+        u: Displacement of the last step, owned degrees of freedom.
     """
     for _ in range(MOST_APPROACHES):
         steps = in_step()
@@ -55,49 +60,54 @@ def approach(body: ElasticBody, in_step: Callable[[], list[ContactStep]], u: np.
 
 
 class DrivenSurfaces:
-    """The surfaces of some contacts that force drives, and their free motions from where they stand at first.
+    """The force-driven surfaces of some contacts, and their free motions.
+
+    Motions are measured from the surfaces' positions when this object is created.
 
     Args:
         body: The body, for sums over ranks.
-        contacts: ``ContactStep`` of its contacts; several may have the same surface.  Collective.
+        contacts: ``ContactStep`` of each contact; several contacts may share a surface.
+            Collective.
 
     Attributes:
         count: Number ``m`` of free motions.
-        axes: ``D`` of each contact, ``shape=(n, gdim, m)``, zero for directions in which supports hold a node, but for nodes
-            that the surface is known to drag along these.
-        springs: Stiffness of each motion's spring, ``shape=(m,)``, force per length.
-        plain: Whether all surfaces are planes that do not turn.
-        pressing: Which motions the normal reactions resist most, ``shape=(m,)``.
+        axes: ``D`` of each contact, ``shape=(n, gdim, m)``.  Zero for directions in which Dirichlet
+            conditions constrain a node, except at nodes along which the surface is known to slide.
+        springs: Spring stiffness of each motion, ``shape=(m,)``, force per length.
+        plain: Whether all surfaces are planes without a free rotation.
+        pressing: Whether mainly normal reactions resist each motion, ``shape=(m,)``, bool.
     """
 
     def __init__(self, body: ElasticBody, contacts: Sequence[ContactStep]):
         self._body = body
         self.surfaces = surfaces_of(c for c in contacts if c.surface.motions)
-        self._home = [surface.displacement for surface in self.surfaces]
+        self._initial_displacements = [surface.displacement for surface in self.surfaces]
         self._motions = [surface.motions for surface in self.surfaces]
         ends = np.cumsum([0] + [len(motions) for motions in self._motions])
         self.parts = [slice(a, b) for a, b in zip(ends, ends[1:])]
         self.count = int(ends[-1])
         self.plain = not any(surface.curved or surface.spins for surface in self.surfaces)
-        self._columns = [self._moved_nodes(contact) for contact in contacts]
-        self.axes = [_felt(contact, D) for contact, D in zip(contacts, self._columns)]
-        self._lengths = np.ones(self.count) if self.plain else self._scaled()
+        self._columns = [self._nodal_columns(contact) for contact in contacts]
+        self.axes = [
+            _unconstrained_columns(contact, D) for contact, D in zip(contacts, self._columns)
+        ]
+        self._lengths = np.ones(self.count) if self.plain else self._scale_rotations()
         motions = [motion for motions in self._motions for motion in motions]
         self.springs = np.array([motion.spring for motion in motions]) / self._lengths**2
         self.names = [motion.name for motion in motions]
         self.turns = np.array([motion.turns for motion in motions])
-        self._pull, self._terms = (self._pulled_at_home(sizes) for sizes in (False, True))
+        self._prescribed, self._terms = (self._initial_forces(sizes) for sizes in (False, True))
         self.pressing = np.array([name == "n" for name in self.names])
         self._rough = self.rough(contacts)
         if not self.plain:
-            self.pressing = self._resisted(contacts)
+            self.pressing = self._resisted_motions(contacts)
 
     def with_columns(self, contacts: Sequence[ContactStep]) -> tuple[ContactStep, ...]:
-        """The contacts, which know what motions of surfaces move at their nodes."""
+        """Return copies of the contacts that store the nodal displacements by surface motions."""
         return tuple(c.but(columns=D) for c, D in zip(contacts, self._columns))
 
-    def _moved_nodes(self, contact: ContactStep) -> np.ndarray:
-        """What each motion moves at the nodes, ``shape=(n, gdim, m)``."""
+    def _nodal_columns(self, contact: ContactStep) -> np.ndarray:
+        """Surface displacement at each node by a unit of each motion, ``shape=(n, gdim, m)``."""
         columns = np.zeros((contact.points.count, contact.points.dim, self.count))
         for one, part, motions in zip(self.surfaces, self.parts, self._motions):
             if one is contact.surface:
@@ -105,14 +115,24 @@ class DrivenSurfaces:
                     columns[:, :, k] = contact.moved_by(motion.axis, motion.turns)
         return columns
 
-    def _pulled_at_home(self, sizes: bool) -> np.ndarray:
-        """What drives each motion where surfaces stand at first, or the sum of the magnitudes of its terms."""
+    def _initial_forces(self, sizes: bool) -> np.ndarray:
+        """Prescribed force along each motion at the surfaces' initial positions, ``shape=(m,)``.
+
+        Args:
+            sizes: Return the sums of the magnitudes of the terms instead.
+        """
         both = zip(self.surfaces, self._motions)
         pulled = [surface.driver.pulled_by(motions, sizes) for surface, motions in both]
         return np.concatenate([np.zeros(0), *pulled]) / self._lengths
 
-    def _scaled(self) -> np.ndarray:
-        """Give rotations the dimension of displacements: the largest lever arm of each, or one.  Collective."""
+    def _scale_rotations(self) -> np.ndarray:
+        """Scale rotations to lengths by their largest lever arm, in place, and return factors.
+        Collective.
+
+        Returns:
+            Length of each motion, ``shape=(m,)``: the largest lever arm of a rotation; one for
+            translations, or if all lever arms are zero.
+        """
         lengths = np.ones(self.count)
         for k, motion in enumerate(motion for motions in self._motions for motion in motions):
             if motion.turns:
@@ -122,11 +142,16 @@ class DrivenSurfaces:
             D /= lengths
         return lengths
 
-    def _resisted(self, contacts: Sequence[ContactStep]) -> np.ndarray:
-        """Motions more along normals than across; without friction all that are along normals at all.  Collective."""
+    def _resisted_motions(self, contacts: Sequence[ContactStep]) -> np.ndarray:
+        """Determine the motions that normal reactions resist, ``shape=(m,)``, bool.  Collective.
+
+        These are motions with a larger part along normals than along tangents.  On frictionless
+        surfaces, any part along normals is enough.  ``_loose`` becomes true for motions that
+        nothing resists.
+        """
         sums = np.zeros((2, self.count))
         for contact, axes in zip(contacts, self.axes):
-            squares = np.einsum("n,nij->ij", self._loaded(contact), axes**2)
+            squares = np.einsum("n,nij->ij", self._node_weights(contact), axes**2)
             sums += squares[-1], squares[:-1].sum(axis=0)
         along, across = self._body.total(sums)
         smooth = np.zeros(self.count, dtype=bool)
@@ -137,8 +162,12 @@ class DrivenSurfaces:
         )
         return (along > across) | (smooth & ~self._loose)
 
-    def _loaded(self, contact: ContactStep) -> np.ndarray:
-        """Normal reactions of the last step; where there are none, one at the nodes that were nearest.  Collective."""
+    def _node_weights(self, contact: ContactStep) -> np.ndarray:
+        """Normal reactions of the last step, ``shape=(n,)``, as weights of the nodes.  Collective.
+
+        Without normal reactions, the weight is one at the nodes nearest to the surface, zero
+        elsewhere.
+        """
         pressing = contact.last.reaction[:, -1]
         if self._body.largest(pressing) > 0.0:
             return pressing
@@ -146,7 +175,12 @@ class DrivenSurfaces:
         return (contact.last.gap <= nearest + NEAR_PART * self._body.extent).astype(float)
 
     def check(self, contacts: Sequence[ContactStep]) -> None:
-        """Raise a ``ValueError`` on all ranks if nothing would hold a surface that force drives.  Collective."""
+        """Raise a ``ValueError`` on all ranks if nothing resists a free motion of a surface.
+        Collective.
+
+        Also if the force pulls a surface off the body, or a spring is too stiff for double
+        precision.
+        """
         if self.plain:
             self._loose = ~self.pressing & (self.springs == 0.0)
             for (_, rough), part in zip(self._rough, self.parts):
@@ -159,7 +193,7 @@ class DrivenSurfaces:
             )
         if self.springs.any():
             self._check_springs(contacts)
-        pulled = None if self.plain else self._pulled()
+        pulled = None if self.plain else self._pulled_off()
         if pulled is not None:
             raise ValueError(
                 f"surface.force does not press {pulled} on the body: it pulls the surface off, and nothing else holds it. It "
@@ -167,7 +201,9 @@ class DrivenSurfaces:
             )
 
     def _check_springs(self, contacts: Sequence[ContactStep]) -> None:
-        """Raise a ``ValueError`` on all ranks for springs whose force double precision does not resolve.  Collective."""
+        """Raise a ``ValueError`` on all ranks for springs too stiff for double precision.
+        Collective.
+        """
         sums = np.zeros(self.count)
         for contact, axes in zip(contacts, self.axes):
             sums += np.einsum("n,nim->m", contact.stiffness.normal, axes**2)
@@ -182,9 +218,9 @@ class DrivenSurfaces:
                 f"of surface.free and prescribe the motion, or take a spring of at most {1e-3 * STIFFEST_SPRING * nodes[k] * scale:.0e}."
             )
 
-    def _pulled(self):
-        """A curved surface that its force pulls off the body, None if there is none.  Collective."""
-        driving = self._pull
+    def _pulled_off(self):
+        """Return a curved surface that its force pulls off the body, or None.  Collective."""
+        driving = self._prescribed
         for surface, part in zip(self.surfaces, self.parts):
             for k in range(part.start, part.stop) if surface.curved else ():
                 if self.pressing[k] and not self.turns[k] and self.springs[k] == 0.0 != driving[k]:
@@ -196,8 +232,8 @@ class DrivenSurfaces:
     # -- motions -------------------------------------------------------------------------------
 
     def place(self, c: np.ndarray) -> None:
-        """Move the planes themselves by these lengths along their free axes from where they stood at first."""
-        given = zip(self.surfaces, self._home, self.parts, self._motions)
+        """Move the surfaces to the positions given by the motions ``c``, ``shape=(m,)``."""
+        given = zip(self.surfaces, self._initial_displacements, self.parts, self._motions)
         for surface, home, part, motions in given:
             ways = c[part] / self._lengths[part]
             turned = [way * motion.axis for way, motion in zip(ways, motions) if motion.turns]
@@ -214,23 +250,26 @@ class DrivenSurfaces:
         c: np.ndarray,
         near: float | None = None,
     ) -> np.ndarray:
-        """Motions with which planes that no node touches at a displacement are where one node alone would carry the force.  Collective.
+        """Return motions in which each surface without contact has moved up to the body.
+        Collective.
 
-        From further away nothing tells how the forces on the plane change with its motion.
+        A surface moves on until its first node alone would carry the prescribed force by its
+        contact stiffness: without contact, reactions do not depend on the motion.
 
         Args:
-            contacts: With columns.
-            x: Displacement of owned degrees of freedom.
-            c: Motions at first.
-            near: If given, planes further away than that are moved to the first node, others stay.
+            contacts: With columns, see ``with_columns``.
+            x: Displacement, owned degrees of freedom.
+            c: Motions before, ``shape=(m,)``.
+            near: If given, only surfaces farther away than this length move, up to first contact.
         """
         for motion in np.flatnonzero(self.pressing & ~self.turns):
             driving = self.driving(c)[motion]
             sign = -1.0 if driving < 0.0 else 1.0
-            ways = [np.full((2, 1), np.inf)]  # to the first node; to where it carries the force
+            ways = [np.full((2, 1), np.inf)]  # to first contact; until one node carries the force
             for contact, axes in zip(contacts, self.axes):
                 gap, rate = contact.at(x, c).gap, sign * axes[:, -1, motion]
-                # By less than rounding none touches: on one node alone a plane that may tilt has no equilibrium.
+                # Gaps below rounding count as closed: a plane that may tilt has no equilibrium on
+                # one node alone.
                 gap = np.where(np.abs(gap) <= contact.gap_rounding(x), 0.0, gap)
                 push = 0.0 if near is not None else sign * driving / contact.stiffness.normal
                 ways.append(np.array([gap, gap + push])[:, rate > 0] / rate[rate > 0])
@@ -242,28 +281,33 @@ class DrivenSurfaces:
         return c
 
     def at_rest(self, c: np.ndarray, softest: float = 0.0) -> np.ndarray:
-        """The motions at which springs hold the planes without reactions.
+        """Return the motions at which springs balance the prescribed forces without reactions.
 
         Args:
-            c: Of planes without springs.
-            softest: Planes whose springs are no stiffer than that, force per length, stay where they are.
+            c: Motions of surfaces without springs, which are kept.
+            softest: Motions with a spring no stiffer than this are kept, too, force per length.
         """
         springs, stretch = self.springs, np.zeros(self.count)
         return c + np.divide(self.driving(c), springs, stretch, where=springs > softest)
 
     @property
     def can_rest(self) -> bool:
-        """Whether no plane needs reactions along its normal."""
+        """Whether all motions resisted by normal reactions have springs: these may act alone."""
         return bool((self.springs[self.pressing] > 0).all())
 
     # -- forces --------------------------------------------------------------------------------
 
     def driving(self, c: np.ndarray) -> np.ndarray:
-        """Sum of the reactions that motions ask for, ``F + k (drive - c)``, ``shape=(m,)``."""
-        return self._pull - self.springs * c
+        """Return the force required along each motion, ``F + k (drive - c)``, ``shape=(m,)``."""
+        return self._prescribed - self.springs * c
 
     def left(self, nodes: Sequence[State], c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces out of balance, reactions minus what drives, and the size of their terms, ``shape=(m,)``.  Collective."""
+        """Return residual forces of the surfaces, ``D^T r`` minus the prescribed forces.
+        Collective.
+
+        Returns:
+            The residual, and the sum of the magnitudes of its terms, ``shape=(m,)`` each.
+        """
         sums = np.zeros((2, self.count))
         for state, axes in zip(nodes, self.axes):
             sums[0] += np.tensordot(state.reaction, axes, 2)
@@ -272,11 +316,16 @@ class DrivenSurfaces:
         return total - self.driving(c), size + self._terms + self.springs * np.abs(c)
 
     def tangent(self, contacts: Sequence[ContactStep], derivatives: Sequence[tuple]) -> np.ndarray:
-        """Derivative of the forces out of balance by the motions, ``k - D^T R_w D``, ``shape=(m, m)``.  Collective.
+        """Return the derivative of the residual by the motions, ``k - D^T R_w D``.  Collective.
+
+        A small multiple of the nodes' stiffness is added as regularisation.
 
         Args:
-            contacts: The contacts.
-            derivatives: As ``LoadStep.derivatives`` returns them.
+            contacts: ``ContactStep`` of each contact.
+            derivatives: Derivatives of the reactions, as ``LoadStep.derivatives`` returns them.
+
+        Returns:
+            ``shape=(m, m)``, force per length.
         """
         sums = np.zeros((2, self.count, self.count))
         for contact, axes, (_, by_motion) in zip(contacts, self.axes, derivatives):
@@ -289,11 +338,11 @@ class DrivenSurfaces:
     def columns(
         self, contacts: Sequence[ContactStep], blocks: Sequence[np.ndarray] | None = None
     ) -> np.ndarray:
-        """Forces on owned degrees of freedom, ``B^T S D``, ``shape=(owned dofs, m)``.
+        """Return nodal forces on owned degrees of freedom, ``B^T S D``, ``shape=(owned dofs, m)``.
 
         Args:
-            contacts: The contacts.
-            blocks: ``S`` of each contact, ``shape=(n, gdim)``; None is one everywhere.
+            contacts: ``ContactStep`` of each contact.
+            blocks: Diagonal of ``S`` of each contact, ``shape=(n, gdim)``; None means the identity.
         """
         columns = np.zeros((self.count, self._body.size))
         for k, (contact, axes) in enumerate(zip(contacts, self.axes)):
@@ -311,19 +360,25 @@ class DrivenSurfaces:
         maps: Sequence[NodalMap],
         required: Callable,
     ) -> np.ndarray:
-        """Motions at which the reactions that maps make are in balance, as far as they can be.  Collective.
+        """Return motions in equilibrium with the reactions of the nodal laws.  Collective.
 
         Args:
-            contacts: With columns.
-            x: Displacement of owned degrees of freedom.
-            c: Motions at first.
-            maps: Of the contacts, see ``law/maps.py``.
-            required: Of motions, the reactions that the body asks of each contact.
+            contacts: With columns, see ``with_columns``.
+            x: Displacement, owned degrees of freedom.
+            c: Initial guess of the motions, ``shape=(m,)``.
+            maps: Nodal contact law of each contact, see ``law/maps.py``.
+            required: Function of the motions that returns, for each contact, the nodal reactions
+                required by equilibrium of the body.
+
+        Returns:
+            ``shape=(m,)``; Newton's last iterate if it does not converge.
         """
         return SurfaceBalance(self, self._body, contacts, x, maps, required).reached(c)
 
     def rough(self, contacts: Sequence[ContactStep]) -> list[tuple]:
-        """The planes, and whether there is friction on each.  Collective."""
+        """Return pairs of each surface and whether any of its contacts has friction.
+        Collective.
+        """
         known = []
         for surface in self.surfaces:
             laws = [c.friction.mu.ravel() for c in contacts if c.surface is surface]
@@ -337,19 +392,24 @@ class DrivenSurfaces:
         c: np.ndarray,
         given: bool = False,
     ) -> str:
-        """Which plane is pushed by more than can be carried, in words; none is the empty string.  Collective.
+        """Describe a surface whose forces exceed what reactions can carry; otherwise return "".
+        Collective.
 
         Args:
-            contacts: The contacts.
-            nodes: Their states.
-            c: Motions.
-            given: Ask before anything is known but the forces that are given, not by the normal reactions.
+            contacts: ``ContactStep`` of each contact.
+            nodes: State of each contact.
+            c: Motions, ``shape=(m,)``.
+            given: Use the prescribed forces alone, before the step, not the computed normal
+                reactions.
         """
         return slides_away(self, self._body, contacts, nodes, c, given)
 
 
-def _felt(contact: ContactStep, columns: np.ndarray) -> np.ndarray:
-    """``D`` without what supports hold, but for nodes that the surface drags."""
+def _unconstrained_columns(contact: ContactStep, columns: np.ndarray) -> np.ndarray:
+    """Return ``D``, zero in constrained directions except at nodes along which the surface slides.
+
+    Rows of nodes whose normal displacement is prescribed are zero.
+    """
     points, axes = contact.points, columns.copy()
     points.without_held(axes[:, :-1])
     if contact.dragged is not None:

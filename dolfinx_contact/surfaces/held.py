@@ -1,10 +1,12 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Planes that force drives along directions in which supports hold contact nodes.
+"""Force-driven planes whose tangential motion constrained contact nodes prevent by friction.
 
-The held nodes carry friction, whose support is rigid: while they carry what the force asks of them, the plane stands still
-relative to them, and they share it in proportion to what each could carry, ``mu r_n``.  If that is not enough, the plane
-slides: then they carry that, against its motion, and the plane moves until springs and other nodes carry the rest.
+Dirichlet conditions constrain these nodes along the plane.  While their friction suffices, the
+plane sticks to them, and the tangential force that the plane needs is distributed over them in
+proportion to their friction limits ``mu r_n``.  If it does not suffice, the plane slides: the nodes
+then carry their friction limits against its motion, and springs and other nodes carry the remaining
+force.
 """
 
 from __future__ import annotations
@@ -26,29 +28,37 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.drive import Motion
     from dolfinx_contact.surfaces.surface import Surface
 
-# Part of a motion along a held direction that may be rounding.
+# Component of a motion along constrained directions, relative, up to which it counts as rounding.
 HELD_ROUNDING = 1e-8
 
 
 class Holding(NamedTuple):
-    """Nodes of a contact that hold a plane."""
+    """Constrained nodes of one contact whose friction resists the motion of a plane."""
 
-    contact: int  # its number
-    rows: np.ndarray  # (k,)
-    axes: np.ndarray  # what the plane's motions move there, tangential components, (k, T, m)
+    contact: int  # index of the contact
+    rows: np.ndarray  # indices of the nodes, (k,)
+    axes: np.ndarray  # tangential displacement by a unit of each motion of the plane, (k, T, m)
 
 
 def held_surfaces(
     body: ElasticBody, contacts: Sequence[ContactStep], last: np.ndarray, b: np.ndarray
 ) -> HeldSurfaces | None:
-    """The planes that held nodes hold, None if there are none; from now on these motions are not free, and the planes go with the nodes.  Collective.
+    """Find planes whose motion constrained nodes prevent by friction, and move them with the nodes.
+    Collective.
+
+    These motions are no longer free in the step.
 
     Args:
-        last: The last displacement, owned degrees of freedom.
-        b: An array that has the present boundary values.
+        body: The body.
+        contacts: ``ContactStep`` of each contact.
+        last: Displacement of the last step, owned degrees of freedom.
+        b: Array that contains the boundary values of this step at fixed degrees of freedom.
+
+    Returns:
+        ``HeldSurfaces``, or None if there are none.
 
     Raises:
-        ValueError: on all ranks, where the law does not tell how nodes share what drives a surface.
+        ValueError: on all ranks, if the friction of the constrained nodes is not determined.
     """
     for contact in contacts:
         if contact.surface.driver is not None:
@@ -63,7 +73,7 @@ def held_surfaces(
 def _held_surface(
     body: ElasticBody, contacts: Sequence[ContactStep], surface: Surface, u: np.ndarray
 ) -> HeldSurface | None:
-    """The plane with the motions that nodes hold.  Collective."""
+    """Return one surface with its motions that constrained nodes prevent, or None.  Collective."""
     motions = surface.motions
     on = [(k, c) for k, c in enumerate(contacts) if c.surface is surface]
     moving = [np.stack([c.moved_by(m.axis, m.turns) for m in motions], axis=2) for _, c in on]
@@ -104,11 +114,13 @@ def _held_surface(
 
 
 class HeldSurfaces:
-    """All planes that held nodes hold; nothing in it changes.
+    """All planes whose motion constrained nodes prevent by friction; immutable.
 
     Attributes:
-        beyond: Whether a plane that slides is pushed by more than all of its nodes carry with the reactions found before.
-        dragged: Directions of slip past which planes slide, by numbers of contacts, ``shape=(n, gdim - 1)``.
+        beyond: Whether the force on a sliding plane exceeds the friction of all its nodes, computed
+            with the last normal reactions.
+        dragged: Slip directions imposed by sliding planes, by index of the contact,
+            ``shape=(n, gdim - 1)``.
     """
 
     def __init__(self, surfaces: list[HeldSurface], beyond: bool = False):
@@ -118,13 +130,21 @@ class HeldSurfaces:
             self.dragged |= surface.dragged
 
     def shared(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> tuple[State, ...]:
-        """States with the share of the held nodes of what drives the planes, the reactions of all others given.  Collective."""
+        """Return states with the friction of constrained nodes that balances the force on planes.
+        Collective.
+
+        All other reactions are kept.
+        """
         for surface in self._surfaces:
             nodes = surface.shared(contacts, nodes)
         return tuple(nodes)
 
     def slid(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> HeldSurfaces | None:
-        """With those planes let slide whose held nodes cannot hold them; None if there are none.  Collective."""
+        """Return a copy in which planes slide whose constrained nodes cannot hold them, or None.
+        Collective.
+
+        None means that all constrained nodes can carry the friction required of them.
+        """
         beyond = any([surface.beyond(contacts, nodes) for surface in self._surfaces])
         found = [surface.slid(contacts, nodes) for surface in self._surfaces]
         if not any(one is not None for one in found):
@@ -133,15 +153,16 @@ class HeldSurfaces:
 
 
 class HeldSurface:
-    """A plane that held nodes hold along some of its free motions.
+    """A plane whose tangential motion constrained contact nodes prevent by friction.
 
     Args:
         body: The body, for sums over ranks.
         surface: The plane.
-        motions: Those that are held, ``m`` of them, translations.
-        holding: ``Holding`` of each contact on the plane.
-        contacts: Numbers of all contacts on it.
-        dragged: Where it slides: as ``HeldSurfaces`` has it.
+        motions: Translations that the nodes prevent, ``m`` of them.
+        holding: ``Holding`` of each contact on the plane that has such nodes.
+        contacts: Indices of all contacts on the plane.
+        dragged: Slip directions of the nodes if the plane slides, see ``HeldSurfaces``; None if
+            not.
     """
 
     def __init__(
@@ -160,10 +181,10 @@ class HeldSurface:
             surface.driver.hold(tuple(motion.name for motion in motions))
 
     def follow(self, contacts: Sequence[ContactStep], u: np.ndarray) -> None:
-        """Move the plane with the held nodes.  Collective.
+        """Move the plane by the mean displacement of its constrained nodes.  Collective.
 
         Raises:
-            ValueError: on all ranks, if these do not move alike.
+            ValueError: on all ranks, if the nodes' displacements along the plane differ.
         """
         for _ in range(2):
             slips, columns, sizes = (
@@ -193,8 +214,13 @@ class HeldSurface:
                 "them it moves is not known. Leave these motions out of surface.free, and prescribe them by surface.displacement."
             )
 
-    def _carried(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> list[np.ndarray]:
-        """What each held node could carry along each motion, ``shape=(k, T, m)``."""
+    def _friction_limits(
+        self, contacts: Sequence[ContactStep], nodes: Sequence[State]
+    ) -> list[np.ndarray]:
+        """Return friction limits of the constrained nodes along each motion, ``shape=(k, T, m)``.
+
+        One array for each ``Holding``, force units, ``T = gdim - 1``.
+        """
         most = []
         for k, rows, axes in self._holding:
             law, R = contacts[k].friction.at(rows), nodes[k].reaction[rows, -1]
@@ -205,15 +231,17 @@ class HeldSurface:
             most.append(R[:, None, None] * np.stack(parts, axis=2))
         return most
 
-    def _part(
+    def _required_fraction(
         self,
         contacts: Sequence[ContactStep],
         nodes: Sequence[State],
         most: list[np.ndarray],
     ) -> np.ndarray:
-        """The part of what all held nodes could carry that the force asks of them along each motion, ``shape=(m,)``.  Collective.
+        """Return the fraction of the friction limits that equilibrium requires, ``shape=(m,)``.
+        Collective.
 
-        Reactions of held nodes along the plane do not count: they are what is asked for.
+        One value for each motion, infinite if the limits are zero.  Present tangential reactions of
+        the constrained nodes are disregarded: they are the unknowns.
         """
         m = len(self._motions)
         sums = np.zeros((m, m + 1))
@@ -232,12 +260,16 @@ class HeldSurface:
         return part
 
     def shared(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> list[State]:
-        """States with the share of the held nodes.  Collective."""
+        """Return the states with the friction of constrained nodes in balance with the force.
+        Collective.
+
+        The friction is capped at the limit.  The states of a sliding plane are returned unchanged.
+        """
         nodes = list(nodes)
         if self._slides:
             return nodes
-        most = self._carried(contacts, nodes)
-        asked = self._part(contacts, nodes, most)
+        most = self._friction_limits(contacts, nodes)
+        asked = self._required_fraction(contacts, nodes, most)
         length = np.linalg.norm(asked)
         given = asked / max(length, 1.0) if length < np.inf else np.zeros(len(asked))
         for (k, rows, _), part in zip(self._holding, most):
@@ -247,7 +279,11 @@ class HeldSurface:
         return nodes
 
     def beyond(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> bool:
-        """Whether no spring pulls the plane, and its force along a motion is more than all nodes carry.  Collective."""
+        """Whether the force on the plane along a motion exceeds the friction of all nodes.
+        Collective.
+
+        Only motions without a spring are considered.
+        """
         pressed = ((contacts[k], nodes[k].reaction[:, -1]) for k in self._contacts)
         most = sum((contact.friction.mu.max(axis=-1) * R).sum() for contact, R in pressed)
         most = float(self._body.total([most])[0])
@@ -255,14 +291,15 @@ class HeldSurface:
         return bool((np.abs(self._surface.driver.pulled_by(loose)) > most).any())
 
     def slid(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> HeldSurface | None:
-        """The plane let slide if its held nodes cannot hold it, else None.  Collective.
+        """Return the plane in the sliding state if its nodes cannot carry the force, or None.
+        Collective.
 
         Raises:
-            ValueError: on all ranks, if nothing tells the direction.
+            ValueError: on all ranks, if the direction of sliding is not determined.
         """
         if self._slides:
             return None
-        part = self._part(contacts, nodes, self._carried(contacts, nodes))
+        part = self._required_fraction(contacts, nodes, self._friction_limits(contacts, nodes))
         if np.linalg.norm(part) <= 1.0:
             return None
         if len(self._motions) > 1:

@@ -19,39 +19,49 @@ from dolfinx_contact.surfaces.surface import Surface, unit
 class RigidPlane(Surface):
     """A rigid plane, driven by displacement, rotation or force.
 
-    Along the directions in ``free``, the plane moves until its forces are in equilibrium, see docs/force.md:
+    Along the directions in ``free``, the plane moves until its forces are in equilibrium, see
+    docs/force.md:
 
         sum of the reactions = force + stiffness (drive - displacement).
 
     Args:
-        point: Any point on the plane, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
+        point: Any point on the plane, ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or
+            3.
         normal: Direction towards the side where the body may be, ``shape=(gdim,)``, of any length.
         axis: First principal friction direction, ``shape=(gdim,)``; made orthogonal to the normal.
             Needed unless friction is isotropic or the body two-dimensional.
-        height: None, or the waviness of the plane: a function of positions ``y``, ``shape=(gdim, n)``, in axes that move with
-            the plane, which returns heights above it, ``shape=(n,)``, length units.  Slopes are neglected.
+        height: None, or the waviness of the plane: a function of positions ``y``,
+            ``shape=(gdim, n)``, in axes that move with the plane, which returns heights above it,
+            ``shape=(n,)``, length units.  Slopes are neglected.
 
     Raises:
-        ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the normal.
+        ValueError: a vector of the wrong size, not finite, complex or zero; an axis along the
+            normal.
 
     Attributes:
-        point, normal, axis: As given, the latter two of unit length; read-only.
-        displacement: Displacement of the plane from its first position, ``shape=(gdim,)``, global frame, length units; zero at
-            first, a read-only array.  To move the plane, assign another one between steps; slip is relative to the plane.  Along
-            free directions, it is a result of the step.
-        rotation: About ``point``, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; zero at first.  Assign
-            another one between steps; normal and axis rotate with the plane, and slip is relative to it.
-        free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the frame, "r1", "r2", "rn" about
-            them; in two dimensions "t", "n" and "r".  Empty at first.  If a rotation is among them, these axes turn with
-            the ``rotation`` that you assign, not with the one that a step finds.
-        force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None is no force.  Components along directions
-            that are not free have no effect: a guide carries them.
-        moment: Moment of the plane on the bodies about ``point``, which moves with the plane, ``shape=(3,)``, in two
-            dimensions one number, global frame; None is zero.
-        stiffness: Springs that pull the plane along free directions, by name, ``{"t1": 200.0}``: force per length, for rotations
-            moment per radian.  Or one number for all free directions, or one for each in the order of ``free``.  Directions
-            without a spring, at first all of them, carry a dead load.
-        drive: Displacement of the spring's far end, ``shape=(gdim,)``, global frame, length units.
+        point, normal, axis: As given, ``normal`` and ``axis`` of unit length; read-only.
+        displacement: Displacement of the plane from its initial position, ``shape=(gdim,)``, global
+            frame, length units; initially zero, a read-only array.  To move the plane, assign
+            another one between steps; slip is relative to the plane.  Along free directions, it is
+            a result of the step.
+        rotation: Rotation about ``point``, radians: a rotation vector, ``shape=(3,)``, in two
+            dimensions an angle; initially zero.  Assign another one between steps; normal and axis
+            rotate with the plane, and slip is relative to it.
+        free: Motions driven by force, a tuple of names: "t1", "t2" and "n" along the axes of the
+            frame, "r1", "r2", "rn" about them; in two dimensions "t", "n" and "r".  Initially
+            empty.  If a rotation is among them, these axes rotate with the ``rotation`` that you
+            assign, not with the rotation that a step computes.
+        force: Force of the plane on the bodies, ``shape=(gdim,)``, global frame; None means no
+            force.  Components along directions that are not free have no effect: a guide carries
+            them.
+        moment: Moment of the plane on the bodies about ``point``, which moves with the plane,
+            ``shape=(3,)``, in two dimensions one number, global frame; None means zero.
+        stiffness: Stiffness of springs that pull the plane along free directions, by name,
+            ``{"t1": 200.0}``: force per length, for rotations moment per radian.  Or one number for
+            all free directions, or one for each in the order of ``free``.  Directions without a
+            spring, initially all of them, carry a dead load.
+        drive: Prescribed displacement of the springs' far end, ``shape=(gdim,)``, global frame,
+            length units.
 
     Example:
         >>> plane = dc.RigidPlane(point=(0, 0, 0), normal=(0, 0, 1), axis=(1, 0, 0))
@@ -91,12 +101,16 @@ class RigidPlane(Surface):
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """Names of the rows of ``frame``, ("t1", "t2", "n") or ("t", "n")."""
+        """Names of the rows of ``frame``, ("t1", "t2", "n") or, in two dimensions, ("t", "n")."""
         return ("t", "n") if self.point.size == 2 else ("t1", "t2", "n")
 
     @property
     def drive_axes(self) -> np.ndarray:
-        """Unit vectors of ``directions``: the rows of ``frame``.  If a rotation is free, at the ``rotation`` assigned last: guides do not tilt with the plane."""
+        """Unit vectors of the directions that can be free, one per row, global frame.
+
+        ``shape=(gdim, gdim)``: the rows of ``frame``.  If a rotation is free, they are the rows of
+        the frame at the ``rotation`` assigned last, because guides do not tilt with the plane.
+        """
         return self.as_placed(self._frame) if self.spins else self.frame
 
     def check_pressing(self, motion: Any) -> None:
@@ -112,16 +126,17 @@ class RigidPlane(Surface):
 
     @property
     def frame(self) -> np.ndarray:
-        """Local frame in the present position, ``shape=(gdim, gdim)``: orthonormal rows (t1, t2, n), in two dimensions (t, n), global components.
+        """Local frame of the plane in its present position, ``shape=(gdim, gdim)``, global frame.
 
-        Without an axis, t1 is the coordinate direction that is most tangential, made orthogonal to the normal.
-        In two dimensions, t is the normal turned by -90 degrees.
+        Orthonormal rows (t1, t2, n), in two dimensions (t, n).  Without an axis, t1 is the
+        coordinate direction that is most tangential, made orthogonal to the normal.  In two
+        dimensions, t is the normal rotated by -90 degrees.
         """
         return self.turned(self._frame)
 
     @cached_property
     def _frame(self) -> np.ndarray:
-        """The frame before any rotation."""
+        """Local frame of the plane before any rotation, ``shape=(gdim, gdim)``, read-only."""
         n = self.normal
         if n.size == 2:
             return frozen(np.array([[n[1], -n[0]], n]))
@@ -133,11 +148,11 @@ class RigidPlane(Surface):
         return frozen(np.array([t1, np.cross(n, t1), n]))
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """The frame in the plane's own axes, ``shape=(gdim, gdim)``, the same at all positions."""
+        """Local frame in the plane's own axes, ``shape=(gdim, gdim)``, equal at all positions."""
         return self._frame
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Distance to the plane minus ``height``, ``shape=(n,)``, length units.
+        """Distance of positions ``y`` to the plane minus ``height``, ``shape=(n,)``, length units.
 
         Raises:
             ValueError: ``height`` returns values of another shape, or not finite.
@@ -154,7 +169,7 @@ class RigidPlane(Surface):
         return flat - height
 
     def described(self) -> np.ndarray:
-        """Point and frame."""
+        """Numbers that identify the plane in checkpoints: point and initial frame, flattened."""
         return np.concatenate((self.point, self._frame.ravel()))
 
     def __repr__(self) -> str:

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Rigid spheres, circles and cylinders, from outside and from inside."""
+"""Rigid spheres, circles and cylinders, with the body outside or inside."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import positive, vector
 from dolfinx_contact.surfaces.surface import CurvedSurface, unit
 
-# Within this part of the radius, a position has no direction from the centre.
+# Distance from the centre, over the radius, below which the normal is undefined.
 CENTRE_RADIUS = 1e-9
 
 
 class _Round(CurvedSurface):
-    """A surface at a constant distance from a point or a line."""
+    """A rigid surface at a constant distance from a point or a line."""
 
     def __init__(self, point: ArrayLike, radius: float, inside: bool) -> None:
         super().__init__(point)
@@ -28,16 +28,18 @@ class _Round(CurvedSurface):
         self.inside = bool(inside)
 
     def _arms(self, y: np.ndarray) -> np.ndarray:
-        """Vectors from the centre, or from the axis of the cylinder, to positions, ``shape=(n, gdim)``."""
+        """Radius vectors from the centre or the cylinder's axis to ``y``, ``shape=(n, gdim)``."""
         return y - self.point
 
     def distance(self, y: np.ndarray) -> np.ndarray:
-        """Signed distance ``|y - c| - R``, or ``R - |y - c|`` if the body is inside; ``shape=(n,)``, length units."""
+        """Signed distance ``|y - c| - R``, negated if the body is inside, ``shape=(n,)``."""
         outside = np.linalg.norm(self._arms(y), axis=1) - self.radius
         return -outside if self.inside else outside
 
     def normals(self, y: np.ndarray) -> np.ndarray:
-        """Unit normals, ``shape=(n, gdim)``: away from the centre, or towards it if the body is inside.
+        """Unit normals, ``shape=(n, gdim)``, pointing from the surface to the body's side.
+
+        They point away from the centre, or towards it if the body is inside.
 
         Raises:
             ValueError: a position is at the centre.
@@ -52,7 +54,7 @@ class _Round(CurvedSurface):
             )
         return arms / (-length if self.inside else length)[:, None]
 
-    def _numbers(self, *more: Any) -> np.ndarray:
+    def _parameters(self, *more: Any) -> np.ndarray:
         sign = -1.0 if self.inside else 1.0
         return np.concatenate((self.point, [sign * self.radius], *more))
 
@@ -60,28 +62,32 @@ class _Round(CurvedSurface):
 class RigidSphere(_Round):
     """A rigid sphere, in two dimensions a circle, driven by displacement, rotation or force.
 
-    Within a step, each node sees the tangent plane of the sphere at its position at the end of the step, see docs/surfaces.md.
+    Within a step, each node sees the tangent plane of the sphere at its position at the end of the
+    step, see docs/surfaces.md.
 
     Args:
         centre: ``shape=(gdim,)``, global frame, length units, ``gdim`` 2 or 3.
         radius: Length units.
-        axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane at each node; needed
-            unless friction is isotropic or the body two-dimensional.
+        axis: First principal friction direction, ``shape=(gdim,)``, projected on the tangent plane
+            at each node; needed unless friction is isotropic or the body two-dimensional.
         inside: Whether the body is inside the sphere, which is then a spherical socket.
 
     Raises:
-        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not positive.
+        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not
+            positive.
 
     Attributes:
-        point, radius, axis, inside: As given, ``point`` the centre, ``axis`` of unit length; read-only.
-        displacement: Displacement from the first position, ``shape=(gdim,)``, global frame, length units; assign another
-            one between steps.
-        rotation: Rotation about the centre, radians, a rotation vector, ``shape=(3,)``, in two dimensions an angle; assign
-            another one between steps.
-        free, force, moment, stiffness, drive: As in ``RigidPlane``, with the names "x", "y", "z", "rx", "ry", "rz", in two
-            dimensions "x", "y", "r": translations along ``guides`` and rotations about them.
-        guides: Directions of "x", "y", "z", one per row, ``shape=(gdim, gdim)``, global frame, orthonormal; the global axes
-            at first.  They do not rotate with the surface.
+        point, radius, axis, inside: As given, ``point`` the centre, ``axis`` of unit length;
+            read-only.
+        displacement: Displacement from the initial position, ``shape=(gdim,)``, global frame,
+            length units; assign another one between steps.
+        rotation: Rotation about the centre, radians: a rotation vector, ``shape=(3,)``, in two
+            dimensions an angle; assign another one between steps.
+        free, force, moment, stiffness, drive: As in ``RigidPlane``, with the names "x", "y", "z",
+            "rx", "ry", "rz", in two dimensions "x", "y", "r": translations along ``guides`` and
+            rotations about them.
+        guides: Directions of "x", "y", "z", one per row, ``shape=(gdim, gdim)``, global frame,
+            orthonormal; initially the global axes.  They do not rotate with the surface.
 
     Example:
         >>> ball = dc.RigidSphere(centre=(0.5, 0.5, -2), radius=2, axis=(1, 0, 0))
@@ -103,8 +109,11 @@ class RigidSphere(_Round):
         self._made = True
 
     def described(self) -> np.ndarray:
-        """Centre, radius (negative if the body is inside) and axis."""
-        return self._numbers(np.zeros(self.point.size) if self.axis is None else self.axis)
+        """Numbers that identify the sphere in checkpoints: centre, radius and axis.
+
+        The radius is negative if the body is inside.  Without an axis, its components are zero.
+        """
+        return self._parameters(np.zeros(self.point.size) if self.axis is None else self.axis)
 
     def __repr__(self) -> str:
         axis = None if self.axis is None else self.axis.tolist()
@@ -112,25 +121,28 @@ class RigidSphere(_Round):
 
 
 class RigidCylinder(_Round):
-    """An infinite rigid cylinder, driven by displacement, rotation or force; in two dimensions use ``RigidSphere``.
+    """An infinite rigid cylinder in three dimensions, driven by displacement, rotation or force.
 
-    Its axis is the first principal friction direction.  Within a step, each node sees the tangent plane of the cylinder at its
-    position at the end of the step, see docs/surfaces.md.
+    Its axis is the first principal friction direction.  Within a step, each node sees the tangent
+    plane of the cylinder at its position at the end of the step, see docs/surfaces.md.  In two
+    dimensions, use ``RigidSphere``.
 
     Args:
-        point: Any point on its axis, ``shape=(3,)``, global frame, length units.
-        axis: Direction of its axis, ``shape=(3,)``, of any length.
+        point: Any point on the cylinder's axis, ``shape=(3,)``, global frame, length units.
+        axis: Direction of the cylinder's axis, ``shape=(3,)``, of any length.
         radius: Length units.
         inside: Whether the body is inside the cylinder, which is then a bore.
 
     Raises:
-        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not positive; two dimensions.
+        ValueError: a vector of the wrong size, zero, complex or not finite; a radius that is not
+            positive; two dimensions.
 
     Attributes:
         point, axis, radius, inside: As given, ``axis`` of unit length; read-only.
-        displacement: Displacement from the first position, ``shape=(3,)``, global frame, length units; assign another one
-            between steps.
-        rotation: Rotation about ``point``, radians, a rotation vector, ``shape=(3,)``; assign another one between steps.
+        displacement: Displacement from the initial position, ``shape=(3,)``, global frame, length
+            units; assign another one between steps.
+        rotation: Rotation about ``point``, radians, a rotation vector, ``shape=(3,)``; assign
+            another one between steps.
         free, force, moment, stiffness, drive, guides: As in ``RigidSphere``.
 
     Example:
@@ -155,8 +167,11 @@ class RigidCylinder(_Round):
         return arms - np.outer(arms @ self.axis, self.axis)
 
     def described(self) -> np.ndarray:
-        """Point, radius (negative if the body is inside), axis, and a one that tells it from a sphere."""
-        return self._numbers(self.axis, [1.0])
+        """Numbers that identify the cylinder in checkpoints: point, radius, axis and one.
+
+        The radius is negative if the body is inside.  The final one distinguishes it from a sphere.
+        """
+        return self._parameters(self.axis, [1.0])
 
     def __repr__(self) -> str:
         return (

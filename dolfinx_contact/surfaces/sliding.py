@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Surfaces that are pushed by more than reactions can carry: there is no static state."""
+"""Limit analysis of force-driven surfaces: detect loads beyond any static equilibrium."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from dolfinx_contact.surfaces.driven import DrivenSurfaces
     from dolfinx_contact.surfaces.surface import Surface
 
-# Part of a motion that is not named.
+# Components of a motion below this fraction of the largest one are left out of messages.
 NEGLIGIBLE_PART = 1e-6
 
-# Part of what friction carries that has to be left: where all is used, how far the plane slides is not determined.
+# Fraction of the friction limit that must remain unused: at the limit, the sliding distance is
+# undetermined.
 FRICTION_MARGIN = 1e-9
 
 
@@ -34,12 +35,16 @@ def slides_away(
     c: np.ndarray,
     given: bool,
 ) -> str:
-    """Which of the ``DrivenSurfaces`` slides away, tips or spins, in words; none is the empty string.  Collective.
+    """Describe the first surface that slides away, tips over or spins; otherwise return "".
+    Collective.
 
     Args:
-        nodes: States of the contacts.
-        c: Motions of surfaces.
-        given: Ask before anything is known but the forces that are given, not by the normal reactions.
+        surfaces: The ``DrivenSurfaces``.
+        body: The body, for sums over ranks.
+        contacts: ``ContactStep`` of each contact.
+        nodes: State of each contact.
+        c: Motions of the surfaces, ``shape=(m,)``.
+        given: Use the prescribed forces alone, before the step, not the computed normal reactions.
     """
     driving = surfaces.driving(c)
     for surface, part in zip(surfaces.surfaces, surfaces.parts):
@@ -48,7 +53,7 @@ def slides_away(
             for contact, state, axes in zip(contacts, nodes, surfaces.axes)
             if contact.surface is surface
         ]
-        one = _Driven(surface, surfaces, part, driving[part], moved, body)
+        one = _DrivenSurface(surface, surfaces, part, driving[part], moved, body)
         message = "" if surface.curved else one.slides(given) or one.tips()
         if not message and not given:
             message = one.spins()
@@ -58,17 +63,20 @@ def slides_away(
 
 
 def lost_far_away(step: LoadStep, state: StepState, acts: bool) -> bool:
-    """Whether body or planes are so far away that rounding hides the loads on them: no state is one then.  Collective.
+    """Whether the body or a surface is so far away that rounding hides the loads on it.
+    Collective.
+
+    Such a state must not be accepted as a solution.
 
     Args:
-        step: The step.
-        state: Whose rounding is as large as the forces that act, roughly.
-        acts: Whether some act above rounding.
+        step: The load step.
+        state: A state whose rounding errors are about as large as its forces.
+        acts: Whether some forces exceed rounding.
     """
     loads, moved, surfaces = [], np.zeros(0), step.surfaces
     if step.statics is not None:
         loads.append(step.statics.loads)
-    if surfaces is not None:  # of springs the force would be as large as the way is far
+    if surfaces is not None:  # without springs, whose force grows with the distance
         loads.append(surfaces.driving(state.c)[surfaces.springs == 0.0])
         moved = np.abs(state.c)
     if not any(load.any() for load in loads):
@@ -77,7 +85,10 @@ def lost_far_away(step: LoadStep, state: StepState, acts: bool) -> bool:
 
 
 def nothing_holds(contacts: Sequence[ContactStep]) -> str:
-    """Whether every plane that touches a body without supports moves along its normal under a dead load, in words."""
+    """Return a message if every plane is free along its normal under a dead load; otherwise "".
+
+    A body without supports is then in no static equilibrium.
+    """
     surfaces = [contact.surface for contact in contacts]
     if any(
         not any(m.name == "n" and m.spring == 0 for m in surface.motions) for surface in surfaces
@@ -89,8 +100,17 @@ def nothing_holds(contacts: Sequence[ContactStep]) -> str:
     )
 
 
-class _Driven:
-    """One surface, its motions ``part`` of all, and the contacts on it with their normal reactions and columns of ``D``."""
+class _DrivenSurface:
+    """Limit analysis of one force-driven surface.
+
+    Args:
+        surface: The surface.
+        surfaces: The ``DrivenSurfaces`` that contain it.
+        part: Slice of the surface's motions among all motions.
+        driving: Prescribed force along each of these motions.
+        contacts: Contacts on the surface, each with its normal reactions and its columns of ``D``.
+        body: The body, for sums over ranks.
+    """
 
     def __init__(
         self,
@@ -106,12 +126,16 @@ class _Driven:
         self._names, self._pressing = surfaces.names[part], surfaces.pressing[part]
 
     def slides(self, given: bool) -> str:
-        """Whether a plane is pushed along itself by more than friction carries."""
+        """Return a message if tangential forces on the plane exceed friction, otherwise "".
+        Collective.
+        """
         along = ~self._turns & np.array([name != "n" for name in self._names])
         motions = np.flatnonzero(along & (self._springs == 0.0))
-        if not motions.size or (given and self._weight() == np.inf):
+        if not motions.size or (given and self._normal_load() == np.inf):
             return ""
-        limit = _Limit(self._contacts, motions, self._body, self._weight() if given else None)
+        limit = _FrictionLimit(
+            self._contacts, motions, self._body, self._normal_load() if given else None
+        )
         way, pushed, most = limit.weakest(self._driving[motions])
         if pushed > most * (1 - FRICTION_MARGIN if given else 1):
             direction = way @ np.array([m.axis for m in self._surface.motions])[motions]
@@ -122,20 +146,22 @@ class _Driven:
             return f"surface.force pushes {self._surface} along {direction} by {pushed:.6g}, and friction carries {most:.6g} along it {known}"
         return ""
 
-    def _weight(self) -> float:
-        """The force along the normal, if it is given: infinite otherwise."""
+    def _normal_load(self) -> float:
+        """Prescribed force along the plane's normal; infinite if it is not a dead load."""
         known = self._names[-1] == "n" and self._springs[-1] == 0
         return float(self._driving[-1]) if known else np.inf
 
     def tips(self) -> str:
-        """Whether moment and weight ask for a centre of pressure beyond the nodes of a plane."""
-        weight = self._weight()
+        """Return a message if the resultant force is outside the contact nodes, otherwise "".
+        Collective.
+        """
+        weight = self._normal_load()
         if not (0.0 < weight < np.inf):
             return ""
         for k in np.flatnonzero(self._turns & (self._springs == 0.0)):
             ends = [np.full((2, 1), -np.inf)]
             for contact, _, axes in self._contacts:
-                normal, most = axes[:, -1, k], _radius(contact.friction, axes[:, :-1, k])
+                normal, most = axes[:, -1, k], _friction_work(contact.friction, axes[:, :-1, k])
                 ends.append(np.array([-(normal - most), normal + most]))
             low, high = np.concatenate(ends, axis=1).max(axis=1)
             low, high = (self._body.comm.allreduce(float(end), op=MPI.MAX) for end in (low, high))
@@ -149,12 +175,16 @@ class _Driven:
         return ""
 
     def spins(self) -> str:
-        """Whether motions that friction alone resists are driven by more than it carries with the present normals."""
+        """Return a message if forces on motions resisted by friction alone exceed it, otherwise "".
+        Collective.
+
+        The friction limit is computed with the present normal reactions.
+        """
         free = ~self._pressing & (self._springs == 0.0)
         motions = np.flatnonzero(free & (self._turns | self._surface.curved))
         if not motions.size:
             return ""
-        limit = _Limit(self._contacts, motions, self._body)
+        limit = _FrictionLimit(self._contacts, motions, self._body)
         way, pushed, most = limit.weakest(self._driving[motions] - limit.by_normals())
         if pushed > most:
             names = [
@@ -171,22 +201,29 @@ class _Driven:
         return ""
 
 
-def _radius(friction: Friction, slip: np.ndarray) -> np.ndarray:
-    """``|M v|`` of nodes that move along their surfaces by ``v``, local components, ``shape=(n,)``."""
+def _friction_work(friction: Friction, slip: np.ndarray) -> np.ndarray:
+    """Frictional work ``|M v|`` per unit normal reaction and unit motion, ``shape=(n,)``.
+
+    Args:
+        friction: Friction law of the nodes.
+        slip: Slip ``v`` of the nodes by unit motion, ``shape=(n, gdim - 1)``, local frame.
+    """
     return np.linalg.norm(friction.mu[..., : slip.shape[1]] * friction.along_axes(slip), axis=1)
 
 
-class _Limit:
-    """What friction carries against motions of a surface, at most, whatever the nodes' friction within the cone.
+class _FrictionLimit:
+    """Upper bound of the friction that resists motions of one surface.
 
-    Against a virtual motion ``c`` node i works ``r_n |M D_t c|`` at most, the support function of its ellipse: forces ``F`` that are in balance
-    have ``F . c <= sum r_n |M D_t c|`` for every ``c``.
+    The frictional work of node i against a virtual motion ``c`` is at most ``r_n |M D_t c|``, the
+    support function of its friction ellipse.  Forces ``F`` can be in equilibrium only if
+    ``F . c <= sum r_n |M D_t c|`` for every ``c``.
 
     Args:
-        contacts: With their normal reactions and columns of ``D``.
-        motions: Columns that are asked for, ``shape=(k,)``.
-        body: For sums over ranks.
-        weight: Sum of normal reactions, of which no node is known; None takes those given.
+        contacts: Contacts on the surface, each with its normal reactions and its columns of ``D``.
+        motions: Indices of the columns to consider, ``shape=(k,)``.
+        body: The body, for sums over ranks.
+        weight: Sum of the normal reactions if their distribution is unknown; None means that the
+            reactions in ``contacts`` are used.
     """
 
     def __init__(
@@ -196,7 +233,7 @@ class _Limit:
         body: ElasticBody,
         weight: float | None = None,
     ):
-        self._body, self._weight = body, weight
+        self._body, self._normal_load = body, weight
         self._parts = [(c.friction, pressed, D[:, :, motions]) for c, pressed, D in contacts]
         laws = [friction for friction, _, _ in self._parts]
         alike = all(law.frictionless or law.isotropic for law in laws)
@@ -207,22 +244,38 @@ class _Limit:
         )
 
     def by_normals(self) -> np.ndarray:
-        """What the normal reactions carry of each motion, ``shape=(k,)``.  Collective."""
+        """Return the force of the normal reactions along each motion, ``shape=(k,)``.
+        Collective.
+        """
         return self._body.total(sum(normal @ axes[:, -1] for _, normal, axes in self._parts))
 
     def carried(self, way: np.ndarray) -> float:
-        """The most frictional work against a motion, per length.  Collective."""
+        """Return the maximum frictional work against a unit of the motion ``way``.  Collective.
+
+        Args:
+            way: Coefficients of the motions, ``shape=(k,)``.
+        """
         most = [np.zeros(1)]
         for friction, normal, axes in self._parts:
             slip = axes[:, :-1] @ way
-            radius = _radius(friction, slip)
-            most.append(radius if self._weight is not None else np.maximum(normal, 0.0) * radius)
-        if self._weight is not None:
-            return self._weight * self._body.largest(np.concatenate(most))
+            radius = _friction_work(friction, slip)
+            most.append(
+                radius if self._normal_load is not None else np.maximum(normal, 0.0) * radius
+            )
+        if self._normal_load is not None:
+            return self._normal_load * self._body.largest(np.concatenate(most))
         return float(self._body.total([np.concatenate(most).sum()])[0])
 
     def weakest(self, force: np.ndarray) -> tuple[np.ndarray, float, float]:
-        """The motion against which the least is carried of what drives it, a unit vector, and both sizes.  Collective."""
+        """Return the motion with the least ratio of friction limit to driving force.  Collective.
+
+        Args:
+            force: Driving force of each motion, ``shape=(k,)``.
+
+        Returns:
+            The motion, a unit vector, ``shape=(k,)``; the driving force along it; the friction
+            limit.
+        """
         size = float(np.linalg.norm(force))
         if size == 0.0:
             return np.eye(force.size)[0], 0.0, np.inf

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The base class of surfaces: rigid motion, distances and local frames."""
+"""Base class of rigid surfaces: rigid motion, distances and local frames."""
 
 from __future__ import annotations
 
@@ -16,18 +16,24 @@ from dolfinx_contact.support.checks import finite, place, vector
 if TYPE_CHECKING:
     from dolfinx_contact.surfaces.drive import Drive, Motion
 
-# Two vectors are parallel if the part of one across the other is below this.
+# Two vectors count as parallel if the sine of their angle is at most this: rounding.
 PARALLEL_PART = 1e-12
 
-# An axis whose tangential part is below this is along the normal.
+# An axis counts as normal to the surface if its tangential component is below this: half of the
+# digits.
 TANGENTIAL_PART = 1e-8
 
-# Components of a normal are compared to this many decimals: where two are equal, neither rounding nor solver errors may choose the tangent.
+# Decimals to which components of a normal are compared: if two are equal, neither rounding nor
+# solver errors may decide which tangent is chosen.
 TIE_DECIMALS = 6
 
 
 def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    """A user's vector, scaled to unit length, ``shape=(size,)``; a ``ValueError`` if it is zero."""
+    """Return a user's vector scaled to unit length, ``shape=(size,)``.
+
+    Raises:
+        ValueError: the vector is zero, not finite, or of another size.
+    """
     along = vector(name, value, size)
     largest = np.abs(along).max()
     if largest == 0.0:
@@ -36,8 +42,8 @@ def unit(name: str, value: ArrayLike, size: int) -> np.ndarray:
     return along / np.linalg.norm(along)
 
 
-class _OfDrive:
-    """An attribute of the surface's ``Drive``, which is created on first access."""
+class _DriveAttribute:
+    """Descriptor of an attribute stored in the surface's ``Drive``, created on first access."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -52,15 +58,17 @@ class _OfDrive:
 class Surface(Guarded):
     """Base class of surfaces: a rigid motion, distances and local frames.
 
-    Positions ``y`` are given in axes that move with the surface; before it moves, they are global coordinates.  For a surface of
-    your own, derive from this class and define ``distance`` and ``frames``, or derive from ``CurvedSurface`` and define
-    ``distance`` and ``normals``; see docs/extending.md.
+    Positions ``y`` are given in axes that move with the surface; before it moves, they are global
+    coordinates.  For a surface of your own, derive from this class and define ``distance`` and
+    ``frames``, or derive from ``CurvedSurface`` and define ``distance`` and ``normals``; see
+    docs/extending.md.
 
     Args:
         point: Centre of rotation, ``shape=(gdim,)``, global frame, length units.
 
     Attributes:
-        varies: Whether gaps are a nonlinear function of the position; contacts then compute them again at every step.
+        varies: Whether gaps are a nonlinear function of the position; contacts then compute them
+            again at every step.
         curved: Whether frames depend on the position.
         deformable: Whether it is the surface of a deformable body.
         axis: First principal friction direction, ``shape=(gdim,)``, a unit vector, or None.
@@ -80,7 +88,7 @@ class Surface(Guarded):
     varies = curved = deformable = False
     axis: np.ndarray | None = None
 
-    force, moment, stiffness, drive, guides = (_OfDrive() for _ in range(5))
+    force, moment, stiffness, drive, guides = (_DriveAttribute() for _ in range(5))
 
     def __init__(self, point: ArrayLike) -> None:
         self.point = frozen(vector("point", point))
@@ -102,11 +110,11 @@ class Surface(Guarded):
 
     @property
     def driver(self) -> Drive | None:
-        """The ``Drive``; None until a free motion or a force is set or read."""
+        """The ``Drive`` with free motions and prescribed forces; None until one is set or read."""
         return self._driver
 
     def driven_by_force(self) -> Drive:
-        """The ``Drive``, created if there is none."""
+        """Return the ``Drive`` with free motions and prescribed forces; create it if missing."""
         if self._driver is None:
             from dolfinx_contact.surfaces.drive import Drive
 
@@ -115,7 +123,10 @@ class Surface(Guarded):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Motions driven by force, see docs/force.md: names of ``directions`` and of rotations about them; empty at first."""
+        """Names of the motions driven by force: ``directions`` and rotations about them.
+
+        Initially empty, see docs/force.md.
+        """
         return () if self._driver is None else self._driver.free
 
     @free.setter
@@ -124,32 +135,38 @@ class Surface(Guarded):
 
     @property
     def motions(self) -> list[Motion]:
-        """The free motions that are not held by contact nodes, rotations first."""
+        """Free motions that are unknowns of the step, rotations first.
+
+        Motions that constrained contact nodes prevent by friction are left out.
+        """
         return [] if self._driver is None else self._driver.motions
 
     @property
     def spins(self) -> bool:
-        """Whether a rotation is free."""
+        """Whether a rotation of the surface is free."""
         return self._driver is not None and self._driver.spins
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """Names of the directions along which the surface can be free, in the order of the rows of ``drive_axes``."""
+        """Names of the translations that can be free, in the order of ``drive_axes``."""
         return ("x", "y") if self.point.size == 2 else ("x", "y", "z")
 
     @property
     def drive_axes(self) -> np.ndarray:
-        """Unit vectors of ``directions``, ``shape=(gdim, gdim)``, global frame."""
+        """Unit vectors of the directions that can be free, one per row, global frame."""
         return self.guides
 
     def check_pressing(self, motion: Any) -> None:
-        """Raise a ``ValueError`` if the force pulls the surface off the bodies; a plane can tell before the step."""
+        """Raise a ``ValueError`` if a prescribed force pulls the surface off the bodies.
+
+        The base class checks nothing; a plane overrides this method.
+        """
 
     # -- motion --------------------------------------------------------------------------------
 
     @property
     def displacement(self) -> np.ndarray:
-        """Displacement from the first position, ``shape=(gdim,)``, global frame, length units."""
+        """Displacement from the initial position, ``shape=(gdim,)``, global frame, length units."""
         return whole("surface.displacement", self._displacement)
 
     @displacement.setter
@@ -158,7 +175,10 @@ class Surface(Guarded):
 
     @property
     def rotation(self) -> np.ndarray:
-        """Rotation from the first position about ``point``, radians: a rotation vector, ``shape=(3,)``, or in 2-D an angle, ``shape=(1,)``."""
+        """Rotation from the initial position about ``point``, radians.
+
+        A rotation vector, ``shape=(3,)``, or in two dimensions an angle, ``shape=(1,)``.
+        """
         return whole("surface.rotation", self._rotation)
 
     @rotation.setter
@@ -168,85 +188,117 @@ class Surface(Guarded):
 
     @property
     def placed(self) -> np.ndarray:
-        """The rotation assigned last, which also orients the guides: rotations found by steps do not turn them."""
+        """Rotation assigned last by the user, radians; it also orients a plane's guides.
+
+        Rotations computed by a step do not change it.
+        """
         return self._placed
 
     def place(self, rotation: ArrayLike, placed: np.ndarray) -> None:
-        """Restore a rotation and the orientation of the guides."""
+        """Restore the rotation and the rotation assigned last, for example from a checkpoint.
+
+        Args:
+            rotation: Rotation of the surface, as ``rotation``.
+            placed: Rotation assigned last by the user, as ``placed``.
+        """
         self.turn_to(rotation)
         self._placed = placed
 
     def turn_to(self, value: ArrayLike) -> None:
-        """Take a rotation found by a step, radians; guides do not turn."""
+        """Set the rotation computed by a step, radians; the orientation of guides is unchanged."""
         size = self._rotation.size
         array = np.atleast_1d(finite("surface.rotation", value))
         if array.shape != (size,):
             wanted = "a vector of 3 numbers" if size == 3 else "one angle"
             raise ValueError(f"surface.rotation must be {wanted}, in radians, got {value!r}.")
         self._rotation, self._spin = frozen(array.astype(np.float64)), None
-        self._turn = _turn_of(self._rotation)
+        self._turn = _nonzero_rotation(self._rotation)
 
     @property
     def spin(self) -> np.ndarray | None:
-        """Small rotation found so far in the current step, radians; None without one and between steps."""
+        """Small rotation computed so far in the current step, radians; None if there is none.
+
+        ``shape=(3,)``, or in two dimensions ``(1,)``.  It is not yet part of ``rotation``.
+        """
         return self._spin
 
     def spin_by(self, angle: np.ndarray | None) -> None:
-        """Set the rotation within the current step; frames stay those of its start."""
+        """Set the small rotation of the current step, radians, or None; frames are unchanged."""
         self._spin = angle
 
     @property
     def stands(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """``displacement``, ``rotation`` and ``spin``."""
+        """Present position of the surface: ``displacement``, ``rotation`` and ``spin``."""
         return self._displacement, self._rotation, self._spin
 
     def end_step(self) -> None:
-        """Add the rotation of the step, ``spin``, to ``rotation``."""
+        """Add the small rotation of the step, ``spin``, to ``rotation``."""
         if self._spin is not None:
             self.turn_to(composed(self._spin, self._rotation))
 
     def motion(self, x: np.ndarray) -> np.ndarray:
-        """Displacement of the surface's material points at ``x``, ``shape=(n, gdim)``; ``(gdim,)`` if it has not rotated.  Global frame."""
+        """Displacement of the surface's material points at ``x``, global frame, length units.
+
+        Args:
+            x: Initial positions, ``shape=(n, gdim)``.
+
+        Returns:
+            ``shape=(n, gdim)``, or ``(gdim,)`` for all points if the surface has not rotated.
+        """
         if self._turn is None:
             return self._displacement
         return self._displacement + (x - self.point) @ self._turn.T
 
     def relative(self, x: np.ndarray) -> np.ndarray:
-        """Coordinates of the points ``x``, ``shape=(n, gdim)``, in axes that move with the surface."""
+        """Coordinates of points ``x`` in axes that move with the surface, ``shape=(n, gdim)``."""
         if self._turn is None:
             return x - self._displacement
         arm = x - self.point - self._displacement
         return self.point + arm + arm @ self._turn
 
     def distances(self, x: np.ndarray) -> np.ndarray:
-        """Distances of points ``x``, ``shape=(..., gdim)``, global frame, from the surface; infinite where it cannot be evaluated."""
+        """Distance of each point ``x`` from the surface, ``shape=x.shape[:-1]``, length units.
+
+        Infinite at all points if the distance cannot be evaluated there.
+
+        Args:
+            x: Positions, ``shape=(..., gdim)``, global frame.
+        """
         try:
             return self.distance(self.relative(x.reshape(-1, x.shape[-1]))).reshape(x.shape[:-1])
         except ValueError:  # a function that accepts only the nodes
             return np.full(x.shape[:-1], np.inf)
 
     def moved_past(self, x: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """``relative(x + moved) - x``, without cancellation for small motions."""
+        """Return ``relative(x + moved) - x``, ``shape=(n, gdim)``, without cancellation.
+
+        This is the displacement of points at ``x`` relative to the surface, in axes that move with
+        it.
+        """
         past = moved - self._displacement
         return past if self._turn is None else past + (x - self.point + past) @ self._turn
 
     def turned(self, frames: np.ndarray) -> np.ndarray:
-        """Frames given in the surface's axes, in global components."""
+        """Convert frames from axes that move with the surface to global components."""
         return frames if self._turn is None else frames + frames @ self._turn.T
 
     def as_placed(self, frames: np.ndarray) -> np.ndarray:
-        """Frames given in the guides' axes, in global components."""
-        turn = _turn_of(self._placed)
+        """Convert frames from initial axes to global components by the rotation ``placed``."""
+        turn = _nonzero_rotation(self._placed)
         return frames if turn is None else frames + frames @ turn.T
 
     def own_axes(self, vector: np.ndarray) -> np.ndarray:
-        """Components of a global vector in the surface's axes; a rotation in two dimensions, one number, is unchanged."""
+        """Convert a global vector to axes that move with the surface.
+
+        A rotation in two dimensions, one number, is returned unchanged.
+        """
         return vector if self._turn is None or vector.size == 1 else vector + vector @ self._turn
 
     def distance(self, y: np.ndarray) -> np.ndarray:
         """Signed distance to the surface, positive on the side where the body may be.
 
-        Only its zero and its slope there matter: on the surface, the derivative along the normal must be one.
+        Only its zero and its slope there matter: on the surface, the derivative along the normal
+        must be one.
 
         Args:
             y: Positions, ``shape=(n, gdim)``, in axes that move with the surface.
@@ -257,33 +309,45 @@ class Surface(Guarded):
         raise NotImplementedError
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """Orthonormal rows (t1, t2, n), in two dimensions (t, n), at positions ``y``: ``shape=(n, gdim, gdim)``, or ``(gdim, gdim)`` for all."""
+        """Local frame at each position ``y``: rows (t1, t2, n), in two dimensions (t, n).
+
+        Args:
+            y: Positions, ``shape=(n, gdim)``, in axes that move with the surface.
+
+        Returns:
+            Orthonormal rows, ``shape=(n, gdim, gdim)``, or ``(gdim, gdim)`` if all are equal, in
+            the same axes.
+        """
         raise NotImplementedError
 
     def check_at(self, y: np.ndarray) -> None:
-        """Raise a ``ValueError`` if the user's input contradicts itself at the nodes' positions ``y``."""
+        """Raise a ``ValueError`` if the user's input is inconsistent at nodal positions ``y``."""
 
     def described(self) -> np.ndarray:
-        """Numbers that identify the surface in checkpoints: point, axis, and the parameters of the class."""
+        """Numbers that identify the surface in checkpoints: point, axis, class parameters."""
         return np.append(self.point, np.zeros(self.point.size) if self.axis is None else self.axis)
 
     def __repr__(self) -> str:
-        """The surface in words, the same on all ranks."""
+        """Return class name and parameters of the surface, the same text on all ranks."""
         return f"{type(self).__name__}({', '.join(map(str, self.described().tolist()))})"
 
 
 def frames_along(
     normals: np.ndarray, axis: np.ndarray | None, at: np.ndarray, surface: Surface
 ) -> np.ndarray:
-    """Local frames with these unit normals: rows (t1, t2, n), in two dimensions (t, n), ``shape=(n, gdim, gdim)``.
+    """Local frames with given unit normals: rows (t1, t2, n), in two dimensions (t, n).
 
-    t1 is the axis, projected on the tangent plane.  Without an axis, t1 is the projection of the coordinate direction that is most tangential.
+    t1 is ``axis``, projected on the tangent plane.  Without an axis, t1 is the projection of the
+    coordinate direction that is most tangential.
 
     Args:
         normals: ``shape=(n, gdim)``, in the same axes as ``axis``.
         axis: ``shape=(gdim,)``, or None.
         at: Positions, ``shape=(n, gdim)``, for the error message.
-        surface: For the error message.
+        surface: The surface, for the error message.
+
+    Returns:
+        ``shape=(n, gdim, gdim)``.
 
     Raises:
         ValueError: the axis is along a normal.
@@ -292,7 +356,7 @@ def frames_along(
         return np.stack((np.column_stack((normals[:, 1], -normals[:, 0])), normals), axis=1)
     most = np.abs(normals).round(TIE_DECIMALS).argmin(axis=1)
     t1 = np.eye(3)[most] if axis is None else np.broadcast_to(axis, normals.shape)
-    for _ in range(2):  # once more, for a nearly parallel axis
+    for _ in range(2):  # twice, to remove rounding errors of a nearly parallel axis
         t1 = t1 - (t1 * normals).sum(axis=1, keepdims=True) * normals
         length = np.linalg.norm(t1, axis=1, keepdims=True)
         if (length < TANGENTIAL_PART).any():
@@ -305,16 +369,18 @@ def frames_along(
 
 
 class CurvedSurface(Surface):
-    """A surface whose normal depends on the position."""
+    """Base class of surfaces whose normal depends on the position."""
 
     curved = varies = True
 
     def normals(self, y: np.ndarray) -> np.ndarray:
-        """Unit normals at positions ``y``, towards the side where the body may be, ``shape=(n, gdim)``."""
+        """Unit normals at positions ``y``, towards the body's side, ``shape=(n, gdim)``."""
         raise NotImplementedError
 
     def frames(self, y: np.ndarray) -> np.ndarray:
-        """Local frame at each position, ``shape=(n, gdim, gdim)``; ``axis`` is projected on the tangent plane.
+        """Local frame at each position ``y``, ``shape=(n, gdim, gdim)``.
+
+        ``axis`` is projected on the tangent plane.
 
         Raises:
             ValueError: the axis is along the normal at a position.
@@ -322,15 +388,20 @@ class CurvedSurface(Surface):
         return frames_along(self.normals(y), self.axis, y, self)
 
 
-def _turn_of(angle: np.ndarray) -> np.ndarray | None:
-    """``rotation_less_one``, or None for no rotation."""
+def _nonzero_rotation(angle: np.ndarray) -> np.ndarray | None:
+    """Rotation matrix minus the identity, see ``rotation_less_one``; None for a zero rotation."""
     return rotation_less_one(angle) if angle.any() else None
 
 
 def rotation_less_one(angle: np.ndarray) -> np.ndarray:
-    """Rotation matrix minus the identity, ``shape=(gdim, gdim)``, without cancellation for small angles.
+    """Rotation matrix minus the identity, ``shape=(gdim, gdim)``, without cancellation.
 
-    Rodrigues' formula, ``sin(a) N + 2 sin(a/2)^2 N^2``, with the cross-product matrix ``N`` of the axis.
+    Rodrigues' formula, ``sin(a) N + 2 sin(a/2)^2 N^2``, with the cross-product matrix ``N`` of the
+    axis.
+
+    Args:
+        angle: Nonzero rotation vector, ``shape=(3,)``, or in two dimensions angle, ``shape=(1,)``,
+            radians.
     """
     a = np.linalg.norm(angle)
     if angle.size == 1:
@@ -342,7 +413,7 @@ def rotation_less_one(angle: np.ndarray) -> np.ndarray:
 
 
 def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Rotation vector, or in two dimensions angle, of the rotation ``before`` followed by ``after``."""
+    """Rotation vector (in 2-D angle) of the rotation ``before`` followed by ``after``, radians."""
     if after.size == 1:
         return after + before
     if not before.any():
@@ -354,7 +425,10 @@ def composed(after: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Rotation vector, or in two dimensions angle, from one rotation to another; may exceed a turn if both have one axis."""
+    """Rotation vector (in 2-D angle) that leads from one rotation to another, radians.
+
+    Its angle may exceed a full turn if both rotations have the same axis.
+    """
     if after.size == 1:
         return after - before
     size = np.linalg.norm(before) * np.linalg.norm(after)
@@ -364,7 +438,11 @@ def rotation_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def cross(angle: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """``angle x arms``, ``shape=(n, gdim)``: velocities of points with these lever arms; in 2-D, ``angle`` is one number."""
+    """Cross product of a rotation and lever arms, ``angle x arms``, ``shape=(n, gdim)``.
+
+    These are the displacements of points by a small rotation.  In two dimensions, ``angle`` is one
+    number.
+    """
     if angle.size == 1:
         return angle * np.column_stack((-arms[:, 1], arms[:, 0]))
     return np.cross(angle, arms)

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A function of position written in UFL, and its gradient, as functions of arrays: compiled by DOLFINx's compiler."""
+"""Values and gradient of a UFL expression of position, as compiled functions of arrays."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ from dolfinx_contact import compat
 
 
 def is_ufl(given: object) -> bool:
-    """Whether it is an expression of UFL."""
+    """Whether an object is a UFL expression."""
     return isinstance(given, Expr)
 
 
 def by_ufl(expression: Any, gdim: int) -> tuple[_Evaluated, _Evaluated]:
-    """Values and gradient of a scalar expression in ``SpatialCoordinate``, at any positions.
+    """Return functions for values and gradient of a scalar UFL expression at arbitrary positions.
 
-    The position becomes a function that is constant on each cell of a mesh with a cell for each position: the user's mesh
-    ends where the body does.  Constants count with the values that they have when the functions are called.
+    The expression is evaluated on an auxiliary mesh with one cell for each position, so that
+    positions may be outside the user's mesh.  Constants have their values at the time of the call.
 
     Args:
-        expression: Scalar, of ``SpatialCoordinate``, numbers and ``Constant``.
-        gdim: Of the positions.
+        expression: Scalar expression of ``SpatialCoordinate``, numbers and ``Constant``.
+        gdim: Dimension of the positions.
 
     Returns:
-        Functions of positions, ``shape=(gdim, n)``: values, ``shape=(n,)``, and derivatives, ``shape=(gdim, n)``.
+        Two functions of positions, ``shape=(gdim, n)``: values, ``shape=(n,)``, and derivatives,
+        ``shape=(gdim, n)``.
 
     Raises:
-        ValueError: an expression that is not scalar, or of anything else.
+        ValueError: the expression is not scalar, or contains other terms.
     """
     allowed = (
         ufl.classes.SpatialCoordinate,
@@ -57,29 +58,36 @@ def by_ufl(expression: Any, gdim: int) -> tuple[_Evaluated, _Evaluated]:
 
 
 class _Evaluated:
-    """Values of an expression, or its derivatives, compiled when first asked for so many positions."""
+    """Function that evaluates a UFL expression, or its gradient, at an array of positions.
+
+    It is compiled at the first call, and again if a later call has more positions.
+    """
 
     def __init__(self, expression: Any, x: np.ndarray, derived: bool):
         self._given, self._x, self._derived = expression, x, derived
         self._constants = list(extract_type(expression, ufl.classes.Constant))
-        self._room = 0
+        self._capacity = 0
 
     def __call__(self, y: np.ndarray) -> np.ndarray:
         gdim, n = y.shape
-        if n > self._room:
+        if n > self._capacity:
             self._compile(gdim, n)
         self._position.x.array.reshape(-1, gdim)[self._nodes[:n]] = y.T
-        for own, given in zip(self._own, self._constants):
+        for own, given in zip(self._own_constants, self._constants):
             own.value[...] = given.value
         found = compat.cell_values(self._compiled, self._mesh, np.arange(n, dtype=np.int32))
         return found.T.copy() if self._derived else found.ravel()
 
     def _compile(self, gdim: int, n: int) -> None:
-        self._mesh, self._room = compat.intervals(n), n
+        self._mesh, self._capacity = compat.intervals(n), n
         V = compat.functionspace(self._mesh, ("DG", 0, (gdim,)))
         self._position, self._nodes = fem.Function(V), compat.cell_nodes(V)[:, 0]
-        self._own = [fem.Constant(self._mesh, np.array(c.value, float)) for c in self._constants]
+        self._own_constants = [
+            fem.Constant(self._mesh, np.array(c.value, float)) for c in self._constants
+        ]
         at = ufl.variable(self._position)
-        moved = ufl.replace(self._given, {self._x: at, **dict(zip(self._constants, self._own))})
+        moved = ufl.replace(
+            self._given, {self._x: at, **dict(zip(self._constants, self._own_constants))}
+        )
         moved = ufl.diff(moved, at) if self._derived else moved
         self._compiled = fem.Expression(moved, np.array([[0.5]]))

@@ -3,6 +3,7 @@
 """What programs keep to: short functions, no path of their own making, no import circle, few interfaces."""
 
 import ast
+import re
 import subprocess
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -173,6 +174,29 @@ def test_interfaces_are_few_and_small():
     assert {"Solver", "BoundSolver", "NodalMap"} <= set(members) and len(members) <= INTERFACES
     assert "return_map" in members["ContactLaw"]  # of its base
     assert not {of: names for of, names in members.items() if len(names) > MEMBERS}
+
+
+def test_names_in_words_exist():
+    """What CONTRIBUTING calls by name, and a docstring of the package by ``Class.name`` or a constant's, is there: renamed things are renamed in words, too."""
+    defined = {"dc", "dolfinx_contact"}
+    for tree in PACKAGE.values():
+        for node in ast.walk(tree):
+            defined |= {getattr(node, key) for key in ("id", "name", "attr", "arg") if hasattr(node, key)}  # fmt: skip
+    cpp = [file.read_text() for end in ("h", "cpp") for file in (ROOT / "cpp").rglob(f"*.{end}")]
+    defined |= set(re.findall(r"\w+", " ".join(cpp)))
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    path = text[text.index("## One load step") : text.index("## What we ask")]
+    called = re.findall(r"`([A-Za-z_][\w.]*)(?:\([^`]*\))?`", path)
+    called = [one for one in called if not one.endswith((".py", ".h"))]
+    assert len(called) > 60
+    for tree in PACKAGE.values():
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)):
+                words = ast.get_docstring(node) or ""
+                called += re.findall(r"``([A-Z]\w+\.[a-z_]\w+)``", words)
+                called += re.findall(r"\b([A-Z]{3,}_[A-Z_0-9]{2,}|(?<=``)[A-Z]{4,}(?=``))", words)
+    missing = [one for one in called if not set(one.split(".")) <= defined]
+    assert not missing
 
 
 def test_constants_have_two_words():

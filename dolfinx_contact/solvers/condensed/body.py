@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The body condensed to its contact nodes: W, the compliance of the nodes to each other's reactions."""
+"""The condensed problem of a body: compliance of the contact nodes, friction, and solution."""
 
 from __future__ import annotations
 
@@ -40,42 +40,47 @@ if TYPE_CHECKING:
     from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# Iterations for a loose body that seems to slide away, and for any other.
+# Iteration limits for a body held by contact alone: if it seems to slide away, and otherwise.
 FEW_ITERATIONS = 3000
 MANY_ITERATIONS = 6000
 
-# Compliance along a direction that a support prescribes, over that of free ones: with none the normal cone is too narrow.
+# Compliance along a direction that a support prescribes, relative to the mean compliance of free
+# directions: small, but not zero, since with zero compliance the normal cone would be too narrow.
 RIGID_COMPLIANCE = 1e-9
 
 
 class BoundCondensedNewton(BoundSolver):
-    """``w = q + W r`` of all contacts of a body, gathered from all ranks, along the principal axes.
+    """Condensed problem ``w = q + W r`` of all contacts of a body, gathered from all ranks.
 
-    ``W`` are the rows of ``K^-1`` at the contact nodes, by a factorisation of ``K`` and blocks of
-    sparse right-hand sides; it is held by rank 0 alone.  Directions that a boundary condition fixes have no friction here:
-    it moves nothing, and follows from the answer.  Where a support moves a node across its free direction, both take
-    part in the law, with next to no compliance along the prescribed one.  Without friction at any contact there are
-    normal components alone.  A body on soft springs is condensed with its anchors, see ``Anchors``: their
-    forces are unknowns behind the reactions, and what they move has to agree with them.  Last come the motions of
-    planes that force drives, see ``CondensedSurfaces``.
+    Components are along the principal axes of friction; if no contact has friction, there are only
+    normal components.  ``W`` is ``K^-1`` between the contact nodes, computed with a factorisation
+    of ``K`` and blocks of sparse right-hand sides; rank 0 alone stores it.
+
+    - Tangential directions that a boundary condition fixes have no friction in the condensed
+      problem: it moves nothing there, and is computed from the solution.  If a support moves a node
+      perpendicular to its one free tangential direction, the law includes both directions, with
+      nearly zero compliance along the prescribed one.
+    - A body on soft springs is condensed with regularisation springs, see ``Anchors``.  Their
+      forces are additional unknowns behind the reactions, with one equation each.
+    - The motions of surfaces driven by force are the last unknowns, see ``CondensedSurfaces``.
 
     Args:
-        options: ``CondensedNewton``, which solves the condensed problem.
-        step: The first step.
+        options: Options of the condensed solver.
+        step: The first load step.
 
     Raises:
-        MemoryError: on all ranks, if ``W`` and what Newton's method needs beside it would not fit.
+        MemoryError: on all ranks, if ``W`` and the work arrays of Newton's method would not fit.
     """
 
     def __init__(self, options: CondensedNewton, step: LoadStep):
         self._options, self.comm, self._body = options, step.body.comm, step.body
-        self._own = None  # factors, where the body has multigrid for a solver that goes first
+        self._own = None  # own factorisation, if the body uses multigrid
         self._kept: tuple[int, Responses] | None = None
         self._moved = [np.zeros(contact.points.count, dtype=bool) for contact in step.contacts]
         self._bind(step)
 
     def _bind(self, step: LoadStep) -> None:
-        """Set everything up for a step but what belongs to the stiffness alone.  Collective."""
+        """Set up the condensed problem for a load step; keep factorisations.  Collective."""
         self._stamps, self._contacts = step.stamps, step.contacts
         self.dim = components(step.contacts)
         self._held_by = self._body.anchors or self._body
@@ -83,7 +88,12 @@ class BoundCondensedNewton(BoundSolver):
         self._set_up(self._moved)
 
     def update(self, step: LoadStep) -> None:
-        """See ``BoundSolver``: ``W`` is along the principal directions, and has no slip without friction."""
+        """Set up anew the parts of the condensed problem that are out of date.  Collective.
+
+        ``W`` is set up anew if stiffness, frames, surface motions or the principal axes of friction
+        changed, or if the first friction was added or the last removed.  If only friction
+        coefficients changed, ``W`` is kept.
+        """
         new, old = step.stamps, self._stamps
         if new.stiffness != old.stiffness:
             self._free_factors()
@@ -102,7 +112,12 @@ class BoundCondensedNewton(BoundSolver):
         self.friction = joint_friction(laws, self._contacts, self.gather)
 
     def _set_up(self, moved: list[np.ndarray]) -> None:
-        """``W`` and the law, where supports move nodes across their free direction.  Collective."""
+        """Compute ``W`` and the friction of all nodes.  Collective.
+
+        Args:
+            moved: For each contact, the nodes that supports move perpendicular to their free
+                direction.
+        """
         body, contacts = self._body, self._contacts
         stiffness = [contact.stiffness for contact in contacts]
         guided = any(contact.points.along.any() for contact in contacts)
@@ -122,7 +137,8 @@ class BoundCondensedNewton(BoundSolver):
         self.operator, size = None, nodes.size
         with raised_together(self.comm):
             if self.comm.rank == 0:
-                # A direction that is fixed: W has no entry there, and its reaction is to stay zero.
+                # Fixed directions have zero rows in W; a diagonal entry keeps their reactions at
+                # zero.
                 inert = np.flatnonzero(~W.any(axis=0) & ~W.any(axis=1))
                 share = 1 - len(inert) / size
                 usual = np.diag(W)[:size].mean() / max(share, 1 / size)
@@ -134,17 +150,21 @@ class BoundCondensedNewton(BoundSolver):
                 if self._surfaces is not None:
                     W = self._surfaces.border(W, size)
                 self.operator = condensed_operator(W, self.dim, self._tied)
-                del W  # copied
+                del W  # the operator has a copy
                 slides = any(c.given.geometry.renews_rows for c in contacts)
-                if not slides:  # else the next solution has other rows
-                    self.operator.prepare()  # pays after some ten iterations
+                if not slides:  # else the next solution has different rows
+                    self.operator.prepare()  # worthwhile after about ten iterations
         self.friction = joint_friction(self._laws, self._contacts, self.gather)
         self._scales = self._gathered_stiffness(stiffness) | {
             "tied_stiffness": np.append(a, np.ones(driven))
         }
 
     def _condensed_surfaces(self, normal: np.ndarray):
-        """Surfaces that force drives, None where there are none.  Collective."""
+        """Return the ``CondensedSurfaces``; None if no surface is driven by force.  Collective.
+
+        Args:
+            normal: Normal stiffness of all nodes, force per length.
+        """
         if not any(contact.surface.motions for contact in self._contacts):
             return None
         from dolfinx_contact.solvers.condensed.surfaces import CondensedSurfaces
@@ -152,15 +172,15 @@ class BoundCondensedNewton(BoundSolver):
         return CondensedSurfaces(self._body, self._contacts, self._turns, normal)
 
     def _motions(self, step: LoadStep, force: np.ndarray) -> np.ndarray:
-        """Motions of surfaces that forces of all rows make."""
+        """Motions of driven surfaces for given forces of all rows, ``shape=(m,)``."""
         return step.no_motions if self._surfaces is None else self._surfaces.moved(force)
 
     def _driving(self, step: LoadStep, c: np.ndarray) -> np.ndarray:
-        """Forces that drive the surfaces of the tied rows."""
+        """Driving forces of the tied rows of surfaces, at surface motions ``c``."""
         return np.zeros(0) if self._surfaces is None else self._surfaces.driving(step, c)
 
     def close(self) -> None:
-        """Free the factors.  Collective."""
+        """Free the factorisation.  Collective."""
         self._free_factors()
 
     def _free_factors(self) -> None:
@@ -169,7 +189,7 @@ class BoundCondensedNewton(BoundSolver):
         self._own = self._kept = None
 
     def _factors(self) -> Any:
-        """What has the linear solver for many right-hand sides as its ``ksp``.  Collective."""
+        """Return an object whose ``ksp`` solves for many right-hand sides.  Collective."""
         if not self._body.crowded or self._body.exact:
             return self._held_by
         if self._own is None:
@@ -178,7 +198,7 @@ class BoundCondensedNewton(BoundSolver):
         return self._own
 
     def _acting(self, moved: list[np.ndarray]) -> list[Friction]:
-        """Friction of each contact as it acts on this problem.  Collective."""
+        """Friction of each contact in the condensed problem, see ``acting``.  Collective."""
         laws = [acting(*both) for both in zip(self._contacts, moved)]
         if not self._shared:
             return laws
@@ -187,7 +207,7 @@ class BoundCondensedNewton(BoundSolver):
         return mean_laws(laws, self._contacts)
 
     def _any_shared(self) -> bool:
-        """Whether any node of any rank belongs to several contacts.  Collective."""
+        """Whether any node on any rank belongs to several contacts.  Collective."""
         if len(self._contacts) < 2:
             return False
         from dolfinx_contact.contact.shared import any_shared
@@ -195,14 +215,18 @@ class BoundCondensedNewton(BoundSolver):
         return any_shared(self._contacts)
 
     def _begun(self, step: LoadStep) -> tuple[np.ndarray, np.ndarray]:
-        """The displacement without reactions, and surfaces near it; set up anew if supports move other nodes.  Collective."""
+        """Return contact-free displacement and nearby motions of driven surfaces.  Collective.
+
+        If supports move other nodes perpendicular to their free direction than before, the
+        condensed problem is set up anew.
+        """
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
         c = step.no_motions if self._surfaces is None else self._surfaces.begun(step, free)
         if self._guided:
             now = [moved_across(contact, contact.at(free, c)) for contact in step.contacts]
             if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):
                 self._set_up(now)
-                if self._surfaces is not None:  # made anew
+                if self._surfaces is not None:  # it was set up anew
                     c = self._surfaces.begun(step, free)
         return free, c
 
@@ -213,26 +237,31 @@ class BoundCondensedNewton(BoundSolver):
         start: StepState | None = None,
         fallbacks: bool = True,
     ) -> SolverResult:
-        """One load step by Newton's method on the condensed problem.
+        """Solve a load step by Newton's method on the condensed problem; return the best state.
 
         Args:
-            step: The ``LoadStep``.
-            starts: q and forces of all rows of earlier steps, and how many of these are tied.
+            step: The load step.
+            starts: For each earlier step: ``q``, forces of all rows, and number of tied rows.
             start: Not used: reactions of earlier steps are better starts.
-            fallbacks: Whether a body that may slide is searched by all methods where Newton's fails.
+            fallbacks: Whether to try all methods if Newton's method fails for a body or surface
+                that may slide.
         """
-        self._until = perf_counter() + self._options.max_seconds  # of all searches together
-        held, first, (free, c) = self._held_by.solve, self.dim * self.nodes, self._begun(step)
+        self._until = perf_counter() + self._options.max_seconds  # common limit of all searches
+        held, first, (free, c) = (
+            self._held_by.solve,
+            self.dim * self.nodes,
+            self._begun(step),
+        )
         acting, anchors = self._body.norm(step.external), slice(first, first + self._anchored)
         q = rows = self._motion(step, free, c)
         placed, near = np.zeros(q.size), _similar_starts(q, starts, self._surfaces)
         if step.statics is not None:
             q, placed, near = self._placed(step, free, c, near)
         iterations, error, rounding, best, state = 0, np.inf, 0.0, None, None
-        base, known = free, np.zeros(q.size)  # a displacement, and the forces of all rows in it
-        for factor in (0.1, 1e-2, 1e-2, 1e-3):  # this error is not quite the condensed problem's
+        base, known = free, np.zeros(q.size)  # a displacement, and the row forces that it includes
+        for factor in (0.1, 1e-2, 1e-2, 1e-3):  # the errors of step and condensed problem differ
             previous = error
-            for limits in _searches(step, fallbacks):
+            for limits in _search_options(step, fallbacks):
                 goal, given = factor * step.tol, [one - placed for one in near]
                 limits = limits or self._limited(step, state)
                 result = self._reactions(step, q + rounding, goal, given, acting, limits)
@@ -247,14 +276,16 @@ class BoundCondensedNewton(BoundSolver):
             if best is not None and not error < previous:
                 break
             change = result.change
-            if self._shared and error <= step.tol < change:  # moves reactions within nodes, too
+            # the change includes shifts of reactions between contacts that share a node
+            if self._shared and error <= step.tol < change:
                 change = min(change, _next_change(state))
             best = state, force, result, change
             lost = step.may_slide and result.error > max(ASTRAY_ERROR, goal)
             if lost or max(error, change) <= step.tol:
                 break
-            # From here on by differences, of which no digit is lost: what is left of equilibrium, then slip and
-            # gap of the body itself in place of those by W, which a long lever or a soft support makes large.
+            # Iterative refinement without loss of digits: correct the residual of equilibrium, then
+            # replace slip and gap by the body's own values; with long levers or soft supports,
+            # those from W are inaccurate.
             left = step.b + self._nodal(force) - self._held_by.multiply(state.x)
             left[self._body.fixed] = 0.0
             base, known, near = state.x + held(left), force, [force]
@@ -264,7 +295,7 @@ class BoundCondensedNewton(BoundSolver):
         state, force, result, change = best
         forward = max(change, state.errors.largest)
         found = state, iterations, forward, SolverName.CONDENSED_NEWTON, result.tried
-        kept = fallbacks or forward <= step.tol  # else another search follows, from the same steps
+        kept = fallbacks or forward <= step.tol  # else another search starts from the same data
         return SolverResult(*found, start=(rows, force, self._tied) if kept else None)
 
     def _measured(
@@ -275,14 +306,23 @@ class BoundCondensedNewton(BoundSolver):
         reaction: np.ndarray,
         before: StepState | None,
     ) -> StepState:
-        """The state of a displacement, to which forces of all rows and reactions belong.  Collective."""
+        """Evaluate the state at a displacement; report it to the monitor.  Collective.
+
+        Args:
+            step: The load step.
+            x: Displacement of owned degrees of freedom.
+            force: Forces of all rows at this displacement.
+            reaction: Reactions of all nodes, along the principal axes.
+            before: The previous state, or None.
+        """
         near = self._shares(reaction) if self._shared else None
         state = step.measure(x, c=self._motions(step, force), before=before, near=near)
         step.tell(state)
         return state
 
     def _limited(self, step: LoadStep, state: StepState | None) -> dict:
-        """Limits of the search for a loose body, none for others.  Collective."""
+        """Iteration limit of a body held by contact alone; else an empty dictionary.
+        Collective."""
         if step.statics is None:
             return {}
         most = (
@@ -291,7 +331,14 @@ class BoundCondensedNewton(BoundSolver):
         return {"max_iterations": min(most, self._options.max_iterations or most)}
 
     def _shares(self, reaction: np.ndarray) -> list[np.ndarray]:
-        """The reactions of each contact: at nodes of several ``x`` tells no more than the sums."""
+        """Reactions of this rank's nodes for each contact, local frame.
+
+        If a node belongs to several contacts, the displacement determines only the sum of its
+        reactions.
+
+        Args:
+            reaction: Reactions of all nodes of all ranks, along the principal axes.
+        """
         counts = self.comm.allgather(len(self._turns))
         first = sum(counts[: self.comm.rank])
         mine = reaction[first : first + len(self._turns)]
@@ -302,13 +349,18 @@ class BoundCondensedNewton(BoundSolver):
     def _placed(
         self, step: LoadStep, free: np.ndarray, c: np.ndarray, starts: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, list]:
-        """Of a loose body: q where it stands at first, the forces of all rows that hold it there, and starts moved there."""
+        """Move a body held by contact alone to its start position.
+
+        Returns:
+            ``q`` at the start position; the forces of all rows that hold the body there; and the
+            initial forces of earlier steps, adapted to this position.
+        """
         first, stiffness = self.dim * self.nodes, self._scales["tied_stiffness"]
         anchors, rows = slice(first, first + self._anchored), self._parts[1]
         placed, moved = np.zeros((2, first + self._tied))
         held = rows.of(step.statics.start)
         placed[anchors] = stiffness[: self._anchored] * held
-        if starts:  # of the last one anchors tell where it left the body
+        if starts:  # the anchor forces of the last step give the body's position after it
             moved[anchors] = placed[anchors] - starts[0][anchors]
         q = self._motion(step, self.displacement(free, placed), c)
         q[anchors] -= held
@@ -316,7 +368,7 @@ class BoundCondensedNewton(BoundSolver):
         return q, placed, starts + [step.statics.share() * last for last in starts[:1]]
 
     def compliance(self) -> np.ndarray:
-        """Motion of all rows by a unit force on each, on rank 0; an empty array on the others.  Collective."""
+        """Compliance matrix between all rows on rank 0, empty on other ranks.  Collective."""
         changes = any(contact.given.changes for contact in self._contacts)
         if changes and not self._body.nonlinear:
             kept = self._responses()
@@ -325,7 +377,10 @@ class BoundCondensedNewton(BoundSolver):
         return compliance(self._factors(), self._parts)
 
     def _responses(self) -> Responses:
-        """Columns of ``K^-1`` that rows whose frames or nodes change have needed so far, of the present stiffness.  Collective."""
+        """Return the cached columns of ``K^-1`` for the present stiffness.  Collective.
+
+        They are used if frames or nodes of the contacts change between solutions.
+        """
         if self._kept is None or self._kept[0] != self._stamps.stiffness:
             reach = [contact.points.reach for contact in self._contacts]
             anchored = self._parts[1].sums.indices
@@ -334,7 +389,7 @@ class BoundCondensedNewton(BoundSolver):
         return self._kept[1]
 
     def _rows(self) -> Rows:
-        """One row per local direction of a node: its global components, none at fixed dofs."""
+        """Rows of the contact nodes: one per direction, zero at constrained degrees of freedom."""
         gdim, body = self._contacts[0].points.dim, self._body
         free = np.ones(body.size, dtype=bool)
         free[body.fixed] = False
@@ -349,7 +404,12 @@ class BoundCondensedNewton(BoundSolver):
         return Rows(self.comm, *both, points.first, body.size)
 
     def _prescribed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Tangential rows of nodes that supports move in one direction, and that direction's dyads, in the order of rows."""
+        """Tangential directions that supports prescribe at nodes with one free direction.
+
+        Returns:
+            Indices of the two tangential rows of each such node, ``shape=(k, 2)``; and the dyad of
+            the prescribed direction, ``shape=(k, 2, 2)``, along the principal axes.
+        """
         if self.dim < 3:
             return np.zeros((0, 2), int), np.zeros((0, 2, 2))
         moved, across = np.concatenate(self._moved), []
@@ -362,7 +422,7 @@ class BoundCondensedNewton(BoundSolver):
         return first[:, None] + np.arange(2), self.gather(turned[:, :, None] * turned[:, None, :])
 
     def _anchor_rows(self) -> Rows:
-        """One row per anchor."""
+        """Rows of the anchors, one for the degree of freedom of each regularisation spring."""
         dofs = self._body.anchors.dofs if self._body.anchors else np.zeros(0, int)
         size, first, whole = self._body.displacements.owned
         rows = (np.ones(dofs.size), first + dofs, np.arange(dofs.size + 1))
@@ -370,7 +430,16 @@ class BoundCondensedNewton(BoundSolver):
         return Rows(self.comm, sparse.eye(dofs.size, format="csr"), sums, first, size)
 
     def _motion(self, step: LoadStep, displacement: np.ndarray, c: np.ndarray) -> np.ndarray:
-        """Slip and gap of all nodes, motion of the anchors, and forces that drive planes, at a displacement."""
+        """Values of all rows at a displacement, on all ranks.
+
+        These are slip and gap of all nodes along the principal axes, displacements of the anchors,
+        and driving forces of the surfaces.
+
+        Args:
+            step: The load step.
+            displacement: Displacement of owned degrees of freedom.
+            c: Motions of driven surfaces.
+        """
         rows = [np.zeros((0, self._turns.shape[2]))]
         for contact, moved in zip(step.contacts, self._moved):
             state = contact.at(displacement, c)
@@ -382,13 +451,13 @@ class BoundCondensedNewton(BoundSolver):
         return np.concatenate((nodes.gather(local), held, self._driving(step, c)))
 
     def displacement(self, base: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Displacement of owned dofs with more forces of all rows than ``base`` has."""
+        """Displacement ``base`` plus the response to forces of all rows; owned dofs."""
         correction = self._held_by.solve(self._nodal(force))
         correction[self._body.fixed] = 0.0
         return base + correction
 
     def _nodal(self, force: np.ndarray) -> np.ndarray:
-        """Forces of all rows on owned degrees of freedom; those of surfaces act on no node."""
+        """Nodal forces on owned dofs for forces of all rows; surface rows load no node."""
         forces, start = np.zeros(self._body.size), 0
         for part in self._parts:
             part.add_forces(force[start : start + part.size], forces)
@@ -404,7 +473,16 @@ class BoundCondensedNewton(BoundSolver):
         acting: float,
         limits: dict,
     ):
-        """The condensed problem solved on rank 0; its result, the best one if it failed, on all ranks."""
+        """Solve the condensed problem on rank 0; return the best result on all ranks.
+
+        Args:
+            step: The load step, with its monitor.
+            q: Values of all rows without forces.
+            tol: Largest error.
+            starts: Initial forces of all rows.
+            acting: Norm of the external forces.
+            limits: Options that replace the solver's own.
+        """
         left = max(self._until - perf_counter(), 1e-9)
         options = replace(self._options, **limits | {"max_seconds": left})
 
@@ -418,11 +496,16 @@ class BoundCondensedNewton(BoundSolver):
     # -- gathered from all ranks -----------------------------------------------------------------
 
     def gather(self, local: np.ndarray) -> np.ndarray:
-        """Rows of all nodes, in the order of ranks and contacts, on all ranks."""
+        """Concatenate nodal rows of all ranks, in the order of ranks and contacts, on all ranks."""
         return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
 
     def _gathered_stiffness(self, stiffness: Sequence[NodalStiffness]) -> dict[str, np.ndarray]:
-        """Normal and tangential blocks of all nodes along the principal axes, for rank 0's errors."""
+        """Nodal stiffness of all ranks along the principal axes, force per length.
+
+        Returns:
+            A dictionary with ``stiffness``, ``shape=(n,)``, and with friction
+            ``tangential_stiffness``, ``shape=(n, dim - 1, dim - 1)``.
+        """
         gathered = {"stiffness": self.gather(np.concatenate([k.normal for k in stiffness]))}
         if self.dim > 1:
             blocks = np.concatenate([k.tangential for k in stiffness])
@@ -432,13 +515,16 @@ class BoundCondensedNewton(BoundSolver):
         return gathered
 
 
-def _searches(step: LoadStep, fallbacks: bool) -> tuple[dict, ...]:
-    """Options of one search after another: where something may slide Newton's method alone first."""
+def _search_options(step: LoadStep, fallbacks: bool) -> tuple[dict, ...]:
+    """Options of the successive searches of a load step.
+
+    If the body or a surface may slide, the first search uses Newton's method only.
+    """
     return ({"fallbacks": False}, {})[: 1 + fallbacks] if step.may_slide else ({},)
 
 
 def moved_across(contact: ContactStep, state: State) -> np.ndarray:
-    """Nodes that supports move in one tangential direction and leave free in the other, ``shape=(n,)``."""
+    """Whether supports prescribe only one tangential direction and move it, ``shape=(n,)``."""
     points, moved = contact.points, np.zeros(contact.points.count, dtype=bool)
     rows = points.supported
     moved[rows] = points.along.any(axis=1) & contact.known_slip(state)[rows].any(axis=1)
@@ -446,7 +532,15 @@ def moved_across(contact: ContactStep, state: State) -> np.ndarray:
 
 
 def acting(contact: ContactStep, moved: np.ndarray) -> Friction:
-    """Friction along the directions that supports leave free; of nodes ``moved`` across them, that of both directions."""
+    """Friction of a contact as it acts in the condensed problem.
+
+    It acts only along the tangential directions that supports leave free.  At nodes that supports
+    move perpendicular to their free direction, it acts along both.
+
+    Args:
+        contact: The contact.
+        moved: Nodes that supports move perpendicular to their free direction, ``shape=(n,)``.
+    """
     free, whole = contact.free_friction, contact.friction
     if free is whole or not moved.any():
         return free
@@ -464,7 +558,18 @@ def _next_change(state: StepState) -> float:
 def _similar_starts(
     q: np.ndarray, starts: Sequence[Any], surfaces: CondensedSurfaces | None
 ) -> list[np.ndarray]:
-    """Reactions to start from: last step's, extrapolated, those of the most similar step, and last step's with the change that led to the most similar one."""
+    """Initial forces of all rows, computed from earlier load steps.
+
+    The list contains the forces of the last step; their linear extrapolation; with a driven
+    surface, the forces of the last step scaled to the new driving force; the forces of the step
+    with the most similar ``q``; and the forces of the last step plus the change in that similar
+    step.
+
+    Args:
+        q: Values of all rows without forces in the present step.
+        starts: For each earlier step: ``q``, forces of all rows, and number of tied rows.
+        surfaces: The driven surfaces, or None.
+    """
     past = [(a, b) for a, b, _ in starts if a.size == q.size]
     if not past:
         return []
@@ -472,7 +577,7 @@ def _similar_starts(
     before = past[-2][1] if len(past) > 1 else 0.0  # nothing acted before the first step
     near = [last[1], 2 * last[1] - before]
     tied = 0 if surfaces is None else surfaces.tied
-    if tied and last[0][-1] * q[-1] > 0.0:  # in balance with the new weight
+    if tied and last[0][-1] * q[-1] > 0.0:  # in equilibrium with the new driving force
         near.append(q[-1] / last[0][-1] * last[1])
     scale, others = np.abs(q[: q.size - tied]).max(), np.array([other for other, _ in past])
     distances = surfaces.distances(others, q) if tied else np.abs(others - q).max(axis=1)

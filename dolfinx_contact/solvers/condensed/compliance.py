@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The compliance of a body at its contact nodes: rows of the inverse of its stiffness."""
+"""Compliance of a body at its contact nodes: rows of the inverse of its stiffness."""
 
 from __future__ import annotations
 
@@ -19,21 +19,34 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.petsc.linear_solver import LinearSolver
 
-UNFELT_PART = 1e-10  # of a motion is what no node feels, over the largest one
-_BLOCK_SIZE = 256  # right-hand sides at a time: more gain nothing, and cost memory
-_COLUMN_COUNT = 60  # of A^-1 at a time, of whole nodes in two and three dimensions
-_MUMPS_BLOCK = 27, 128  # of which MUMPS takes so many at once, by default 32
+# Singular value, relative to the largest, below which a motion of the anchors moves no contact
+# node.
+UNFELT_PART = 1e-10
+
+# Number of right-hand sides per solve: more give no speed-up, and cost memory.
+_BLOCK_SIZE = 256
+
+# Number of columns of A^-1 computed at a time: complete nodes in two and three dimensions.
+_COLUMN_COUNT = 60
+
+# MUMPS parameter ICNTL(27), the number of right-hand sides that MUMPS solves at once (by default
+# 32), and its value.
+_MUMPS_BLOCK = 27, 128
 
 
 class Rows:
-    """Linear functionals of the displacement, in the order of ranks; all of them are known to every rank.
+    """Linear functionals of the displacement: one row per local direction of a contact node.
+
+    The rows are ordered by rank.  Every rank stores all rows, as the product of two sparse
+    matrices.
 
     Args:
         comm: MPI communicator.
-        directions: This rank's are the product of these, sparse, ``shape=(k, l)``, and of ``sums``.
-        sums: Sparse, ``shape=(l, dofs)``, columns in global numbers of degrees of freedom.  Collective.
+        directions: First factor of this rank's rows, sparse, ``shape=(k, l)``.
+        sums: Second factor, sparse, ``shape=(l, dofs)``, columns in global numbers of degrees of
+            freedom. Collective.
         first: Global number of this rank's first degree of freedom.
-        owned: Number of its degrees of freedom.
+        owned: Number of degrees of freedom that this rank owns.
     """
 
     def __init__(
@@ -58,35 +71,38 @@ class Rows:
 
     @property
     def all(self) -> sparse.csr_matrix:
-        """All of them, columns in global numbers of degrees of freedom."""
+        """All rows of all ranks, sparse, ``shape=(size, dofs)``, columns in global numbers."""
         return (self.directions @ self.sums).tocsr()
 
     def part(self, u: np.ndarray) -> np.ndarray:
-        """What this rank's displacements, ``shape=(dofs, ...)``, add to the values of all rows."""
+        """Contribution of this rank's displacements, ``shape=(dofs, ...)``, to all row values."""
         return self.directions @ (self._mine @ u)
 
     def of(self, u: np.ndarray) -> np.ndarray:
-        """Values of all rows for displacements of owned dofs, on all ranks.  Collective."""
+        """Values of all rows for a displacement of owned degrees of freedom, on all ranks.
+        Collective."""
         return self.comm.allreduce(self.part(u))
 
     def add_forces(self, force: np.ndarray, forces: np.ndarray) -> None:
-        """Add what a force on each row is on owned degrees of freedom."""
+        """Add the nodal forces of a force on each row to ``forces`` on owned degrees of freedom."""
         forces += self._mine.T @ (self.directions.T @ force)
 
     def gather(self, local: np.ndarray) -> np.ndarray:
-        """Values that ranks have for their own rows, on all ranks.  Collective."""
+        """Concatenate the values that each rank has for its own rows, on all ranks.  Collective."""
         return np.concatenate(self.comm.allgather(np.ascontiguousarray(local)))
 
 
 def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
-    """Motion of all rows by a unit force on each, ``A^-1`` between them.
+    """Compliance matrix ``W = B A^-1 B^T``, where ``B`` are the rows.  Collective.
+
+    Entry ``(i, j)`` is the displacement along row ``i`` under a unit force along row ``j``.
 
     Args:
-        solver: What has the PETSc solver of ``A`` as its ``ksp``.
-        rows: In the order of the result.
+        solver: Object with the PETSc solver of ``A`` as its ``ksp``.
+        rows: Groups of rows, in the order of the result.
 
     Returns:
-        Symmetric, on rank 0; an empty array on the others.  Collective.
+        Symmetric matrix on rank 0; an empty array on the other ranks.
     """
     comm, size = rows[0].comm, sum(part.size for part in rows)
     loads = sparse.vstack([part.all for part in rows]).tocsr()
@@ -97,7 +113,8 @@ def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
         answer = solve_block(loads[block])  # (owned dofs, right-hand sides)
         found = comm.reduce(np.concatenate([part.part(answer) for part in rows]), root=0)
         if comm.rank == 0:
-            # Symmetric, but not to the last bit as it is computed: the mean of both halves.
+            # Rounding makes the computed matrix slightly unsymmetric: take the mean with its
+            # transpose.
             found[block] = (found[block] + found[block].T) / 2
             found[:start] = (found[:start] + W[block, :start].T) / 2
             W[:, block], W[block, :start] = found, found[:start].T
@@ -105,24 +122,27 @@ def compliance(solver: Any, rows: list[Rows]) -> np.ndarray:
 
 
 def one_below_other(parts: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
-    """Sparse matrices one below the other; none is copied if the others have no rows."""
+    """Stack sparse matrices vertically; without a copy if only one of them has rows."""
     some = [part for part in parts if part.shape[0]] or parts[:1]
     return some[0] if len(some) == 1 else sparse.vstack(some).tocsr()
 
 
 def along_diagonal(parts: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
-    """Sparse matrices along a diagonal; none is copied if the others have no rows."""
+    """Return the block-diagonal sparse matrix; without a copy if only one block has rows."""
     some = [part for part in parts if part.shape[0]] or parts[:1]
     return some[0] if len(some) == 1 else sparse.block_diag(some, "csr")
 
 
 class Responses:
-    """``A^-1`` between the degrees of freedom that rows may ever have, solved for a block of columns at a time when rows need it.
+    """Cached columns of ``A^-1`` for contacts whose rows change between solutions.
 
-    Rows of curved and turning surfaces change with their frames, those of deformable ones as bodies slide; ``A`` stays.  Blocks do not depend on who asked first, so that W does not.
+    The rows change with the frames of curved and rotating surfaces, and when deformable bodies
+    slide; ``A`` does not.  Blocks of columns are computed when rows first need them.  The division
+    into blocks is fixed, so that ``W`` does not depend on the order of requests.
 
     Args:
-        dofs: Global numbers, sorted, the same on all ranks, ``shape=(m,)``.
+        dofs: Global numbers of all degrees of freedom that rows may involve, sorted, the same on
+            all ranks, ``shape=(m,)``.
     """
 
     def __init__(self, dofs: np.ndarray):
@@ -130,16 +150,25 @@ class Responses:
         self._blocks: dict[int, np.ndarray] = {}  # on rank 0, (m, columns)
 
     def needed(self, rows: list[Rows]) -> list[int]:
-        """Blocks that these rows need."""
+        """Indices of the blocks of columns that the rows need."""
         dofs = np.concatenate([part.sums.indices for part in rows])
         return np.unique(np.searchsorted(self.dofs, dofs) // _COLUMN_COUNT).tolist()
 
     def bytes_needed(self, rows: list[Rows]) -> int:
-        """Bytes of the blocks with those of these rows."""
+        """Memory of the computed blocks together with the blocks that the rows need, bytes."""
         return 8 * self.dofs.size * _COLUMN_COUNT * len(self._solved.union(self.needed(rows)))
 
     def compliance(self, solver: Any, rows: list[Rows]) -> np.ndarray:
-        """As the function of this name: sums of displacements first, which have few entries, then their directions."""
+        """Compliance matrix of the rows from the cached columns, computing missing ones.
+        Collective.
+
+        Args:
+            solver: Object with the PETSc solver of ``A`` as its ``ksp``.
+            rows: Groups of rows, in the order of the result.
+
+        Returns:
+            Symmetric matrix on rank 0; an empty array on the other ranks.
+        """
         comm, needed = rows[0].comm, self.needed(rows)
         self._solve(solver, comm, [k for k in needed if k not in self._solved])
         if comm.rank > 0:
@@ -150,7 +179,7 @@ class Responses:
         R = sparse.csr_matrix((sums.data, at, sums.indptr), (size, self.dofs.size))
         moved = np.zeros(
             (len(needed) * _COLUMN_COUNT, size)
-        )  # sums by unit forces at what they need
+        )  # values of the sums under unit forces
         for k, first in zip(needed, range(0, len(moved), _COLUMN_COUNT)):
             block = self._blocks[k]
             moved[first : first + block.shape[1]] = (R @ block).T
@@ -160,7 +189,7 @@ class Responses:
         return (W + W.T) / 2
 
     def _solve(self, solver: LinearSolver, comm: MPI.Comm, blocks: list[int]) -> None:
-        """Add blocks of columns.  Collective."""
+        """Compute blocks of columns of ``A^-1``; rank 0 stores them.  Collective."""
         A = solver.ksp.getOperators()[0]
         first, last = A.getOwnershipRange()
         mine = (self.dofs >= first) & (self.dofs < last)
@@ -179,10 +208,18 @@ class Responses:
 
 
 def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
-    """Make rows of anchors of ``W``, behind ``size`` rows of nodes, those of the forces that undo these springs.
+    """Modify the anchor rows of ``W`` in place, so that their unknowns cancel the anchor springs.
 
-    Where all springs are at motions without energy their block has to vanish.  What is left for it is put along motions
-    of the anchors that no node feels, which keeps those where they are.
+    If all springs restrain motions without elastic energy, the diagonal block of the anchors must
+    vanish.  Only the part along anchor motions that move no contact node is set, which fixes these
+    motions.
+
+    Args:
+        W: Compliance: ``size`` rows of nodes, then the rows of the anchors (regularisation
+            springs).
+        size: Number of rows of nodes.
+        a: Stiffness of the anchor springs, force per length.
+        loose: Whether all springs restrain motions without elastic energy.
     """
     last = slice(size, len(W))
     W[last, last] -= np.diag(1 / a)
@@ -195,21 +232,28 @@ def tie(W: np.ndarray, size: int, a: np.ndarray, loose: bool) -> None:
 
 
 def bytes_needed(nodes: int, dim: int, unknowns: int) -> int:
-    """Bytes that W and its inverse take, with what is needed beside them: an upper bound, docs/solvers.md.
+    """Upper bound of the memory for ``W``, its inverse and work arrays, bytes.
 
-    W is copied once; with its inverse it then needs a third of that, and a Jacobian with its factors the rest.  Beside W, solving for a block was measured
-    to take six times what its solutions take.
+    ``W`` with its copy or inverse and a Jacobian with its factors take up to three times the memory
+    of ``W``. See docs/solvers.md.  Solving for a block of columns was measured to take six times
+    the memory of its solutions.
+
+    Args:
+        nodes: Number of contact nodes.
+        dim: Number of components per contact node.
+        unknowns: Number of degrees of freedom of the body.
     """
     return 8 * (3 * (nodes * dim) ** 2 + 6 * _BLOCK_SIZE * unknowns)
 
 
 def available_first(comm: MPI.Comm) -> float:
-    """What rank 0 has free, which holds W, on all ranks.  Collective."""
+    """Free memory of rank 0, which stores ``W``, bytes; the same value on all ranks.
+    Collective."""
     return comm.bcast(free_memory() if comm.rank == 0 else None)
 
 
 def fits(comm: MPI.Comm, nodes: int, dim: int, unknowns: int) -> bool:
-    """Whether W would fit into half of the memory that rank 0 has free."""
+    """Whether ``W`` would fit into half of the free memory of rank 0.  Collective."""
     return 2 * bytes_needed(nodes, dim, unknowns) <= available_first(comm)
 
 
@@ -223,14 +267,14 @@ def check_memory(comm: MPI.Comm, needed: int) -> None:
 
 
 def block_solver(ksp: PETSc.KSP):
-    """A function that solves for blocks of sparse right-hand sides with the solver of ``ksp``.
+    """Return a function that solves for blocks of sparse right-hand sides with ``ksp``.
 
-    With MUMPS the block goes to it as it is, which leaves out the zeros of the right-hand sides in
-    the forward substitution; any other solver takes one column after another.
+    MUMPS solves for the whole block and skips the zeros of the right-hand sides in the forward
+    substitution; any other solver solves for one column after another.
 
     Returns:
-        ``solve(rows)``: a right-hand side a row, sparse, columns in global numbers, the same on all ranks.  Gives
-        ``shape=(owned dofs, k)``.
+        A function ``solve(rows)``.  Each sparse row is a right-hand side, columns in global
+        numbers, the same on all ranks.  The result has ``shape=(owned dofs, k)``.
     """
     A = ksp.getOperators()[0]
     comm, (owned, size) = A.comm, A.getSizes()[0]
@@ -239,7 +283,8 @@ def block_solver(ksp: PETSc.KSP):
 
     def by_block(rows: Any):
         count = rows.shape[0]
-        # MUMPS wants all of a sparse right-hand side on the first rank, row by row its transpose.
+        # MUMPS requires a sparse right-hand side on the first rank, as the transpose of a row-wise
+        # matrix.
         mine = comm.rank == 0
         transposed = PETSc.Mat().createAIJ(
             ((count if mine else 0, count), (size if mine else 0, size)),
@@ -254,7 +299,7 @@ def block_solver(ksp: PETSc.KSP):
         result = np.empty((owned, count), order="F")
         answer = PETSc.Mat().createDense(((owned, size), (None, count)), array=result, comm=comm)
         answer.assemble()
-        if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen how many at once
+        if factors.getMumpsIcntl(_MUMPS_BLOCK[0]) < 0:  # the user has not chosen this number
             factors.setMumpsIcntl(*_MUMPS_BLOCK)
         factors.matSolve(rhs, answer)
         for matrix in (rhs, transposed, answer):

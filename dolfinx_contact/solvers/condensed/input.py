@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The arrays of a condensed problem, checked."""
+"""Checks of the input arrays of a condensed problem."""
 
 from __future__ import annotations
 
@@ -18,12 +18,22 @@ if TYPE_CHECKING:
 
     from dolfinx_contact.contact.contact_step import ContactStep
 
-# Compliance over the mean one that counts as none, as the kernel has it (Tuning::negligible).
+# Compliance, relative to the mean one, that counts as zero; the same value as the kernel's
+# Tuning::negligible.
 NEGLIGIBLE_COMPLIANCE = 1e-14
 
 
 def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
-    """``q``, ``W`` and ``r0`` as arrays of numbers that belong together, and a ``Friction`` with them."""
+    """Check the input of ``solve_condensed``; return ``q``, ``W``, a ``Friction`` and ``r0``.
+
+    Returns:
+        ``q``, ``shape=(n, dim)``; ``W``, ``shape=(dim n, dim n)``; the ``Friction``; and ``r0``, an
+        array of the size of ``q`` or None.
+
+    Raises:
+        ValueError: an array has the wrong shape, is not real and finite, or does not fit the
+            others.
+    """
     q = finite("q", q)
     dim = q.shape[1] if q.ndim == 2 else 3
     if dim not in (2, 3) or q.ndim not in (1, 2) or q.size % dim:
@@ -79,7 +89,12 @@ def checked_problem(q: ArrayLike, W: Any, friction: Any, r0: Any) -> tuple:
 
 
 def checked_compliance(W: Any) -> np.ndarray:
-    """``W`` as an array, that of the user if it is of the type; a sparse one with its zeros."""
+    """Return ``W`` as a dense array, without a copy if possible.
+
+    Raises:
+        ValueError: ``W`` is not real and finite.
+        MemoryError: a sparse ``W`` is too large for a dense array and its factors.
+    """
     if not hasattr(W, "tocsc"):
         return finite("W", W, copy=False)
     needed, free = 8 * 5 * W.shape[0] * W.shape[1], free_memory()
@@ -92,18 +107,20 @@ def checked_compliance(W: Any) -> np.ndarray:
 
 
 def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
-    """Whether it is proved that a gap is negative, whatever the reactions.
+    """Whether the condensed problem is proved infeasible: for all reactions, a gap is negative.
 
-    That is so if there are pressures ``y >= 0`` with ``W^T y = 0`` and ``q . y < 0``: then ``y . w = q . y + (W^T y) . r < 0`` (Farkas' lemma).
-    They are sought by nonnegative least squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974)].  What rounding leaves of
-    ``W^T y`` counts for reactions up to the largest that the kernel's judge takes for a solution.
+    This holds if there are pressures ``y >= 0`` with ``W^T y = 0`` and ``q . y < 0``: then
+    ``y . w = q . y + (W^T y) . r < 0`` (Farkas' lemma).  They are computed by non-negative least
+    squares [C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974)].  Because ``W^T y``
+    is zero only up to rounding, the proof covers reactions up to the largest ones that the kernel
+    accepts in a solution.
 
     Args:
-        W: ``shape=(dim n, dim n)``, with the normal component of a contact last.
-        q: ``shape=(n, dim)``.
+        W: Compliance, ``shape=(dim n, dim n)``, the normal component of a contact last.
+        q: Displacement without reactions, ``shape=(n, dim)``.
         tol: Largest error of a solution, relative to the load.
     """
-    from scipy.optimize import nnls  # a large module, for what is refused alone
+    from scipy.optimize import nnls  # a large module, needed only here
 
     dim, gaps, eps = q.shape[1], q[:, -1], np.finfo(float).eps
     columns = W[dim - 1 :: dim].T
@@ -114,22 +131,24 @@ def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
     except RuntimeError:  # too many iterations
         return False
     own = W.diagonal()[dim - 1 :: dim]
-    own = np.maximum(own, NEGLIGIBLE_COMPLIANCE * own.mean() or 1.0)  # as the kernel has it
+    own = np.maximum(own, NEGLIGIBLE_COMPLIANCE * own.mean() or 1.0)  # as in the kernel
     load = np.linalg.norm(np.column_stack((q[:, :-1], np.minimum(gaps, 0))) / own[:, None])
     moved = np.linalg.norm(columns @ y) + eps * np.linalg.norm(np.abs(columns) @ y)
-    allowed = math.sqrt(tol) * load * (own @ y)  # the judge would allow tol of it
+    allowed = math.sqrt(tol) * load * (own @ y)  # the kernel accepts an error of tol
     return bool(-gaps @ y > moved * load / math.sqrt(eps) + allowed)
 
 
 def joint_friction(
     laws: Sequence[Friction], contacts: Sequence[ContactStep], gather: Callable
 ) -> Friction:
-    """The law of all nodes; contacts with the same coefficients stay one uniform law.
+    """Combine the friction of all contacts in one ``Friction`` with coefficients for each node.
+
+    If all contacts have the same coefficients, the result is one uniform law.
 
     Args:
         laws: Friction of each contact.
-        contacts: The contacts of a body.
-        gather: Function that gathers rows of nodes from all ranks.  Collective.
+        contacts: The contacts of the body.
+        gather: Function that gathers nodal rows from all ranks.  Collective.
     """
     first = laws[0]
     uniform = first.mu.ndim == 1 and all(

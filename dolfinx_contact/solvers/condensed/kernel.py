@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The compiled condensed solver with the linear algebra for this processor: AVX-512, AVX2 and FMA, or what all have."""
+"""The compiled condensed solver, with linear algebra for the instructions of this processor."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from dolfinx_contact import _kernel
 
 
 def widest_algebra() -> Any:
-    """The last argument of ``CondensedOperator``, None for what every processor can run.
+    """Linear algebra of the condensed solver with this processor's widest vector instructions.
 
-    Answers with one and with another differ by rounding.
+    It is the last argument of ``CondensedOperator``.  None selects the code that every processor
+    can run.  Results with different instructions differ
+    by rounding.
     """
     for instructions in _kernel.instruction_sets():
         try:
@@ -26,5 +28,11 @@ def widest_algebra() -> Any:
 
 
 def condensed_operator(W: Any, dim: int, tied: int = 0) -> Any:
-    """The kernel's ``CondensedOperator`` of ``W``, ``dim`` rows a contact, then ``tied`` ones."""
+    """Return the compiled ``CondensedOperator`` of a compliance ``W``.
+
+    Args:
+        W: Compliance: ``dim`` rows per contact node, then ``tied`` rows.
+        dim: Number of components per contact node.
+        tied: Number of rows of bilateral constraints.
+    """
     return _kernel.CondensedOperator(W, dim, tied, widest_algebra())

@@ -29,21 +29,27 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep
 
 
-UNLIMITED_ITERATIONS = 200_000  # iterations; methods have limits of their own
+# Iteration limit if the user gives none; the single methods have limits of their own.
+UNLIMITED_ITERATIONS = 200_000
 
-# Default iteration limit for arrays, which need not have a solution: ITERATION_WORK over the unknowns squared, at least FEWEST_ITERATIONS and PER_CONTACT, at most
-# MOST_ITERATIONS.  Random problems of up to 12 contacts, with strong friction and crossed slip rules, need up to 6,500; a pile of 156 contacts needs 757.
+# Default iteration limit of ``solve_condensed``, whose problem may have no solution: ITERATION_WORK
+# over the square of the number of unknowns, at least FEWEST_ITERATIONS and PER_CONTACT iterations
+# per contact, at most MOST_ITERATIONS.  Random problems of up to 12 contacts, with strong friction
+# and crossed slip rules, need up to 6,500 iterations; a pile of 156 contacts needs 757.
 ITERATION_WORK = 9e6
 FEWEST_ITERATIONS = 600
 PER_CONTACT = 10
 MOST_ITERATIONS = 7000
 
-# Iterations after which infeasibility is tested, and the number of contacts up to which that takes less than a second.
+# Number of iterations after which infeasibility is tested, and largest number of contacts for this
+# test, which then takes less than a second.
 FIRST_ITERATIONS = 100
 PROVABLE_CONTACTS = 500
 
-# If a smaller error is needed: tolerances relative to tol; the largest part of the next Newton step that may remain; the multiple of rounding
-# below which it is not tried; the unknowns up to which all methods search again.
+# Refinement of a solution whose reactions are still uncertain: tolerances relative to tol; it
+# continues while the next Newton step falls below LEAST_GAIN of its last size, and stops if the
+# error is below NEAR_ROUNDING times the rounding error.  Up to ROUNDING_MULTIPLE unknowns, all
+# methods may search again.
 NEARER_TOLERANCES = (1e-2, 1e-4)
 LEAST_GAIN = 0.1
 NEAR_ROUNDING = 10
@@ -52,12 +58,15 @@ ROUNDING_MULTIPLE = 100
 
 @dataclass(frozen=True, kw_only=True)
 class CondensedNewton(Solver):
-    """Semismooth Newton method with a line search on the condensed problem ``w = q + W r``, and its fallbacks; see docs/solvers.md.
+    """Semismooth Newton method with a line search on the condensed problem ``w = q + W r``.
+
+    If Newton's method fails, other methods are tried; see docs/solvers.md.
 
     Args:
-        slip_tol: Largest slip error of a solution, dimensionless; by default the same as ``tol``.
-        max_iterations: Iteration limit of all methods together; by default 200,000 for a body, and for ``solve_condensed`` from
-            7,000 (up to 12 contacts) to 600 (41 to 60), and ten a contact beyond, at most 7,000.
+        slip_tol: Largest slip error of a solution, dimensionless; by default equal to ``tol``.
+        max_iterations: Iteration limit of all methods together.  The default is 200,000 for a body.
+            For ``solve_condensed``, it falls from 7,000 (up to 12 contacts) to 600 (41 to 60
+            contacts); for more contacts, it is ten per contact, at most 7,000.
         newton_iterations: Iteration limit of one attempt of Newton's method.
         max_seconds: Wall time after which the search ends, seconds; infinite by default.
         fallbacks: Whether to try other methods if Newton's method fails.
@@ -92,11 +101,14 @@ class CondensedNewton(Solver):
         starts: Sequence[np.ndarray] = (),
         **given: Any,
     ) -> CondensedResult:
-        """As ``search``, of which no result but a solution is returned; ``solve_condensed`` is the public entry.
+        """Return a solution of the condensed problem with a kernel operator, or raise.
+
+        The arguments are those of ``search``.  The public function is ``solve_condensed``.  If
+        errors exceed ``tol`` but not their rounding error, the solution is returned with a
+        ``RoundingWarning``.
 
         Raises:
-            CondensedNotConverged: nothing that was tried reached ``tol`` or, if that is larger, the
-                rounding of the errors; the latter is a ``RoundingWarning``.
+            CondensedNotConverged: no method reached ``tol`` or, if larger, the rounding error.
         """
         found, converged = self.search(operator, friction, q, tol, starts, **given)
         if not converged:
@@ -120,17 +132,23 @@ class CondensedNewton(Solver):
         monitor: Callable | None = None,
         **scales: Any,
     ) -> tuple[CondensedResult, bool]:
-        """The best state found with a kernel operator, and whether it is a solution.
+        """Return the best result with a kernel operator, and whether it is a solution.
 
         Args:
-            q, starts: With the tied rows of the operator, if it has any, at the end.
-            monitor: None, or a function of residual and contacts open, sticking and slipping of every iterate.
-            scales: Of the errors: ``stiffness`` (n,), ``tangential_stiffness`` (n, T, T),
-                ``tied_stiffness`` (tied,), force per length, and ``external``, a force that acts
-                beside the reactions.
+            operator: The kernel's ``CondensedOperator`` of ``W``.
+            friction: Friction of the contacts, along its principal axes.
+            q, starts: Displacement without reactions, and initial reactions.  The tied rows of the
+                operator, if it has any, come last.
+            tol: Largest error of a solution.
+            monitor: None, or a function called for every iterate with the residual and the numbers
+                of open, sticking and slipping contacts.
+            scales: Scales of the errors: ``stiffness``, ``shape=(n,)``, ``tangential_stiffness``,
+                ``shape=(n, T, T)``, and ``tied_stiffness``, ``shape=(tied,)``, all force per
+                length; and ``external``, a force that acts in addition to the reactions.
         """
         tangents = operator.dim - 1
-        # Friction(0) has no slip rule; a frictionless node of a field gets one that does not matter.
+        # Friction(0) has no slip rule; a frictionless node among others gets an arbitrary one,
+        # without effect.
         p = None if friction.frictionless else np.where(friction.mu > 0, friction.p, 1.0)
         found = operator.solve(
             mu=friction.mu[..., :tangents],
@@ -170,7 +188,7 @@ class CondensedNewton(Solver):
     def bind(self, step: LoadStep) -> BoundSolver:
         """See ``Solver``."""
         from dolfinx_contact.solvers.condensed.body import (
-            BoundCondensedNewton,  # arrays alone do without DOLFINx
+            BoundCondensedNewton,  # imported here: solve_condensed does not need DOLFINx
         )
 
         return BoundCondensedNewton(self, step)
@@ -188,27 +206,33 @@ def solve_condensed(
 ) -> CondensedResult:
     """Solve ``w = q + W r`` with the friction law between ``w`` and ``r`` at every contact.
 
-    Needs neither a body nor DOLFINx.  ``W`` is the compliance between ``n`` contacts, ``q`` their displacement without reactions.
-    Each contact has the components (t1, t2, n), in two dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` the slip.
+    This needs neither a body nor DOLFINx.  ``W`` is the compliance between ``n`` contacts, ``q``
+    their displacement without reactions.  Each contact has the components (t1, t2, n), in two
+    dimensions (t, n): ``w_n`` is the gap at the end of the step, ``w_t`` the slip.
 
     The law [dSFMH07, Section 1] and both errors are those of ``ContactProblem``:
 
     - ``error = |r - proj(r - kappa (Q^2 w_t, w_n + |M Q^2 w_t|), K_mu)| / |r|`` with
       ``kappa = 1 / W_nn`` of each contact, Euclidean norms over all contacts;
-    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector along ``P^-2 r_t``),
-      ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that vector.
+    - ``slip_error = |kappa_t (w_t + |w_t| d)| / |r|`` over slipping contacts (``d`` the unit vector
+    along ``P^-2 r_t``),
+      ``|kappa_t w_t|`` over sticking ones, ``1 / kappa_t`` the compliance of the contact along that
+      vector.
 
-    Both are relative to the reactions in the state itself, or to the load ``|kappa (q_t, min(q_n, 0))|`` if bodies jam and
-    ``|r|`` exceeds it.  An answer whose errors are above ``tol`` but below ``rounding`` is returned with a ``RoundingWarning``,
-    one whose ``local_error`` is above the square root of ``tol`` with a ``UserWarning``.
+    Both are relative to the reactions in the state itself, or to the load ``|kappa (q_t, min(q_n,
+    0))|`` if bodies jam and ``|r|`` exceeds it.  A result whose errors are above ``tol`` but below
+    ``rounding`` is returned with a ``RoundingWarning``; a result whose ``local_error`` is above the
+    square root of ``tol``, with a ``UserWarning``.
 
     Args:
-        W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which is made dense.  May be
-            rank-deficient and slightly unsymmetric.
-        q: Displacement without reactions, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two dimensions; length units.
-        friction: A ``Friction``, with coefficients common to all contacts or ``shape=(n, 2)``, a pair for each; a number; or an array of
-            isotropic coefficients, one per contact, ``shape=(n,)``.
-        solver: ``CondensedNewton(...)``; None takes the default options.
+        W: Compliance, ``shape=(3n, 3n)``, length per force; dense, or a SciPy sparse matrix, which
+            is converted to a dense one.  It may be rank-deficient and slightly unsymmetric.
+        q: Displacement without reactions, ``shape=(n, 3)``, or flat ``(3n,)``; ``(n, 2)`` in two
+            dimensions; length units.
+        friction: A ``Friction``, with coefficients common to all contacts, or ``shape=(n, 2)``, a
+            pair for each; a number; or an array of isotropic coefficients, one per contact,
+            ``shape=(n,)``.
+        solver: ``CondensedNewton(...)``; None selects the default options.
         tol: Largest error, and largest slip error unless the solver has a ``slip_tol``.
         r0: Initial reactions, of the shape of ``q``.
         max_seconds: Wall time after which the search ends, seconds.
@@ -217,8 +241,11 @@ def solve_condensed(
         A ``CondensedResult``: reactions, displacements, status, errors and the methods used.
 
     Raises:
-        ValueError: an array of the wrong shape, or not real and finite; a negative diagonal entry of ``W``, or a normal one next to none; or ``friction`` for other contacts.
-        CondensedNotConverged: no method reached ``tol``, or none can, ``failure.infeasible``; ``failure.best`` is the best state.
+        ValueError: an array has the wrong shape, or is not real and finite; a diagonal entry of
+            ``W`` is negative, or a normal one is positive but negligible; or ``friction`` does not
+            fit the contacts.
+        CondensedNotConverged: no method reached ``tol``; ``failure.best`` is the best state.  If it
+            is proved that no solution exists, ``failure.infeasible`` is True.
 
     Example:
         >>> dc.solve_condensed(np.eye(2), [[0.5, -1]], dc.Friction(mu=0.3)).reaction.round(6)  # (t, n): slips
@@ -253,7 +280,7 @@ def _checked_options(
 
 
 def _along_axes(W: np.ndarray, q: np.ndarray, friction: Friction, r0: np.ndarray | None) -> tuple:
-    """``W``, ``q`` and starts along the principal axes of friction, and the turns to these."""
+    """Return ``W``, ``q`` and the start along the principal axes of friction, and the axes."""
     turns = principal_axes(friction, *q.shape)
     starts = () if r0 is None else [_turned(r0.reshape(q.shape), turns)]
     if friction.axes is not None:
@@ -270,7 +297,11 @@ def _found(
     tol: float,
     starts: Sequence[np.ndarray],
 ) -> CondensedResult:
-    """A solution.  Where few iterations find none, it is asked whether there is any before the search goes on."""
+    """Return a solution; raise ``CondensedNotConverged`` if none is found.
+
+    After ``FIRST_ITERATIONS`` iterations without success, infeasibility is tested before the search
+    continues.
+    """
     least = max(FEWEST_ITERATIONS, PER_CONTACT * len(q), int(ITERATION_WORK / q.size**2))
     most = solver.max_iterations or min(MOST_ITERATIONS, least)
     problem = operator, friction, q, tol, starts
@@ -282,9 +313,9 @@ def _found(
             raise CondensedNotConverged(replace(best, branch="infeasible")) from None
         if (
             left <= 0 or best.iterations < FIRST_ITERATIONS or most <= FIRST_ITERATIONS
-        ):  # nothing else is to be tried
+        ):  # nothing else to try
             raise
-    # the same iterations once more, then others
+    # a restart repeats the first iterations, then continues
     return replace(solver, max_iterations=most, max_seconds=left).solve_condensed(*problem)
 
 
@@ -296,11 +327,11 @@ def _nearer(
     tol: float,
     found: CondensedResult,
 ) -> CondensedResult:
-    """The same solution with smaller errors, where those of ``tol`` leave its reactions open.
+    """Refine a solution whose reactions are uncertain at the tolerance ``tol``.
 
-    Where W is ill conditioned, an error of ``tol`` may be one of reactions that are far off; where contacts are unlike
-    each other, those of some.  Large problems are not searched by all methods again: where W is rank deficient reactions
-    stay open anyway.
+    If ``W`` is ill conditioned, reactions may be far off although the error is ``tol``.  If
+    contacts differ much in stiffness or load, this may hold for some of them.  For large problems,
+    only Newton's method is used: if ``W`` is rank-deficient, the reactions are not unique anyway.
     """
     cheap = solver.fallbacks and q.size <= ROUNDING_MULTIPLE
     most = min(solver.max_iterations or UNLIMITED_ITERATIONS, 100 * solver.newton_iterations)
@@ -322,13 +353,13 @@ def _nearer(
             break
         if max(found.error, found.slip_error) > factor * tol:
             nearer, done = again(max(factor * tol, 1e-14))
-            before, found = found, nearer if done else _better(nearer, found, tol)
-            if not done or found.change > LEAST_GAIN * before.change:  # no smaller error tells them
+            before, found = found, nearer if done else _better_result(nearer, found, tol)
+            if not done or found.change > LEAST_GAIN * before.change:  # smaller errors do not help
                 break
     if done and found.local_error > tol:
         nearer, done = again(tol, local_tol=tol)
-        found = nearer if done else _better(nearer, found, tol)
-    if found.local_error > math.sqrt(tol):  # half the digits that were asked for
+        found = nearer if done else _better_result(nearer, found, tol)
+    if found.local_error > math.sqrt(tol):  # half the requested digits
         warnings.warn(
             f"local_error {found.local_error:.1e}, tol {tol:.1e}: the contacts together obey the law, but not one that is far "
             "softer, or bears far less, than others. Solve such contacts by themselves, or with a smaller tol.",
@@ -337,20 +368,24 @@ def _nearer(
     return found
 
 
-def _better(nearer: CondensedResult, found: CondensedResult, tol: float) -> CondensedResult:
-    """The best state of a search that failed, if it is a solution with a smaller local error than the one found before."""
+def _better_result(nearer: CondensedResult, found: CondensedResult, tol: float) -> CondensedResult:
+    """Choose between a solution and the best state of a later search that did not converge.
+
+    The later state is returned if its errors are at most ``tol`` and its local error is smaller.
+    Otherwise the solution is returned with the updated record of methods, iterations and time.
+    """
     if max(nearer.error, nearer.slip_error) <= tol and nearer.local_error < found.local_error:
         return nearer
     return replace(found, tried=nearer.tried, iterations=nearer.iterations, seconds=nearer.seconds)
 
 
 def _turned(vectors: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Vectors of contacts along the principal axes, ``shape=(n, dim)``."""
+    """Components of contact vectors along the principal axes of friction, ``shape=(n, dim)``."""
     return np.einsum("nij,nj->ni", turns, vectors)
 
 
 def _turned_matrix(W: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """``W`` along the principal axes."""
+    """Compliance ``W`` in components along the principal axes of friction."""
     n, dim, _ = turns.shape
     blocks = W.reshape(n, dim, n, dim)
     return np.einsum("aij,ajbk,blk->aibl", turns, blocks, turns, optimize=True).reshape(W.shape)

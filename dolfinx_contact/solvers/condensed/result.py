@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What the solution of a condensed problem returns, or raises."""
+"""Result and exception of the condensed solver."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Attempt:
-    """One method that was tried, and the smallest errors found until its end."""
+    """Record of one solution method that was tried.
+
+    Attributes:
+        branch: Name of the method.
+        converged: Whether it found a solution.
+        iterations: Number of its iterations.
+        seconds: Its wall time, seconds.
+        error: Smallest error found until its end, see ``CondensedResult``.
+        slip_error: Slip error of the same state.
+    """
 
     branch: str
     converged: bool
@@ -23,23 +32,28 @@ class Attempt:
 
 @dataclass(frozen=True)
 class CondensedResult:
-    """Solution of ``solve_condensed``; ``n`` contacts, in three dimensions (in two, one column less).
+    """Solution of ``solve_condensed`` for ``n`` contacts.
+
+    Shapes are given for three dimensions; in two, arrays have one column less.
 
     Attributes:
         reaction: ``r``, ``shape=(n, 3)``, (t1, t2, n), in the cone, force units.
         displacement: ``w = q + W r``, ``shape=(n, 3)``: slip, then gap; length units.
         status: 0 open, 1 sticking, 2 slipping, ``shape=(n,)``, as ``dc.Status``.
         error: ``|r - proj(r - kappa w)|`` relative to the acting forces, see ``solve_condensed``.
-        slip_error: Defect of the slip rule, as a force, relative to the same.
-        local_error: The largest error of any single contact, relative to the force that acts there, ``max(|r|, kappa |w|)``; zero
-            if rounding may explain it.  ``error`` and ``slip_error`` hardly detect errors at contacts that are much softer, or
-            carry much less, than others.
-        rounding: Rounding error of both in double precision; an error above ``tol`` is below it.
-        change: Size of the next Newton step of the reactions, relative to the same forces: an estimate of the distance to the
-            nearest solution.  If W is ill conditioned, it is much larger than the error.  It says nothing about other solutions.
-        iterations: Of all methods tried.
-        seconds: Wall time of all methods tried.
-        branch: The method that found the solution; if none was found "", or "infeasible" if it is proved that none exists.
+        slip_error: Defect of the slip rule, as a force, relative to the same acting forces.
+        local_error: Largest error of any single contact, relative to the force that acts there,
+            ``max(|r|, kappa |w|)``; zero if it may be rounding alone.  ``error`` and ``slip_error``
+            hardly detect errors at contacts that are much softer, or carry much less, than others.
+        rounding: Rounding error of ``error`` and ``slip_error`` in double precision.  Where an
+            accepted error exceeds ``tol``, it is below this value.
+        change: Size of the next Newton step of the reactions, relative to the acting forces: an
+            estimate of the distance to the nearest solution.  If W is ill conditioned, it is much
+            larger than the error.  It says nothing about other solutions.
+        iterations: Number of iterations of all methods tried.
+        seconds: Wall time of all methods tried, seconds.
+        branch: Name of the method that found the solution; "" if no solution was found;
+            "infeasible" if it is proved that no solution exists.
         tried: All methods tried, in order.
         tied: Forces of the bilateral constraints of a kernel operator, if it has any.
 
@@ -65,12 +79,13 @@ class CondensedResult:
 
 
 class CondensedNotConverged(RuntimeError):
-    """No method reached the tolerance.
+    """Raised by ``solve_condensed`` if no method reached the tolerance.
 
     Attributes:
-        best: The ``CondensedResult`` of the smallest errors found; not a solution.
+        best: The ``CondensedResult`` with the smallest errors found; not a solution.
         tried: The methods tried, a tuple of ``Attempt``.
-        infeasible: Whether it is proved that there is no solution: whatever the reactions, a gap is negative.
+        infeasible: Whether it is proved that no solution exists: for all reactions, a gap is
+            negative.
 
     Example:
         >>> try:

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Planes that force drives in the condensed problem: rows and columns for their motions."""
+"""Surfaces driven by force in the condensed problem: rows and columns for their motions."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ if TYPE_CHECKING:
 
 
 class CondensedSurfaces:
-    """Motions ``c`` of planes beside the reactions of the nodes, ``w = q + W r - D c``.
+    """Motions of force-driven surfaces as unknowns of the condensed problem.
 
-    Equilibrium of a plane, ``-D^T r - k c + F = 0``, is a tied row.  Of springs ``k`` that are stiffer than a node ``c``
-    is eliminated: ``w = q + (W + D k^-1 D^T) r``, from where the spring is not stretched.
+    With motions ``c``, the problem is ``w = q + W r - D c``.  The equilibrium of a surface, ``-D^T
+    r - k c + F = 0``, is a bilateral constraint: a tied row behind the rows of the nodes.  If the
+    spring ``k`` of a motion is stiffer than the stiffest node, ``c`` is eliminated instead: ``w = q
+    + (W + D k^-1 D^T) r``, with ``c`` measured from the unstretched position of the spring.
 
     Args:
         body: The body.
-        contacts: Its contacts.
-        turns: Rotations of the nodes' frames to the principal axes, ``shape=(n, dim, gdim)``.
+        contacts: The contacts of the body.
+        turns: Rotations from the nodes' frames to the principal axes of friction, ``shape=(n, dim,
+            gdim)``.
         stiffness: Normal stiffness of all nodes, force per length.  Collective.
 
     Attributes:
@@ -50,11 +53,11 @@ class CondensedSurfaces:
         self.tied = int((~self._stiff).sum())
 
     def border(self, W: np.ndarray, nodal: int) -> np.ndarray:
-        """``W`` with the planes.
+        """Return the compliance ``W`` extended by the motions of the driven surfaces.
 
         Args:
-            W: Compliance, length per force.
-            nodal: How many of its rows are of nodes.
+            W: Compliance, length per force.  Its rows of nodes are changed in place.
+            nodal: Number of its rows that belong to nodes.
         """
         stiff, loose, size = self._stiff, ~self._stiff, len(W)
         W[:nodal, :nodal] += self._axes[:, stiff] / self._springs[stiff] @ self._pulled[:, stiff].T
@@ -66,18 +69,25 @@ class CondensedSurfaces:
         return bordered
 
     def begun(self, step: LoadStep, free: np.ndarray) -> np.ndarray:
-        """Where planes begin: where they were; where springs are not stretched if these are eliminated; all near the body.
+        """Motions of the surfaces at the start of a load step, ``shape=(m,)``.
+
+        A surface starts from its last position or, if its motion is eliminated, from the
+        unstretched position of its spring.  A surface that no node touches is moved to the body.
 
         Args:
-            step: The step.
-            free: Displacement of owned degrees of freedom without reactions.
+            step: The load step.
+            free: Contact-free displacement of owned degrees of freedom.
         """
         c = step.surfaces.at_rest(step.no_motions, self._stiffest)
         self._at_first = step.surfaces.touched(step.contacts, free, c)
         return self._at_first
 
     def moved(self, force: np.ndarray) -> np.ndarray:
-        """Where forces of all rows, the tied rows' last, have the planes."""
+        """Motions of the surfaces for given unknowns of all rows, ``shape=(m,)``.
+
+        Args:
+            force: Reactions of the nodes, then the unknowns of the tied rows.
+        """
         moved, stiff = np.zeros(len(self._springs)), self._stiff
         moved[~stiff] = force[len(force) - self.tied :]
         reactions = force[: len(self._axes)]
@@ -85,14 +95,22 @@ class CondensedSurfaces:
         return self._at_first + moved
 
     def distances(self, others: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """How far steps are from that of ``q``, length units; forces that drive planes count by their part of the largest."""
+        """Distance of earlier load steps from the present one, maximum norm, length units.
+
+        Forces that drive surfaces are scaled to lengths by the largest displacement over the
+        largest force.
+
+        Args:
+            others: ``q`` of earlier load steps, one per row.
+            q: Displacements without reactions of the present step, then the driving forces.
+        """
         apart, lengths, forces = np.abs(others - q), q[: -self.tied], q[-self.tied :]
         largest = np.abs(forces).max() or 1.0
         apart[:, -self.tied :] *= np.abs(lengths).max() / largest
         return apart.max(axis=1)
 
     def driving(self, step: LoadStep, c: np.ndarray) -> np.ndarray:
-        """Forces that drive the planes of the tied rows, in motions of all."""
+        """Driving forces of the tied rows, when the surfaces have the motions ``c``."""
         return step.surfaces.driving(c)[~self._stiff]
 
 
@@ -102,7 +120,13 @@ def _turned(turns: np.ndarray, axes: np.ndarray) -> np.ndarray:
 
 
 def _past_held(contact: ContactStep, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``D``, and what of it the reactions without those along held directions pull by: friction there goes with the normal one."""
+    """Matrices of relative nodal motion and of pulling forces for surface motions.
+
+    Both have ``shape=(n, gdim, m)``.  They differ only at nodes that supports hold tangentially
+    while a driven surface slides past them. There, slip is prescribed: the first matrix is ``D``
+    without the tangential rows, and the second adds the friction in proportion to the normal
+    reaction.
+    """
     if contact.dragged is None:
         return axes, axes
     moved, rows = axes.copy(), contact.dragged.any(axis=1)

@@ -1,6 +1,9 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""What the preconditioner's springs hold and nothing does: planes that force drives, a body that contact alone holds."""
+"""Correction of the preconditioner for force-driven surfaces and bodies held by contact alone.
+
+The springs of the preconditioner restrain these motions, although nothing does in the problem.
+"""
 
 from __future__ import annotations
 
@@ -14,27 +17,31 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.step.load_step import LoadStep
 
-# Steps of conjugate gradients for what a plane's motion does to the body, and what they may leave.
+# Conjugate gradients for the body's response to a motion: iteration limit and relative residual.
 MOST_STEPS = 50
 RESIDUAL_PART = 1e-6
 
-# Part of the stiffness against a motion that may be no more than what they leave.
+# Stiffness against a motion, relative to the largest, below which it may be only that residual.
 NOISE_PART = 1e-4
 
 
 class Border:
-    """The correction for motions ``c`` that follow the body: each with a force on it and an equation.
+    """Schur-complement correction for additional unknown motions ``c``, each with its own equation.
 
         A u - C c = residual,  -C^T u + s c = 0,
 
-    so that ``u = A^-1 residual + Y (s - C^T Y)^-1 Y^T residual`` with ``Y = A^-1 C``, which is kept.  With springs ``S``
-    between nodes and planes, motions ``D c`` of these, and ``A = K + B^T S B``, a plane's ``C = B^T S D`` and
-    ``s = D^T S D + k``.  Springs ``a`` of anchors in ``A`` are undone by ``C = E a`` and ``s = a``.
+    so that ``u = A^-1 residual + Y (s - C^T Y)^-1 Y^T residual`` with ``Y = A^-1 C``, which is
+    kept.
+
+    For driven surfaces with motions ``D c``, springs ``S`` between nodes and surfaces and the
+    stiffness ``A = K + B^T S B``, the matrices are ``C = B^T S D`` and ``s = D^T S D + k``.  For
+    the regularisation springs (anchors) of stiffness ``a`` in ``A``, ``C = E a`` and ``s = a``
+    cancel the spring forces.
 
     Args:
-        step: The step: its body, contacts and surfaces.
+        step: The load step with its body, contacts and driven surfaces.
         A: The stiffness plus springs, a PETSc matrix.
-        stiffened: What applies a preconditioner of A.
+        stiffened: An object whose method ``apply`` applies a preconditioner of ``A``.
         springs: ``S`` of each contact, ``shape=(n, gdim)``, force per length.  Collective.
     """
 
@@ -52,19 +59,19 @@ class Border:
             columns.append(forces)
             s = block_diag(s, np.diag(stiffness))
         C = np.concatenate(columns, axis=1)
-        self._follow = _solved(body, A, stiffened, C)
-        self._left = s - body.total(C.T @ self._follow)
+        self._responses = _solved(body, A, stiffened, C)
+        self._left = s - body.total(C.T @ self._responses)
 
     def correct(self, residual: np.ndarray) -> np.ndarray:
-        """What their giving way adds to ``A^-1 residual``."""
-        pushed = self._body.total(self._follow.T @ residual)
-        if self._loose:  # nothing resists some of them where there is no friction
-            return self._follow @ np.linalg.lstsq(self._left, pushed, rcond=NOISE_PART)[0]
-        return self._follow @ np.linalg.solve(self._left, pushed)
+        """Displacement to add to ``A^-1 residual`` when the motions ``c`` are free."""
+        pushed = self._body.total(self._responses.T @ residual)
+        if self._loose:  # without friction, some motions meet no resistance
+            return self._responses @ np.linalg.lstsq(self._left, pushed, rcond=NOISE_PART)[0]
+        return self._responses @ np.linalg.solve(self._left, pushed)
 
 
 class _Preconditioner:
-    """What applies a preconditioner, as PETSc wants it."""
+    """Python context for PETSc's PC object: applies a given preconditioner."""
 
     def __init__(self, stiffened: Any):
         self._stiffened = stiffened
@@ -74,7 +81,7 @@ class _Preconditioner:
 
 
 def _solved(body: ElasticBody, A: PETSc.Mat, stiffened: Any, C: np.ndarray) -> np.ndarray:
-    """A^-1 C, ``shape=(owned dofs, m)``, by conjugate gradients with a preconditioner."""
+    """Return ``A^-1 C``, ``shape=(owned dofs, m)``, by preconditioned conjugate gradients."""
     ksp = PETSc.KSP().create(body.comm)
     ksp.setOperators(A)
     ksp.setType("cg")

@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Predictor and corrector as a fixed point of the displacement alone."""
+"""Fixed-point iteration on the displacement with predictor, corrector and Anderson acceleration."""
 
 from __future__ import annotations
 
@@ -21,26 +21,31 @@ from dolfinx_contact.support.checks import positive
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# Augmentation parameters over the nodal stiffness, tried in this order. The first ones needed the fewest iterations on
-# the paper's punch; the paper's map weights slip by Q^2, which a larger rho makes up for.
+# Augmentation parameters relative to the nodal normal stiffness, tried in this order.  The first
+# ones needed the fewest iterations on the reference paper's punch.  The paper's map weights slip by
+# Q^2, which a larger rho compensates.
 RHO_FACTORS = {"bipotential": (3.0, 1.0, 10.0), "return": (1.0, 3.0, 0.3)}
 
-# The contact is linearised every TANGENT_INTERVAL iterations: after so many, most nodes have found their status, and easy steps are nearly
-# solved. If the error then grows by more than LARGEST_GROWTH, it was too early, and the search goes on from its best state without; the limit rises as
-# much each time, since the same one would repeat the same iterations for ever. If a tangent has not reduced the error below USELESS_TANGENT times its
-# value by the time the next one is due, the iterations until then use none.
-# If the start has an error below NEAR_ERROR, as in a repeated step, most nodes have their status at once: a tangent then has to help at once.
+# The contact is linearised every TANGENT_INTERVAL iterations: by then, most nodes have their final
+# status, and easy steps are nearly solved.  If the error then grows by a factor above
+# LARGEST_GROWTH, the tangent came too early, and the search continues from its best state without a
+# tangent.  The limit is multiplied by LARGEST_GROWTH each time; with an unchanged limit, the same
+# iterations would repeat forever.  If a tangent does not reduce the error below USELESS_TANGENT
+# times its value before the next one is due, the following interval uses no tangent. If the error
+# at the start is below NEAR_ERROR, as in a repeated step, most nodes have their final status: the
+# contact is linearised at once, and the tangent is dropped as soon as the error grows.
 TANGENT_INTERVAL = 20
 LARGEST_GROWTH = 30.0
 USELESS_TANGENT = 0.9
 NEAR_ERROR = 0.1
 
-# The error must halve within so many iterations, or the next attempt follows: a state may lead nowhere, with all statuses fixed.
+# Iterations within which the error must halve; otherwise the next attempt begins.
 HALVING_ITERATIONS = 60
 
-# Further attempts: tangents every so many iterations, and where they begin: as the first one, or where half of the loads lead, or in the best
-# state, of which nodes that miss the law by more than this part of the most are put back where they were: their slip may have no
-# solution nearby.
+# Further attempts: iterations between tangents, and the start.  The start is the start of the load
+# step, the solution under half of the load increment, or the best state after resetting the slip of
+# the nodes whose violation of the contact law exceeds this part of the largest one: with their
+# present slip there may be no solution nearby.
 FROM_START = "from the start"
 HALF_WAY = "half the way"
 FURTHER_ATTEMPTS = (
@@ -51,30 +56,34 @@ FURTHER_ATTEMPTS = (
     (TANGENT_INTERVAL // 2, 0.05),
 )
 
-# If corrections grow by this factor, Anderson's differences mislead.
+# If the norm of the correction grows by this factor, Anderson's method is restarted from the best
+# state.
 ASTRAY_GROWTH = 1e3
 
 
 @dataclass(frozen=True)
 class FixedPoint(Solver):
-    """Predictor and corrector in every iteration, without a condensed operator.
+    """Fixed-point iteration with predictor and corrector, without a condensed operator.
 
-    An iteration takes the reactions required for equilibrium, ``K u - f`` at the contact nodes, and applies predictor and projection
-    on the friction cone [dSFMH07, Section 2].  The new reactions enter the residual, and one back-solve with the stiffness plus springs
-    at the contact nodes corrects the displacement.  Anderson's method accelerates the iteration.  Every twenty iterations, the
-    contact is linearised; with this tangent, the near-contact subdomain is corrected before the back-solve, see ``SurfaceLayer``,
-    unless the last tangent did not help.
+    An iteration computes the reactions required for equilibrium, ``K u - f`` at the contact nodes,
+    and applies predictor and projection on the friction cone [dSFMH07, Section 2].  The new
+    reactions enter the residual, and one back-solve with the stiffness plus springs at the contact
+    nodes corrects the displacement.  Anderson's method accelerates the iteration.  Every twenty
+    iterations, the contact is linearised.  With this tangent, the near-contact subdomain is
+    corrected before the back-solve, see ``SurfaceLayer``, unless the last tangent did not help.
 
-    If the error does not halve within sixty iterations, further attempts begin: at the step's start, where half of the loads lead, then in the best state,
-    in which the nodes that miss the law most are put back where they were; at last with tangents twice as often.  If they also fail, the
-    fixed point continues with another rho.  The solution does not depend on rho.  ``step.reason`` lists the attempts.
+    If the error does not halve within sixty iterations, further attempts begin: from the start of
+    the step, from the solution under half of the load increment, then from the best state after
+    resetting the slip of the nodes that violate the contact law most; finally with tangents twice
+    as often.  If they also fail, the fixed point continues with another ``rho``.  The solution does
+    not depend on ``rho``.  ``step.reason`` lists the attempts.
 
     Attributes:
-        map: "return", or "bipotential", the paper's predictor and Euclidean projection, see
-            ``Contact.update``.  Both have the same solutions; with strongly non-associated friction, "return" needs fewer
-            iterations.
-        rho: Augmentation parameter relative to the nodal normal stiffness.  None tries the values of a short list until one
-            converges, at the cost of a factorisation each.
+        map: "return", the return map, or "bipotential", the reference paper's predictor and
+            Euclidean projection, see ``Contact.update``.  Both have the same solutions; with
+            strongly non-associated friction, "return" needs fewer iterations.
+        rho: Augmentation parameter relative to the nodal normal stiffness.  None tries the values
+            of a short list until one converges, at the cost of one factorisation per value.
         depth: Number of previous corrections that Anderson's method combines.
         max_iterations: Iteration limit of each attempt.
         max_seconds: Wall time after which the search ends, seconds; infinite by default.
@@ -107,7 +116,14 @@ class FixedPoint(Solver):
 
 
 def _slides(state: StepState, tried: bool = False) -> bool:
-    """Whether force pushes a plane by more than friction carries in this state; the body, if all was tried.  Collective."""
+    """Whether the force on a driven surface exceeds the frictional resistance in this state.
+    Collective.
+
+    Args:
+        state: The state.
+        tried: Whether all attempts failed; then the loads on a body held by contact alone are
+            checked, too.
+    """
     step = state.step
     if step.surfaces is None and not (tried and step.statics is not None):
         return False
@@ -116,7 +132,11 @@ def _slides(state: StepState, tried: bool = False) -> bool:
 
 
 def half_way(step: LoadStep) -> LoadStep:
-    """The step with half of what its loads and boundary values change, for a start; of tolerance zero, since F itself has all of them."""
+    """Return the load step with half of the increment of its loads and boundary values.
+
+    Its solution serves as a start for the full step.  The tolerance is zero, because errors
+    measured with the form F would refer to the full loads.
+    """
     last, fixed, reactions = step.last, step.body.fixed, np.zeros_like(step.b)
     for contact in step.contacts:
         contact.points.add_forces(contact.last.reaction, reactions)
@@ -126,7 +146,10 @@ def half_way(step: LoadStep) -> LoadStep:
 
 
 class BoundFixedPoint(BoundSolver):
-    """The fixed point for the steps of a problem; keeps the preconditioner of the rho used last."""
+    """The fixed-point solver, set up for the load steps of one problem.
+
+    It keeps the preconditioner for the ``rho`` used last.
+    """
 
     def __init__(self, options: FixedPoint, step: LoadStep):
         self._options, self._stamps = options, step.stamps
@@ -140,7 +163,12 @@ class BoundFixedPoint(BoundSolver):
         self.preconditioner, self._factor = None, 0.0
 
     def update(self, step: LoadStep) -> None:
-        """See ``BoundSolver``: within a step springs of nearly the same rows do as well, but not those of motions that follow."""
+        """Discard the preconditioner if stiffness, frames or friction changed too much.
+        Collective.
+
+        If only the frames of contact nodes changed within a step, the springs are kept, unless
+        motions of driven surfaces or of anchors are part of the preconditioner.
+        """
         new, old, self._stamps = step.stamps, self._stamps, step.stamps
         if self.preconditioner is None:
             return
@@ -153,17 +181,19 @@ class BoundFixedPoint(BoundSolver):
     def solve(
         self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
     ) -> SolverResult:
-        """Iterate until the errors are at most the tolerance, or every rho has been tried.
+        """Iterate until the errors are at most the tolerance or all attempts failed.
+
+        Returns the best state.
 
         Args:
-            step: The ``LoadStep``.
+            step: The load step.
             starts: Not used.
-            start: Where to begin; None asks the step.
+            start: The initial state; None takes ``step.start()``.
         """
         start = step.start() if start is None else start
         search, attempts = Search(step, start, self._options.max_seconds), []
         where = start.x, start.c
-        start = None  # a state is as large as its contacts: no more than three are kept
+        start = None  # to save memory: at most three states are kept
         for name, factor, every in self._attempts(search, *where):
             attempts.append(f"{name} ({search.iterations})")
             self._fall(search, factor, every)
@@ -185,7 +215,17 @@ class BoundFixedPoint(BoundSolver):
     def _attempts(
         self, search: Search, x: np.ndarray, c: np.ndarray
     ) -> Iterator[tuple[str, float, int]]:
-        """The attempts in their order, begun: a name, rho, and every how many iterations there is a tangent; the step starts at ``x``.  Collective."""
+        """Begin one attempt after another and yield its settings.  Collective.
+
+        Args:
+            search: The ``Search``.
+            x: Displacement at the start of the load step.
+            c: Motions of driven surfaces at the start of the load step.
+
+        Yields:
+            Name of the attempt, ``rho`` relative to the nodal stiffness, and iterations between
+            tangents.
+        """
         options, step = self._options, search.step
 
         def begin(state: StepState) -> None:
@@ -212,7 +252,8 @@ class BoundFixedPoint(BoundSolver):
                 return
 
     def _half_way(self, search: Search, factor: float) -> StepState:
-        """About where the step stands after half of its loads, with all of its boundary values.  Collective."""
+        """Approximate solution under half of the load increment, with full boundary values.
+        Collective."""
         step, half = search.step, half_way(search.step)
         other = Search(half, half.start(), self._options.max_seconds)
         other.begin(
@@ -225,9 +266,11 @@ class BoundFixedPoint(BoundSolver):
         return step.evaluate(x, step.measuring_maps, c=other.nearest.c)
 
     def _fall(self, search: Search, factor: float, every: int) -> None:
-        """Anderson's method with one rho while the errors fall: with a tangent after every so many iterations, and at once where the error is small.
+        """Iterate with Anderson acceleration and one ``rho`` until the present attempt ends.
 
-        It starts again from the nearest state wherever the error has grown too much since the last tangent.
+        The contact is linearised every ``every`` iterations, and at once if the error is small.  If
+        the error has grown too much since the last tangent, the iteration restarts from the best
+        state of the attempt.
         """
         step, first = search.step, search.iterations == 0
         near, growth, anderson = (
@@ -238,7 +281,7 @@ class BoundFixedPoint(BoundSolver):
         while search.goes_on:
             if anderson is None:
                 known = step.continues and search.iterations == 0
-                maps = self._set(step, factor, known)
+                maps = self._set_up_maps(step, factor, known)
                 near = 0.0 if known and self.preconditioner.linearised else near
                 x, before = search.nearest.x, search.nearest.as_start
                 anderson = Anderson(x.size, self._options.depth, step.total)
@@ -255,10 +298,10 @@ class BoundFixedPoint(BoundSolver):
             if search.left <= due or search.error < near:
                 search.error = before.errors.largest
             if search.left <= due or search.error < near:
-                limit = growth if near == 0.0 else 1.0  # one at once has to help at once
+                limit = growth if near == 0.0 else 1.0  # an early tangent may not raise the error
                 due, near = search.left - every, 0.0
                 useless = search.error > USELESS_TANGENT * tangent
-                # not if less reduction of the error is left than the last tangent has brought
+                # keep a tangent that reduced the error by more than the reduction still needed
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
                     self.preconditioner.forget_tangent()
                     if not useless:
@@ -268,16 +311,20 @@ class BoundFixedPoint(BoundSolver):
                 tangent = np.inf if useless else search.error
             following, norm = anderson.step(x, self.preconditioner.correct(state.residual))
             search.count(1)
-            if (
-                norm > ASTRAY_GROWTH * smallest
-            ):  # the differences mislead: start again from the best
+            if norm > ASTRAY_GROWTH * smallest:  # restart from the best state
                 anderson.restart()
                 following, smallest = search.nearest.x, np.inf
             smallest = min(smallest, norm)
             x = following
 
-    def _set(self, step: LoadStep, factor: float, known: bool) -> list:
-        """The maps with a rho, and a preconditioner that belongs to them, with its tangent if that is ``known``."""
+    def _set_up_maps(self, step: LoadStep, factor: float, known: bool) -> list:
+        """Return the nodal maps for an augmentation parameter and set up their preconditioner.
+
+        Args:
+            step: The load step.
+            factor: Augmentation parameter relative to the nodal normal stiffness.
+            known: Whether to keep the last tangent of the preconditioner.
+        """
         bipotential = self._options.map == "bipotential"
         parameters = [factor * contact.stiffness.normal for contact in step.contacts]
         maps = [BipotentialMap(rho) if bipotential else ReturnMap(rho, rho) for rho in parameters]

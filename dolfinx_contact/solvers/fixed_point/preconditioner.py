@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The correction of an iteration: body with springs at its contact nodes, and the contact tangent next to the plane."""
+"""Preconditioner of the fixed point: stiffness plus springs, and the tangent near the contact."""
 
 from __future__ import annotations
 
@@ -23,17 +23,20 @@ if TYPE_CHECKING:
 
 
 class ContactPreconditioner:
-    """Corrects a displacement for forces out of balance; every application is one cycle or back-solve.
+    """Preconditioner of the fixed point: approximate displacement that removes a residual.
+
+    An application costs one multigrid cycle or back-solve.
 
     Args:
-        step: The step: its body, rows and laws of its contacts.
-        maps: Of each contact; their springs are added to the stiffness.  Collective.
+        step: The load step with its body and contacts.
+        maps: Nodal map of each contact; its springs are added to the stiffness.  Collective.
 
     Attributes:
-        rigid: ``RigidBalance`` of the motions that the springs stiffen too much.
-        stiffened: What applies the preconditioner of the stiffness with springs.
-        linearised: Whether corrections know a tangent.
-        followed: Whether motions of surfaces or anchors follow the body.
+        rigid: ``RigidBalance`` of the motions that the springs restrain too much.
+        stiffened: Object whose method ``apply`` applies the inverse of the stiffness with springs,
+            or a multigrid cycle.
+        linearised: Whether corrections use the contact tangent near the contact.
+        followed: Whether motions of driven surfaces or of anchors are corrected, see ``Border``.
     """
 
     def __init__(self, step: LoadStep, maps: Sequence[NodalMap]):
@@ -56,7 +59,11 @@ class ContactPreconditioner:
         S.destroy()
 
     def soften(self) -> bool:
-        """Look for more soft motions, of a step that does not converge; whether there are any new ones.  Collective."""
+        """Look for further soft motions; return whether any was added to ``rigid``.  Collective.
+
+        The candidates are the displacements under forces on the contacts.  This is done once, in a
+        load step that does not converge.
+        """
         if self._softened:
             return False
         self._softened, known = True, len(self.rigid)
@@ -66,24 +73,25 @@ class ContactPreconditioner:
         return len(rigid) > known
 
     def destroy(self) -> None:
-        """Free factors and levels.  Collective."""
+        """Free factorisations and multigrid levels.  Collective."""
         self.stiffened.destroy()
         self._A.destroy()
         if self._layer is not None:
             self._layer.destroy()
 
     def _rates(self, contacts: Sequence[ContactStep]) -> list[np.ndarray]:
-        """The maps' springs under the laws of each contact."""
+        """Spring stiffness of each contact's nodes, ``shape=(n, gdim)``, force per length."""
         both = zip(contacts, self._maps)
         return [map.springs(contact.friction, contact.points.dim) for contact, map in both]
 
     def same_springs(self, contacts: Sequence[ContactStep]) -> bool:
-        """Whether the laws of contacts have the springs that are set up.  Collective."""
+        """Whether the friction laws of the contacts lead to the springs already set up.
+        Collective."""
         same = all(map(np.array_equal, self._rates(contacts), self._spring_rates))
         return self._body.comm.allreduce(same, op=MPI.LAND)
 
     def _springs(self):
-        """The maps' springs, a PETSc matrix with entries at contact nodes alone."""
+        """Spring stiffness, a PETSc matrix with entries at contact nodes only."""
         K, S = self._body.K, None
         for points, springs in zip(self._points, self._spring_rates):
             matrix = points.matrix(springs[:, :, None] * np.eye(points.dim))
@@ -93,11 +101,12 @@ class ContactPreconditioner:
         return like(K, S)
 
     def linearise(self, step: LoadStep, derivatives: Sequence[tuple]) -> None:
-        """From now on corrections know how the contact nodes respond, see ``SurfaceLayer``.  Collective.
+        """Set up the contact tangent for the following corrections, see ``SurfaceLayer``.
+        Collective.
 
         Args:
-            step: The step, whose rows count.
-            derivatives: As ``LoadStep.derivatives`` returns them.
+            step: The load step with the present contact points.
+            derivatives: Derivatives of the nodal maps, as ``LoadStep.derivatives`` returns them.
         """
         if self._layer is None:
             prefix = f"{self._body.prefix}layer_"
@@ -107,17 +116,17 @@ class ContactPreconditioner:
         self.linearised = True
 
     def forget_tangent(self) -> None:
-        """Corrections by springs alone again."""
+        """Stop using the contact tangent: corrections use the springs only."""
         self.linearised = False
 
     def tangent(self, x: np.ndarray) -> np.ndarray:
-        """Minus the derivative of the forces out of balance along ``x``, where they were linearised."""
+        """Product of the contact tangent, minus the derivative of the residual, with ``x``."""
         return self._layer.multiply(x, self._body.multiply(x))
 
     def correct(self, residual: np.ndarray) -> np.ndarray:
-        """Displacement that removes the residual while the springs hold the contact nodes.
+        """Displacement increment that removes a residual, with springs at the contact nodes.
 
-        After ``linearise`` the layers next to the plane are corrected first.
+        After ``linearise``, the near-contact subdomain is corrected first.
         """
         residual, near = residual.copy(), 0.0
         residual[self._body.fixed] = 0.0

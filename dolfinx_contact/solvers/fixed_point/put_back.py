@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""A state that is no solution, and where to go on from it: nodes that miss the law most are put back where they were."""
+"""New start after a failed attempt: nodes that violate the contact law most lose their slip."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ if TYPE_CHECKING:
 
 
 def wrong(state: StepState) -> list[np.ndarray]:
-    """Forces by which the nodes of each contact miss the law in a state, by F itself, ``shape=(n,)``.  Collective."""
+    """Violation of the contact law at the nodes of each contact, ``shape=(n,)``, force units.
+    Collective.
+
+    Norm of the residual of the projection plus norm of the defect of the slip rule.  The reactions
+    are computed from the residual form F.
+    """
     state, found = state.step.measure(state.x, before=state), []
     for contact, nodes in zip(state.step.contacts, state.nodes):
         defect, _, slip = contact_defects(contact, nodes)
@@ -24,7 +29,14 @@ def wrong(state: StepState) -> list[np.ndarray]:
 
 
 def put_back(state: StepState, part: float) -> StepState:
-    """A state whose nodes that miss the law by more than a part of the most do not slip.  Collective."""
+    """Return a state in which the nodes that violate the contact law most have no slip.
+    Collective.
+
+    Args:
+        state: The state to start from.
+        part: Nodes whose violation exceeds this part of the largest one are moved back by their
+            slip increment.
+    """
     step, amounts, x = state.step, wrong(state), state.x.copy()
     largest = step.body.largest(np.concatenate([np.zeros(0), *amounts]))
     for contact, nodes, amount in zip(step.contacts, state.nodes, amounts):

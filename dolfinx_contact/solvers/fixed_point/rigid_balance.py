@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Motions of a body that soft springs or slenderness hardly resist, balanced apart from the rest."""
+"""Equilibrium along soft motions: rigid modes on soft supports, bending of slender bodies."""
 
 from __future__ import annotations
 
@@ -19,43 +19,48 @@ if TYPE_CHECKING:
     from dolfinx_contact.law.maps import NodalMap
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-# A motion is balanced apart if the springs of the preconditioner stiffen it more than this many times. The punch
-# (20 times; with flat elements at the plane up to 160) gains nothing by it, a block on springs of a hundredth of its
-# stiffness (up to 2300 times) more than halves its iterations.
+# A motion counts as soft if the springs of the preconditioner raise its stiffness by more than this
+# factor.  The reference paper's punch (factor 20; with flat elements at the contact up to 160)
+# gains nothing from a separate balance; a block on springs of a hundredth of its stiffness (up to
+# 2300) needs less than half the iterations.
 STIFFENING_FACTOR = 200.0
 
-# Motions whose part of their own, squared, is below this are combinations of others.
+# Eigenvalue of the scaled energy matrix, relative to the largest, below which motions are linearly
+# dependent.
 DEPENDENT_PART = 1e-10
 
-# Newton's method ends when the forces along the motions are this small beside those on all nodes.
+# Newton's method ends when the generalised forces are below this part of the norm of all nodal
+# forces, or after NEWTON_STEPS steps.
 SMALL_RESIDUAL = 1e-3
 NEWTON_STEPS = 20
 
-# The shortest part of a step of it that is tried.
+# Smallest step length of its line search, relative to the full Newton step.
 SHORTEST_STEP = 2.0**-11
 
-# Part of the largest slope that is none; lengths that are tried along such a motion, and part of the forces that may be left.
+# Stiffness, relative to the largest, that counts as zero; number of lengths tried along a motion
+# without stiffness; part of the generalised forces below which such a length is accepted.
 FREE_SLOPE = 1e-9
 LENGTHS_TRIED = 60
 RESIDUAL_LEFT = 0.9
 
 
 class RigidBalance:
-    """Moves a body until the forces along its soft motions are in balance.
+    """Equilibrium of a body along its soft motions, solved by Newton's method.
 
-    The springs of the preconditioner hold motions that the body hardly resists, so an iteration
-    hardly moves them: rigid ones on soft supports, the bending of slender bodies.  Their balance ``Z^T (f - K u + R(K u - f, u)) = 0``, ``R`` the nodal map, has a few
-    unknowns ``c`` of ``u + Z c`` and needs products at the contact nodes only: Newton's method, every step
-    halved until the forces along ``Z`` fall.
+    The springs of the preconditioner restrain motions with little elastic stiffness: rigid-body
+    modes on soft supports, bending of slender bodies.  A fixed-point iteration therefore hardly
+    changes them. Their equilibrium ``Z^T (f - K u + R(K u - f, u)) = 0``, with the nodal map ``R``,
+    is solved for a few coefficients ``c`` of ``u + Z c``; this needs products at the contact nodes
+    only.  Every Newton step is halved until the generalised forces along ``Z`` decrease.
 
     Args:
-        body: The elastic body, its stiffness assembled.
+        body: The elastic body with its assembled stiffness.
         A: The stiffness plus springs of the preconditioner, a PETSc matrix.
-        modes: Motions that may be soft, ``shape=(owned dofs, k)``.  Collective.
+        modes: Candidate motions, ``shape=(owned dofs, k)``.  Collective.
 
     Attributes:
         modes: The soft motions ``Z``, ``shape=(owned dofs, m)``.
-        forces: ``K Z``, of the same shape.
+        forces: ``K Z``, ``shape=(owned dofs, m)``.
     """
 
     def __init__(self, body: ElasticBody, A: PETSc.Mat, modes: np.ndarray):
@@ -68,13 +73,14 @@ class RigidBalance:
             A.mult(right, left)
             column[:] = left.array_r
         energy, all_energy = body.total([modes.T @ forces, modes.T @ stiffened])
-        # Motions orthonormal in the energy of A, by the share that K has in it: 1 where no spring acts.
+        # Motions orthonormal in the energy of A; their eigenvalue is the part of K in it, 1 without
+        # springs.
         root = _inverse_root(all_energy)
         share, vectors = np.linalg.eigh(root.T @ (energy + energy.T) @ root / 2)
         soft = root @ vectors[:, share < 1 / STIFFENING_FACTOR]
         self.modes, self.forces = modes @ soft, forces @ soft
         self._energy = soft.T @ energy @ soft
-        if len(self):  # of unknowns besides displacements nothing counts
+        if len(self):  # unknowns other than displacements are left out
             diagonal, are = A.getDiagonal().array_r, body.displacements.are
             self._scale = np.where(are, 1 / np.sqrt(np.where(are, diagonal, 1.0)), 0.0)
 
@@ -85,13 +91,17 @@ class RigidBalance:
     def balanced(
         self, x: np.ndarray, step: LoadStep, maps: Sequence[NodalMap], before: StepState
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """``x``, moved along the soft motions, or as it was if there is no way down; the step's ``forces`` there, and motions of surfaces.
+        """Move a displacement along the soft motions into equilibrium.
 
         Args:
             x: Displacement of owned degrees of freedom.
-            step: The ``LoadStep``.
-            maps: Of the contacts.
-            before: A state nearby.
+            step: The load step.
+            maps: Nodal map of each contact.
+            before: A nearby state.
+
+        Returns:
+            The new displacement, the forces ``step.forces`` there, and the motions of driven
+            surfaces.  If Newton's method finds no decrease, the displacement is unchanged.
         """
         start = (x, step.forces(x), before.c)
         if len(self) == 0:
@@ -124,13 +134,14 @@ class RigidBalance:
         maps: Sequence[NodalMap],
         near: StepState,
     ) -> tuple:
-        """Of a loose body with a motion that changes no forces, as where all nodes slip: to where one of them turns.
+        """Search along a motion without stiffness, as when all contact nodes slip.
 
-        Along that motion, the way that loads drive it, the length is doubled until less is left, and halved where that
-        turns round.
+        The search follows the motion in the direction of the loads.  The length is doubled until
+        the generalised forces decrease enough, or bisected once they change sign.
 
         Returns:
-            As a step of ``balanced``: a displacement and its forces, what is left there; None, None where there is no such place.
+            The displacement with its forces, and the result of ``left`` there; ``(None, None)`` if
+            no length is found, or if the body is not held by contact alone.
         """
         if self._body.loose is None:
             return None, None
@@ -151,7 +162,11 @@ class RigidBalance:
         return None, None
 
     def _limited(self, c: np.ndarray) -> np.ndarray:
-        """A step, of a body that contact alone holds no further than its size: it must not be lost."""
+        """Return the step ``c``, scaled down to displacements of at most the body's size.
+
+        Only the step of a body held by contact alone is limited: it could lose its contact for
+            good.
+        """
         if self._body.loose is None:
             return c
         return c * min(
@@ -166,9 +181,14 @@ class RigidBalance:
         maps: Sequence[NodalMap],
         before: StepState,
     ) -> tuple[np.ndarray, np.ndarray, float, StepState]:
-        """Forces along the motions, minus their derivative, the norm of the forces on all nodes, and the state.
+        """Evaluate the residual along the soft motions at a displacement.
 
-        All in roots of energy: each force over the root of its node's stiffness in A.
+        Forces are scaled by one over the square root of the nodal stiffness in ``A``, so that norms
+        are square roots of energies.
+
+        Returns:
+            Generalised forces ``Z^T residual``, ``shape=(m,)``; minus their derivative, ``shape=(m,
+            m)``; norm of the residual at all nodes; and the state.
         """
         n, surfaces = len(self), step.surfaces
         slope, pushed, pushing = np.zeros((n, n)), 0.0, 0.0
@@ -181,7 +201,7 @@ class RigidBalance:
                 axes = surfaces.axes[k]
                 pushed = pushed + np.tensordot(axes, change, ((0, 1), (0, 1)))
                 pushing = pushing + np.tensordot(Z, both[1] @ axes, ((0, 1), (0, 1)))
-        if surfaces is not None:  # which follow
+        if surfaces is not None:  # their motions are eliminated
             pushed = self._body.total(pushed)
             resisting = surfaces.tangent(step.contacts, derivatives)
             slope -= pushing @ np.linalg.solve(resisting, pushed)
@@ -194,9 +214,10 @@ class RigidBalance:
 
 
 def patch_motions(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
-    """What the body gives way to forces and moments on each of its contacts, ``shape=(owned dofs, m)``.
+    """Displacements of the body under forces and moments on each contact.
 
-    The bending of a slender body is among them.  One solve with the stiffness for each.  Collective.
+    The result has ``shape=(owned dofs, m)``.  The displacements include the bending of a slender
+    body.  Each one costs a solve with the stiffness. Collective.
     """
     rigid, motions = body.rigid_modes(), [np.zeros((body.size, 0))]
     for one in points:
@@ -210,7 +231,7 @@ def patch_motions(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndar
 
 
 def _inverse_root(energy: np.ndarray) -> np.ndarray:
-    """R with R^T energy R the identity, without the directions that are combinations of others."""
+    """Return ``R`` with ``R^T energy R = I``, without linearly dependent directions."""
     scale = 1 / np.sqrt(np.diag(energy))
     values, vectors = np.linalg.eigh(scale[:, None] * energy * scale)
     kept = values > DEPENDENT_PART * values[-1]

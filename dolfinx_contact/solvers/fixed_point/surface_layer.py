@@ -1,6 +1,6 @@
 # Copyright (c) 2026 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The contact tangent on the layers of nodes next to the plane: what a fixed preconditioner does not know."""
+"""The contact tangent on the near-contact subdomain, a correction to the fixed preconditioner."""
 
 from __future__ import annotations
 
@@ -21,35 +21,39 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.interface import ContactPoints
     from dolfinx_contact.step.load_step import LoadStep
 
-ELEMENT_LAYERS = 2  # with one, more iterations; with three, dearer ones for hardly fewer
+# Number of node layers of the near-contact subdomain, contact nodes included.  One layer needs more
+# iterations; three make iterations more expensive and hardly save any.
+ELEMENT_LAYERS = 2
 
 
 class SurfaceLayer:
-    """The fixed point linearised at the contact nodes, and its exact solution near the plane.
+    """Linearised contact on the near-contact subdomain: contact nodes and their neighbours.
 
-    The fixed point ``R(K u - f, u) - (K u - f) = 0`` at the contact nodes has the derivative
-    ``-J``, ``J = (I - R_r) K - R_u`` with the derivatives ``R_r, R_u`` of the nodal map, and is ``K`` inside
-    the body.  Where nodes slip against a rule that is not associated, ``J`` is far from symmetric, and
-    no springs resemble it.  Its block on the contact nodes and the nodes next to them is factorised.
+    The fixed-point equation ``R(K u - f, u) - (K u - f) = 0`` at the contact nodes has the
+    derivative ``-J`` with ``J = (I - R_r) K - R_u``, where ``R_r`` and ``R_u`` are the derivatives
+    of the nodal map ``R``.  Inside the body, ``J`` is ``K``.  If nodes slip with a non-associated
+    slip rule, ``J`` is far from symmetric, and no springs approximate it.  Its block on the
+    subdomain is factorised.
 
     Args:
-        body: The elastic body, its stiffness assembled.
-        points: ``ContactPoints`` of its contacts.
-        prefix: Of the PETSc options of the factorisation, MUMPS by default.
+        body: The elastic body with its assembled stiffness.
+        points: ``ContactPoints`` of each contact.
+        prefix: Prefix of the PETSc options of the factorisation, which is MUMPS by default.
 
     Attributes:
-        dofs: Owned free degrees of freedom of the layers.
+        dofs: Owned free degrees of freedom of the subdomain.
     """
 
     def __init__(self, body: ElasticBody, points: Sequence[ContactPoints], prefix: str):
         self._body, self._prefix = body, prefix
-        self.dofs = _near(body, points)
+        self.dofs = _subdomain_dofs(body, points)
         first, last = body.K.getOwnershipRange()
         rows, layer = (
             PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), body.comm)
             for dofs in (np.arange(first, last), first + self.dofs)
         )
-        # K on displacements of the layers: a product with all of K would cost a tenth of a cycle more.
+        # Columns of K in the subdomain: a product with all of K would cost a tenth of a multigrid
+        # cycle more.
         self._columns = body.K.createSubMatrix(rows, layer)
         self._near, self._forces = self._columns.createVecs()
         self._layer, self._block = layer, body.K.createSubMatrix(layer, layer)
@@ -64,11 +68,12 @@ class SurfaceLayer:
             self._solver.destroy()
 
     def linearise(self, step: LoadStep, derivatives: Sequence[tuple]) -> None:
-        """Factorise the block at new derivatives of the nodal maps.  Collective.
+        """Assemble and factorise the tangent on the subdomain.  Collective.
 
         Args:
-            step: The step, whose rows and surfaces count.
-            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
+            step: The load step, which provides the contact points and the driven surfaces.
+            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local
+                frame.
         """
         self._derivatives = derivatives
         self._points = [contact.points for contact in step.contacts]
@@ -91,10 +96,11 @@ class SurfaceLayer:
         A.destroy()  # the solver has its own reference
 
     def correct(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Remove the residual of the layers while the body beyond is held.
+        """Solve the linearised equations on the subdomain, with the rest of the body held fixed.
 
         Returns:
-            The displacement, zero beyond the layers, and the residual that it leaves.
+            The correction of the displacement, zero outside the subdomain, and the remaining
+            residual.
         """
         near = self._solver.solve(residual[self.dofs])
         correction = np.zeros_like(residual)
@@ -104,18 +110,21 @@ class SurfaceLayer:
         return correction, residual - self.multiply(correction, self._forces.array_r.copy())
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
+        """Product ``J x`` from ``forces = K x``; zero at constrained degrees of freedom.
+
+        If surfaces are driven by force, their motions are eliminated from ``J``.
+        """
         change = response(self._points, self._derivatives, forces, x)
         product = forces - change
-        if self._pushing is not None:  # surfaces that follow
+        if self._pushing is not None:  # surfaces driven by force
             pushed = self._body.total(self._pushing.T @ change)
             product -= self._pushed @ np.linalg.solve(self._resisting, pushed)
         product[self._body.fixed] = 0.0
         return product
 
 
-def _near(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
-    """Owned free degrees of freedom of the contact nodes and the ``LAYERS - 1`` layers next to them."""
+def _subdomain_dofs(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
+    """Owned free dofs of contact nodes and of ``ELEMENT_LAYERS - 1`` neighbour layers."""
     displacements = body.displacements
     gdim, nodes, near = (
         displacements.dim,

@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""The tangent of the whole body with the contact in its rows, factorised."""
+"""The tangent matrix of body and contact together, factorised."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ if TYPE_CHECKING:
 
 
 class ContactTangent:
-    """``J = (I - R_r) K - R_u``: minus the derivative of the forces out of balance, see ``SurfaceLayer``.
+    """Tangent ``J = (I - R_r) K - R_u`` of body and contact, minus the derivative of the residual.
 
-    It differs from ``K`` in the rows of contact nodes alone, and has no entry that ``K`` has not.  The
-    symbolic factorisation is kept.
+    ``K`` is the stiffness of the body; ``R_r`` and ``R_u`` are the derivatives of the new reactions
+    with respect to the required reactions and to the displacement.  ``J`` differs from ``K`` only
+    in the rows of contact nodes.  Its sparsity pattern is contained in the pattern of ``K`` unless
+    a contact point depends on several nodes.  The symbolic factorisation is kept.
 
     Args:
-        body: The body; its ``K`` may change its values, not its pattern.
-        points: ``ContactPoints`` of its contacts.
+        body: The body; the values of its ``K`` may change, the pattern may not.
+        points: ``ContactPoints`` of each contact.
     """
 
     def __init__(self, body: ElasticBody, points: Sequence[ContactPoints]):
@@ -62,19 +64,20 @@ class ContactTangent:
 
     @property
     def matrix(self) -> PETSc.Mat:
-        """``J``, once it was linearised; ``linearise`` changes its values."""
+        """The tangent ``J``, a PETSc matrix; None before the first call of ``linearise``."""
         return self._A
 
     @property
     def ksp(self) -> PETSc.KSP:
-        """The linear solver of ``matrix``."""
+        """The PETSc linear solver for ``matrix``."""
         return self._factors().ksp
 
     def linearise(self, derivatives: Sequence[tuple]) -> None:
-        """Set up at the present ``K`` and at derivatives of the nodal maps.  Collective.
+        """Assemble ``J`` from the present ``K`` and the derivatives of the nodal maps.  Collective.
 
         Args:
-            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local frame.
+            derivatives: For each contact ``R_r`` and ``R_u``, ``shape=(n, gdim, gdim)``, local
+                frame.
         """
         K, self._derivatives = self._body.K, derivatives
         with stage("contact: tangent"):
@@ -91,10 +94,11 @@ class ContactTangent:
             free.destroy()
 
     def _pattern(self) -> PETSc.Mat:
-        """A matrix with room for all entries.  Collective."""
+        """Return a matrix whose sparsity pattern holds all entries of ``J``.  Collective."""
         A, how = self._body.K.copy(), structure(self._points)
         if how != PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN:
-            # Of ones, products cancel where normals are along a diagonal.
+            # Random values: products of ones may cancel, for instance for a normal along a
+            # diagonal.
             any_values = np.random.default_rng(0).uniform(
                 1.0, 2.0, self._points[0].frames.shape[1:]
             )
@@ -108,13 +112,13 @@ class ContactTangent:
         return A
 
     def multiply(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """``J x``, zero at fixed degrees of freedom, from the forces ``K x``."""
+        """Product ``J x`` from ``forces = K x``; zero at constrained degrees of freedom."""
         product = forces - response(self._points, self._derivatives, self._free * forces, x)
         product[self._body.fixed] = 0.0
         return product
 
     def solve(self, residual: np.ndarray) -> np.ndarray:
-        """``J^-1`` of forces on owned degrees of freedom.
+        """Solve ``J x = residual``; arrays of owned degrees of freedom.
 
         Raises:
             LinearSolverError: ``J`` is singular.
@@ -130,12 +134,15 @@ class ContactTangent:
 
 
 def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> PETSc.Mat:
-    """``R_r K + R_u``, what the contact changes of ``K``.  Collective.
+    """Contribution ``R_r K + R_u`` of the contacts to a stiffness ``K``, a PETSc matrix.
+    Collective.
 
     Args:
-        K: PETSc matrix.
-        both: ``responses``, or such parts of them as belong to ``K``.
-        free: PETSc vector, one at free degrees of freedom, zero at others; None where all are free.
+        K: PETSc matrix: the stiffness, or a diagonal block of it.
+        both: The matrices ``R_r`` and ``R_u`` in the numbering of ``K``, as ``responses`` returns
+            them or as PETSc matrices.
+        free: PETSc vector, one at free degrees of freedom, zero at constrained ones; None if all
+            are free.
     """
     P, Q = (given if isinstance(given, PETSc.Mat) else like(K, given) for given in both)
     if free is not None:
@@ -149,10 +156,13 @@ def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> P
 
 
 def next_change(state: StepState) -> float:
-    """How much Newton's next step would still change the sums of reactions at nodes, over the forces that act.  Collective.
+    """Change of the nodal forces in the next Newton step, relative to the acting forces.
+    Collective.
+
+    Infinite if surfaces are driven by force, or if the tangent is singular.
 
     Args:
-        state: Of a step without planes that force drives, else infinite.
+        state: State of a load step near its solution.
     """
     step, body = state.step, state.step.body
     if step.surfaces is not None:
@@ -171,7 +181,15 @@ def next_change(state: StepState) -> float:
 
 
 class OnTangent(BoundSolver):
-    """A solver on the tangent of one body, bound; keeps its ordering."""
+    """Base class of solvers that factorise the ``ContactTangent`` of one problem.
+
+    Args:
+        options: The solver's options.
+        step: The first load step.
+
+    Raises:
+        ValueError: a surface is driven by force.
+    """
 
     def __init__(self, options: Any, step: LoadStep):
         if step.surfaces is not None:
@@ -187,7 +205,12 @@ class OnTangent(BoundSolver):
         self._tangent = ContactTangent(step.body, [contact.points for contact in step.contacts])
 
     def update(self, step: LoadStep) -> None:
-        """See ``BoundSolver``: nothing that is kept knows the law, and of a nonlinear body the stiffness is new in every iteration."""
+        """Discard the tangent if the frames of the contact nodes or the stiffness changed.
+        Collective.
+
+        The friction law enters only through ``linearise``, so its changes need no action.  For a
+        non-linear body, a new stiffness needs no new pattern.
+        """
         new, old = step.stamps, self._stamps
         stiffness = new.stiffness != old.stiffness and not self._body.nonlinear
         if stiffness or new.rows != old.rows:

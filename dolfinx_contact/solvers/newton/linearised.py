@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""Any solver on a nonlinear body: a sequence of contact steps of the linearised body."""
+"""Newton's method for non-linear bodies: a sequence of load steps of the linearised body."""
 
 from __future__ import annotations
 
@@ -18,22 +18,26 @@ from dolfinx_contact.step.load_step import LoadStep, StepState
 from dolfinx_contact.step.nonlinear import LinearisedStep
 from dolfinx_contact.support.line_search import halves
 
-# Linearised steps at most; of one is taken the largest half, quarter, ... after which the error is smaller than the
-# largest of the last ERRORS_BEFORE ones.
+# Largest number of linearised steps.  Line search: lengths 1, 1/2, 1/4, ... down to SHORTEST_STEP
+# are tried until the error falls below the largest of the last ERRORS_BEFORE errors.
 MOST_STEPS = 30
 SHORTEST_STEP = 2.0**-6
 ERRORS_BEFORE = 3
 
-# Tolerance of a linearised step: at most ROUGH_TOLERANCE, else this part of what is left after it, were errors to fall as squares.
+# Tolerance of a linearised step: TOLERANCE_PART of the error expected after it with quadratic
+# convergence, and at most ROUGH_TOLERANCE.
 ROUGH_TOLERANCE = 1e-3
 TOLERANCE_PART = 0.1
 
 
 class Linearised(Solver):
-    """Newton's method: in every iteration a solver's contact step of the body linearised at the last iterate.
+    """Newton's method for non-linear bodies: a sequence of linearised load steps.
+
+    Each iteration solves a load step with contact.  The body is linearised at the last iterate; the
+    contact law is not.
 
     Args:
-        solver: The solver of the linearised steps.
+        solver: Options of the solver for the linearised steps.
     """
 
     nonlinear = True
@@ -47,33 +51,35 @@ class Linearised(Solver):
 
 
 class BoundLinearised(BoundSolver):
-    """The method for one body; the solver is bound anew to every tangent."""
+    """Newton's method for one problem; the inner solver is set up anew for every tangent."""
 
     def __init__(self, solver: Solver):
         self._solver = solver
 
     def close(self) -> None:
-        """Nothing is kept."""
+        """Do nothing: the solver keeps no data between load steps."""
 
     def update(self, step: LoadStep) -> None:
-        """Nothing is kept."""
+        """Do nothing: the solver keeps no data between load steps."""
 
     def solve(
         self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
     ) -> SolverResult:
-        """Linearise until the errors are at most the tolerance, or nothing helps any more.
+        """Iterate until the errors are at most the tolerance or no step reduces them.
+
+        Returns the best state.
 
         Args:
             step: The ``NonlinearStep``.
-            starts: For the solver.
-            start: Where to begin; None asks the step.
+            starts: Start data of earlier steps, passed to the inner solver.
+            start: The initial state; None takes ``step.start()``.
         """
         best = step.start() if start is None else start
         state, forward, iterations, used, own = best.as_start, np.inf, 0, [], []
         errors, last = deque([np.inf], maxlen=ERRORS_BEFORE), np.inf
         while len(used) < MOST_STEPS:
             try:
-                with np.errstate(all="ignore"):  # a trial may turn elements inside out
+                with np.errstate(all="ignore"):  # a trial displacement may invert elements
                     found = self._linear_step(step, state, last, [*starts, *own])
             except (LinearSolverError, np.linalg.LinAlgError):
                 break
@@ -98,7 +104,7 @@ class BoundLinearised(BoundSolver):
     def _linear_step(
         self, step: LoadStep, state: StepState, error: float, starts: Sequence[Any]
     ) -> SolverResult:
-        """The contact step of the body linearised at a state, whose error is known."""
+        """Solve the load step of the body linearised at a state; ``error`` is the state's error."""
         body = step.body
         body.linearise(state.x)
         tol = max(
@@ -116,9 +122,10 @@ class BoundLinearised(BoundSolver):
             bound.close()
 
     def _bind(self, step: LoadStep) -> BoundSolver:
-        """The solver, bound to the present tangent; the fixed point where that is none of a body by itself.
+        """Set up the inner solver with the present tangent, or ``FixedPoint`` if it refuses it.
 
-        Bodies under pressure may be stable on the plane alone: without it nodes would not give way to their reactions.
+        The tangent of a body may be unstable without its contacts, for instance under pressure.
+        Then contact nodes have no positive compliance, and other solvers refuse the tangent.
         """
         try:
             return self._solver.bind(step)
@@ -126,14 +133,18 @@ class BoundLinearised(BoundSolver):
             return FixedPoint().bind(step)
 
     def _part(self, state: StepState, to: StepState, most: float) -> StepState | None:
-        """The state of the step at a part of the way; None if no part helps."""
+        """Return the first state between ``state`` and ``to`` with an error below ``most``.
+
+        This is a line search from ``to`` backwards.  None if no step length reduces the error
+        enough.
+        """
         step = state.step
         for length in halves(SHORTEST_STEP):
             x = to.x if length == 1.0 else state.x + length * (to.x - state.x)
             trial = step.measure(x, c=to.c, before=state)
             step.tell(trial)
             error, moved = trial.errors.largest, np.isfinite(step.size(trial.forces))
-            # Supports that are not yet where they should be make any error infinite.
+            # The error is infinite until the displacement has its boundary values.
             if moved and (error < most or error == np.inf == most):
                 return trial
         return None

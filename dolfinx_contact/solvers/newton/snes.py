@@ -1,6 +1,6 @@
 # Copyright (c) 2025 The dolfinx_contact authors
 # SPDX-License-Identifier: MIT
-"""PETSc's SNES on the forces out of balance of body and contact together."""
+"""PETSc's non-linear solver SNES, applied to the residual of body and contact together."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
 DEFAULT_OPTIONS = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
-MOST_ITERATIONS = 10_000  # iterations, far more than snes_max_it
+# Iteration limit of the search: far above ``snes_max_it``, so that SNES alone decides when to stop.
+MOST_ITERATIONS = 10_000
 DIVERGED_REASONS = {
     value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] in "CD"
 }
@@ -32,14 +33,17 @@ DIVERGED_REASONS = {
 
 @dataclass(frozen=True, eq=False)  # a dictionary has no hash
 class SNES(Solver):
-    """PETSc's SNES on the equations of ``SparseNewton``, with its types, line searches, monitors and options.
+    """PETSc's SNES on the equations of ``SparseNewton``, with its types, line searches and options.
 
-    One Newton step brings supports to their positions and finds which nodes touch; SNES continues from there.  It ends when the
-    errors of the step are at most ``tol`` of the problem; ``snes_rtol`` and the like are ignored.  The prefix of its options is
-    the problem's ``petsc_options_prefix``.  Linear systems are factorised; the prefix of their options ends in ``tangent_``.
+    One Newton step first imposes the boundary values and finds which nodes are in contact; SNES
+    continues from there.  It ends when the errors of the step are at most the ``tol`` of the
+    problem; ``snes_rtol`` and similar options are ignored.  The prefix of its options is the
+    problem's ``petsc_options_prefix``. Linear systems are factorised; the prefix of their options
+    ends in ``tangent_``.
 
     Attributes:
-        petsc_options: Options of SNES, a dictionary, without prefix.  PETSC_OPTIONS and the command line override them.
+        petsc_options: Dictionary of SNES options without prefix.  The environment variable
+            PETSC_OPTIONS and the command line override them.
 
     Raises:
         ValueError: ``petsc_options`` is not a dictionary.
@@ -63,17 +67,17 @@ class SNES(Solver):
 
 
 class BoundSNES(OnTangent):
-    """SNES for one body."""
+    """PETSc's SNES, set up for the load steps of one problem."""
 
     def solve(
         self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
     ) -> SolverResult:
-        """Let SNES iterate until the errors are at most the tolerance, or it gives up.
+        """Run SNES until the errors are at most the tolerance or SNES stops; return the best state.
 
         Args:
-            step: The ``LoadStep``.
+            step: The load step.
             starts: Not used.
-            start: Where to begin; None asks the step.
+            start: The initial state; None takes ``step.start()``.
         """
         state = step.start() if start is None else start
         search = Search(step, state, math.inf)
@@ -81,7 +85,7 @@ class BoundSNES(OnTangent):
         kappa = [contact.stiffness.normal for contact in step.contacts]
         maps = [ReturnMap(NORMAL_FACTOR * rho, rho) for rho in kappa]
         message = "converged at its start"
-        with np.errstate(all="ignore"):  # a trial may turn elements inside out
+        with np.errstate(all="ignore"):  # a trial displacement may invert elements
             state = step.evaluate(state.x, maps, before=state.as_start)
             if step.held(state.x):
                 search.see(state)
@@ -103,7 +107,13 @@ class BoundSNES(OnTangent):
         search: Search,
         stands: bool,
     ) -> StepState:
-        """What Newton's method makes of a state until supports are where they should be, after one step as a rule."""
+        """Apply Newton steps until the displacement has its boundary values; return that state.
+
+        One step is usually enough.
+
+        Raises:
+            LinearSolverError: no part of a Newton step reduces the residual enough.
+        """
         descent, length = Descent(step, self._tangent, stands), 1.0
         descent.begin(maps)
         while length > 0.0:
@@ -114,7 +124,7 @@ class BoundSNES(OnTangent):
         raise LinearSolverError("no part of Newton's step brings the supports to their places.")
 
     def _iterate(self, equations: _Equations, x: np.ndarray) -> str:
-        """What PETSc says of its method and of how it ended."""
+        """Run SNES from a displacement; return its type and converged reason as text."""
         X, residual = self._tangent.matrix.createVecs()
         X.array_w[:] = x
         snes = PETSc.SNES().create(self._body.comm)
@@ -132,7 +142,7 @@ class BoundSNES(OnTangent):
             equations.search.count(snes.getIterationNumber())
             reason = snes.getConvergedReason()
             return f"{snes.getType()}, {DIVERGED_REASONS.get(reason, reason)}"
-        except PETSc.Error as failure:  # since 3.25 what a callback raises is hidden behind one
+        except PETSc.Error as failure:  # since PETSc 3.25, it hides the exception of a callback
             raise equations.failure or failure from None
         finally:
             for part in (snes, X, residual):
@@ -140,11 +150,11 @@ class BoundSNES(OnTangent):
 
 
 class _Equations:
-    """Forces that are too much at a displacement, their derivative, and whether they are small enough.
+    """Callbacks of SNES: residual, Jacobian and convergence test.
 
     Attributes:
-        search: The ``Search``, which knows the best iterate.
-        failure: What a callback has raised.
+        search: The ``Search``, which keeps the best iterate.
+        failure: The exception that a callback raised; None if there was none.
     """
 
     def __init__(
@@ -159,7 +169,7 @@ class _Equations:
         self._seen = self._last = state
 
     def calls(self, work: Callable) -> Callable:
-        """A callback of PETSc that leaves what it raises in ``failure``."""
+        """Return a callback that calls ``work`` and stores its exception in ``failure``."""
 
         def call(*arguments: Any):
             try:
@@ -171,24 +181,27 @@ class _Equations:
         return call
 
     def _at(self, X: PETSc.Vec) -> StepState:
-        """The state of a displacement, which PETSc asks for several times."""
+        """Return the state at a displacement; the last one is cached for repeated calls."""
         if not self._step.body.same(X.array_r, self._last.x):
             self._last = self._step.evaluate(X.array_r.copy(), self._maps, before=self._seen)
         return self._last
 
     def function(self, snes: PETSc.SNES, X: PETSc.Vec, residual: PETSc.Vec) -> None:
-        """Forces that are too much; zero at fixed degrees of freedom."""
+        """Compute minus the forces out of balance; zero at constrained degrees of freedom."""
         residual.array_w[:] = -self._at(X).residual
 
     def jacobian(self, snes: PETSc.SNES, X: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Their derivative, written into the tangent's matrix."""
+        """Assemble the derivative of ``function`` in the matrix of the contact tangent."""
         state, body = self._at(X), self._step.body
         if body.nonlinear:
             body.linearise(state.x)
         self._tangent.linearise(self._step.derivatives(state, self._maps))
 
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
-        """Judge the iterate by the errors of the step."""
+        """Return PETSc's reason for convergence if the search has ended, else 0.
+
+        The criterion is the errors of the load step, instead of PETSc's norms.
+        """
         self._seen = self.search.see(self._at(snes.getSolution()))
         done = self.search.over
         return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE if done else 0

@@ -26,16 +26,20 @@ if TYPE_CHECKING:
 
 SOLVER_NAME = "SparseNewton"
 
-# Augmentation parameters over the nodal stiffness, along the normal and along slip; the next one where steps get SHORT_STEP.
+# Augmentation parameters relative to the nodal normal stiffness, for the normal and the tangential
+# reactions.  If the line search takes less than SHORT_STEP of a Newton step, the next tangential
+# one follows.
 NORMAL_FACTOR = 10.0
 TANGENTIAL_FACTORS = (1.0, 0.3, 0.1)
 SHORT_STEP = 0.1
 
-# Of the parameter along the normal: with so little predictors are the reactions that the body asks for.
+# Factor on the normal augmentation parameter.  With a parameter this small, the predictor equals
+# the reaction required for equilibrium.
 TINY_FACTOR = 1e-12
 
-# Of a step is taken the largest half, quarter, ... after which the residual is smaller than the largest of the last
-# RESIDUALS_BEFORE ones; below SHORTEST_STEP there is none. Iterations in which the smallest error has to halve.
+# Non-monotone line search: lengths 1, 1/2, 1/4, ... down to SHORTEST_STEP are tried until the
+# residual falls below the largest of the last RESIDUALS_BEFORE residuals.
+# The search ends if the smallest error does not halve within HALVING_ITERATIONS iterations.
 RESIDUALS_BEFORE = 5
 SHORTEST_STEP = 2.0**-9
 HALVING_ITERATIONS = 12
@@ -43,10 +47,12 @@ HALVING_ITERATIONS = 12
 
 @dataclass(frozen=True)
 class SparseNewton(Solver):
-    """Newton's method on body and contact together: ``-F(u) + r(F(u), u) = 0``, with the nodal map r of the law, see docs/nonlinear.md.
+    """Newton's method on body and contact together: ``-F(u) + r(F(u), u) = 0``.
 
-    An iteration assembles the tangent of the body, replaces its rows at contact nodes with the derivatives of predictor and
-    corrector, and factorises it (MUMPS).  Bodies that are linear in ``u`` are not assembled again.
+    ``F`` is the residual form and ``r`` the nodal map (predictor and corrector) of the contact law,
+    see docs/nonlinear.md.  An iteration assembles the tangent of the body, replaces its rows at
+    contact nodes with the derivatives of predictor and corrector, and factorises it (MUMPS).  If
+    ``F`` is linear in ``u``, the stiffness is not assembled again.
 
     Attributes:
         max_iterations: Iteration limit.
@@ -73,30 +79,32 @@ class SparseNewton(Solver):
 
 
 class BoundSparseNewton(OnTangent):
-    """The method for one body."""
+    """Newton's method with a sparse factorisation, set up for the load steps of one problem."""
 
     def solve(
         self, step: LoadStep, starts: Sequence[Any] = (), start: StepState | None = None
     ) -> SolverResult:
-        """Iterate until the errors are at most the tolerance, or nothing helps any more.
+        """Iterate until the errors are at most the tolerance or a limit is reached.
+
+        Returns the best state.
 
         Args:
-            step: The ``LoadStep``.
+            step: The load step.
             starts: Not used.
-            start: Where to begin; None asks the step.
+            start: The initial state; None takes ``step.start()``.
         """
         state = step.start() if start is None else start
         search = Search(step, state, self._options.max_seconds)
         search.begin(search.best, self._options.max_iterations, HALVING_ITERATIONS)
         descent, self._seen = Descent(step, self._tangent, stands=start is None), state.as_start
         x, forces = state.x, state.forces
-        state = start = None  # no more than three are kept
+        state = start = None  # to save memory: at most three states are kept
         for tangential in cycle(TANGENTIAL_FACTORS):
             parameters = [contact.stiffness.normal for contact in step.contacts]
             maps = [ReturnMap(NORMAL_FACTOR * rho, tangential * rho) for rho in parameters]
             try:
-                with np.errstate(all="ignore"):  # a trial may turn elements inside out
-                    x, forces = self._fall(search, descent, x, forces, maps)
+                with np.errstate(all="ignore"):  # a trial displacement may invert elements
+                    x, forces = self._iterate(search, descent, x, forces, maps)
             except LinearSolverError:
                 break
             if not search.goes_on:
@@ -105,7 +113,7 @@ class BoundSparseNewton(OnTangent):
             search.best, search.iterations, search.forward_error, SolverName.SPARSE_NEWTON
         )
 
-    def _fall(
+    def _iterate(
         self,
         search: Search,
         descent: Descent,
@@ -113,7 +121,11 @@ class BoundSparseNewton(OnTangent):
         forces: np.ndarray,
         maps: Sequence[ReturnMap],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Steps with the same maps until the search ends or one gets short: displacement and forces of the last iterate."""
+        """Apply Newton steps with the same nodal maps until the search ends or a step is short.
+
+        Returns:
+            Displacement and forces of the last iterate.
+        """
         descent.begin(maps)
         step = search.step
         while True:
@@ -130,34 +142,45 @@ class BoundSparseNewton(OnTangent):
 
 
 class Descent:
-    """Steps of Newton's method, each no longer than it helps.
+    """Newton steps on body and contact, with a line search.
 
-    Supports that are not where they should be are moved with the step: where ``d`` is missing, ``J d`` is part of the
-    residual, and a step of length t leaves ``1 - t`` of it.
+    Boundary values are imposed by the same steps.  If prescribed displacements still lack an
+    increment ``d``, then ``J d`` is part of the residual, and a step of length ``t`` leaves ``(1 -
+    t) J d`` of it.
+
+    Args:
+        step: The load step.
+        tangent: The tangent matrix of body and contact.
+        stands: Whether the first iteration reuses the body's present stiffness.
     """
 
     def __init__(self, step: LoadStep, tangent: ContactTangent, stands: bool):
         self._step, self._body, self._tangent = step, step.body, tangent
-        self._stands = stands  # the body's tangent is good enough
+        self._stands = stands  # reuse the body's present stiffness in the first iteration
 
     def begin(self, maps: Sequence[ReturnMap]) -> None:
-        """With these maps from now on; the first step may lead to a larger residual: it finds who touches."""
+        """Set the nodal maps for the following steps and restart the line search.
+
+        The first step may increase the residual, since it finds which nodes are in contact.
+        """
         self._maps, self._sizes, self._free = maps, deque(maxlen=RESIDUALS_BEFORE), True
 
     def advance(self, state: StepState, chord: bool) -> tuple[StepState, float]:
-        """The next iterate, and the part of the step that leads to it: 0 if none helps.
+        """Return the next iterate and the step length, relative to the full Newton step.
+
+        If no length reduces the residual enough, the iterate itself and length 0 are returned.
 
         Args:
-            state: The iterate.
-            chord: Whether the last tangent is good enough.
+            state: The present iterate.
+            chord: Whether to reuse the last tangent.
         """
         step, maps, x = self._step, self._maps, state.x
         if not chord or self._tangent.matrix is None:
             if self._body.nonlinear and not self._stands:
                 self._body.linearise(x)
-            maps = self._following(state) if self._stands else maps
+            maps = self._maps_keeping_contact(state) if self._stands else maps
             self._stands = False
-            closing = self._closing(x, maps) if self._free else maps
+            closing = self._maps_at_zero_gap(x, maps) if self._free else maps
             self._tangent.linearise(step.derivatives(state, closing))
         here = step.evaluate(x, maps, forces=state.forces, before=state)
         carried, missing = np.zeros_like(x), step.missing(x)
@@ -176,12 +199,14 @@ class Descent:
                 return there, length
         return state, 0.0
 
-    def _following(self, state: StepState) -> list:
-        """Maps for which nodes under load stay pressed where their plane moves off: Newton's step closes their gaps.
+    def _maps_keeping_contact(self, state: StepState) -> list:
+        """Nodal maps that keep frictionless nodes in contact if their surface moves away.
 
-        Let go, all would spring back at once. Where gaps close does not depend on the augmentation parameter ``rho``, as
-        long as the predictor ``r - rho g`` is positive. With friction they are let go, along the plane, too: held, steps
-        that turn back took more iterations.
+        The Newton step then closes the gaps of these nodes; if they were open instead, all would
+        spring back at once.  The normal parameter ``rho`` of such a node is reduced until its
+        predictor ``r - rho g`` is positive; the solution of the linear system does not depend on
+        ``rho``.  Nodes with friction keep their maps, since load reversals took more iterations
+        otherwise.
         """
         asked = [ReturnMap(TINY_FACTOR * m.normal, m.tangential) for m in self._maps]
         state = self._step.evaluate(state.x, asked, forces=state.forces, before=state)
@@ -194,17 +219,20 @@ class Descent:
             maps.append(ReturnMap(normal, map.tangential))
         return maps
 
-    def _closing(self, x: np.ndarray, maps: Sequence[ReturnMap]) -> list:
-        """Maps for which nodes that just touch do so under load: a body at rest on a plane is not to fall through."""
+    def _maps_at_zero_gap(self, x: np.ndarray, maps: Sequence[ReturnMap]) -> list:
+        """Nodal maps whose derivatives count nodes at zero gap as nodes in contact.
+
+        Otherwise a body that rests on a surface without pressure would pass through it.
+        """
         both = zip(self._step.contacts, maps)
-        return [_Closing(map, contact.gap_rounding(x)) for contact, map in both]
+        return [_ShiftedMap(map, contact.gap_rounding(x)) for contact, map in both]
 
 
-class _Closing(NamedTuple):
-    """The derivatives of a map at smaller gaps."""
+class _ShiftedMap(NamedTuple):
+    """A nodal map whose derivatives are taken at gaps reduced by ``depth``."""
 
     map: ReturnMap
-    depth: float  # length
+    depth: float  # length units
 
     def linearised(self, law: NodalLaw, reaction: np.ndarray, gap: np.ndarray, slip: np.ndarray):
         return self.map.linearised(law, reaction, gap - self.depth, slip)
