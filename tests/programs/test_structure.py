@@ -20,7 +20,7 @@ PROGRAMS = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("
 TREES = {file: ast.parse(file.read_text()) for file in PROGRAMS}
 PACKAGE = {file: tree for file, tree in TREES.items() if ROOT / "dolfinx_contact" in file.parents}
 PUBLIC = ("dolfinx_contact.compat", "dolfinx_contact.extend")  # beside the package itself
-LINES = 60  # of a function
+STATEMENTS = 50  # of a function
 CIRCLE = 7  # files that import each other, in a circle, some for type checkers alone
 INTERFACES, MEMBERS = 8, 12
 
@@ -33,10 +33,10 @@ def name(file: Path) -> str:
 
 @pytest.mark.parametrize("file", PROGRAMS, ids=name)
 def test_functions_are_short(file):
-    """No function has more than 60 lines."""
+    """No function has more than 50 statements, however they are broken into lines; docstrings do not count."""
     functions = [n for n in ast.walk(TREES[file]) if isinstance(n, ast.FunctionDef)]
-    long = {f.name: n for f in functions if (n := f.end_lineno - f.lineno + 1) > LINES}
-    assert not long
+    counts = {f.name: sum(isinstance(n, ast.stmt) for n in ast.walk(f)) - 2 for f in functions}
+    assert not {function: count for function, count in counts.items() if count > STATEMENTS}
 
 
 @pytest.mark.parametrize("file", PACKAGE, ids=name)
@@ -195,6 +195,7 @@ def test_names_in_words_exist():
                 words = ast.get_docstring(node) or ""
                 called += re.findall(r"``([A-Z]\w+\.[a-z_]\w+)``", words)
                 called += re.findall(r"\b([A-Z]{3,}_[A-Z_0-9]{2,}|(?<=``)[A-Z]{4,}(?=``))", words)
+    defined.add("PETSC_OPTIONS")  # a variable of the shell
     missing = [one for one in called if not set(one.split(".")) <= defined]
     assert not missing
 
