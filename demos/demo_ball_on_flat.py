@@ -41,7 +41,7 @@ import dolfinx_contact as dc  # before DOLFINx, which one of its wheels needs
 import numpy as np
 from helpers import (
     elastic,
-    everywhere,
+    on_all_ranks,
     picture,
     point_force_field,
     quarter_block,
@@ -102,7 +102,7 @@ def main(cells: int = 20):
     states = press(cells)
     contact = next(states)
     force = contact.force()
-    x, normal, pressure = everywhere(contact.x, contact.reaction[:, 2], contact.pressure)
+    x, normal, pressure = on_all_ranks(contact.x, contact.reaction[:, 2], contact.pressure)
     r = np.hypot(x[:, 0], x[:, 1])
     off = -4 * force[2] / FORCE - 1
     radius = np.sqrt(2.5 * (normal @ r**2) / normal.sum()) / A - 1

@@ -40,7 +40,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, hooke, on_all_ranks, picture, say
 
 E, NU, CLEARANCE = 1.0, 0.3, 2e-3
 CORE, OUTER = 0.1, 20.0  # radii
@@ -104,7 +104,7 @@ def main(cells: int = 160) -> tuple:
         way.value[0] = ratio * CLEARANCE
         problem.solve()
         load = 2 * contact.force()[0] / (-E / (1 - NU**2) * CLEARANCE)
-        x, p = everywhere(contact.x, contact.pressure)
+        x, p = on_all_ranks(contact.x, contact.pressure)
         angle = np.arctan2(x[:, 1], x[:, 0])
         last = angle[p > 0].max()
         fits = np.linspace(0.01, 1.47, 20001)

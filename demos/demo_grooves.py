@@ -47,7 +47,7 @@ from dolfinx import fem, mesh
 from helpers import (
     COMM,
     elastic,
-    everywhere,
+    on_all_ranks,
     picture,
     point_force_field,
     quarter_block,
@@ -134,7 +134,7 @@ def guided(angle: float, grooves: float) -> np.ndarray:
 def main(cells: int = 16):
     """Solve, print and assert what is claimed above; places and pressure of the nodes."""
     contact = press(cells)
-    x, normal, pressure = everywhere(contact.x, contact.reaction[:, 2], contact.pressure)
+    x, normal, pressure = on_all_ranks(contact.x, contact.reaction[:, 2], contact.pressure)
     sizes = [np.sqrt(5 * (normal @ x[:, k] ** 2) / normal.sum()) for k in range(2)]
     found = [
         sizes[0] / A,

@@ -37,7 +37,7 @@ from types import SimpleNamespace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, picture, say
+from helpers import COMM, on_all_ranks, picture, say
 
 YOUNG, NU, YIELD = 1000.0, 0.3, 1.0
 SHEAR, BULK, HARDENING = YOUNG / (2 + 2 * NU), YOUNG / (3 - 6 * NU), 1e-3 * YOUNG
@@ -146,7 +146,7 @@ def main(cells=(10, 20)) -> dict:
     found = 2 * fine - coarse
     u = scenes[-1].u.x.array.reshape(-1, 2)[: scenes[-1].V.dofmap.index_map.size_local]
     x = scenes[-1].V.tabulate_dof_coordinates()[: len(u), :2]
-    x, u = everywhere(x, u)
+    x, u = on_all_ranks(x, u)
     left = -u[:, 1].min() / depths[deepest]
     say(
         f"pressure over (2 + pi) k: {coarse:.3f}, {fine:.3f}, extrapolated {found:.3f}; imprint {left:.2f} times the depth"

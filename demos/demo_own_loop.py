@@ -15,7 +15,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from demos.helpers import everywhere, say
+from demos.helpers import on_all_ranks, say
 from studies.punch import Parameters, Punch
 
 
@@ -65,7 +65,7 @@ def compare(case: str = "C", displacements=(0.05, 0.1, 0.07)) -> float:
         own.move_top(displacement)
         iterations = loop.solve(tol=1e-13)
         record = reference.press(displacement)
-        found, expected = everywhere(own.contact.reaction, reference.contact.reaction)
+        found, expected = on_all_ranks(own.contact.reaction, reference.contact.reaction)
         differences.append(np.abs(found - expected).max() / np.abs(expected).max())
         say(f"{displacement} mm: {iterations} iterations, ContactProblem {record['iterations']}, "
             f"difference {differences[-1]:.1e}")  # fmt: skip

@@ -41,7 +41,7 @@ import gmsh
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, picture, say
+from helpers import COMM, on_all_ranks, picture, say
 
 R, OUTER, L, DELTA, MU = 10.0, 20.0, 15.0, 0.01, 0.15
 E, NU = (210e3, 70e3), (0.3, 0.33)  # of shaft and hub
@@ -119,7 +119,7 @@ def fitted(cells: int):
 # %%
 def pressures(contact: dc.Contact) -> tuple[np.ndarray, np.ndarray]:
     """Heights of all nodes, sorted, and pressures there, on every rank."""
-    z, p = everywhere(contact.x[:, 1], contact.pressure)
+    z, p = on_all_ranks(contact.x[:, 1], contact.pressure)
     order = np.argsort(z)
     return z[order], p[order]
 

@@ -39,7 +39,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
+from helpers import COMM, hooke, on_all_ranks, picture, picture_of_body, say
 
 E, NU, MU = 210e3, 0.3, 0.3
 LENGTH, WEIGHT = 100.0, 77.0  # a cube of steel
@@ -62,7 +62,7 @@ def cube(cells: int = 8):
 def reactions(problem):
     """Places and reactions of all contact nodes, global components, on every rank."""
     contact = problem.contacts[0]
-    return everywhere(contact.x, contact.reaction @ contact.frame)
+    return on_all_ranks(contact.x, contact.reaction @ contact.frame)
 
 
 # %% [markdown]

@@ -41,7 +41,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
+from helpers import COMM, hooke, on_all_ranks, picture, picture_of_body, say
 
 RADIUS, HEIGHT, E, NU = 10.0, 10.0, 210e3, 0.3
 MU, P = (0.30, 0.15), (0.05, 0.20)  # case C of [dSFMH07, Table 1]
@@ -84,7 +84,7 @@ def run(quarter: bool) -> list[dict]:
     for depth in DEPTHS:
         pressed.value[2] = -depth
         step = problem.solve()
-        x, r, work = everywhere(contact.x, contact.reaction, contact.dissipation)
+        x, r, work = on_all_ranks(contact.x, contact.reaction, contact.dissipation)
         here = (x[:, :2] > -1e-9 * RADIUS).all(axis=1)
         x, r = x[here], r[here]
         if quarter:

@@ -46,7 +46,7 @@ from dolfinx_contact.compat import mixed_functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, picture, say
+from helpers import COMM, on_all_ranks, picture, say
 
 INNER, SHEAR = 0.6, 1.0
 STEP, STEPS = 0.025, 12  # displacement of the plate in a step; the height goes down by 30 %
@@ -112,8 +112,8 @@ def flatten(mu: float, depths) -> dict:
     u = problem.u.sub(0).collapse()
     n = u.function_space.dofmap.index_map.size_local
     x = u.function_space.tabulate_dof_coordinates()[:n, :2]
-    shape = everywhere(x, u.x.array[: 2 * n].reshape(-1, 2))
-    touch = everywhere(contact.x[:, :2], contact.reaction[:, -1])
+    shape = on_all_ranks(x, u.x.array[: 2 * n].reshape(-1, 2))
+    touch = on_all_ranks(contact.x[:, :2], contact.reaction[:, -1])
     return {name: np.array(row) for name, row in found.items()} | dict(shape=shape, touch=touch)
 
 

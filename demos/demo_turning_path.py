@@ -51,7 +51,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, say
+from helpers import COMM, hooke, on_all_ranks, picture, say
 
 MU, P = np.array([0.30, 0.15]), np.array([0.05, 0.20])  # case C of [dSFMH07, Table 1]
 STEP = 0.5  # |Delta s|, mm
@@ -105,7 +105,7 @@ def drag(depth: float, p) -> dict[str, np.ndarray]:
         assert step.counts.slip == sum(step.counts)  # all nodes touch and slide
         force, expected = contact.force(), closed_form(angle, p)
         total = np.linalg.norm(force[:2] - force[2] * expected) / np.linalg.norm(force[:2])
-        r, dissipation = everywhere(contact.reaction, contact.dissipation)
+        r, dissipation = on_all_ranks(contact.reaction, contact.dissipation)
         worst = np.linalg.norm(r[:, :2] - r[:, 2:] * expected, axis=1).max() / force[2]
         rows.append((force, total, worst, dissipation.sum() - before))
         before = dissipation.sum()

@@ -41,7 +41,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
+from helpers import COMM, hooke, on_all_ranks, picture, picture_of_body, say
 
 E, NU, MU = 210e3, 0.0, 0.2
 INNER, WIDTH, HEIGHT = 1.0, 2.0, 0.2  # the foot is INNER < x < INNER + WIDTH, |y| < WIDTH / 2
@@ -78,7 +78,7 @@ def friction(problem):
     """Positions, normal reactions and friction of all contact nodes, global components, on every rank."""
     contact = problem.contacts[0]
     u = problem.u.x.array.reshape(-1, 3)[contact.nodes]
-    return everywhere((contact.x + u)[:, :2], contact.reaction[:, 2], contact.reaction[:, :2] @ contact.frame[:2, :2])  # fmt: skip
+    return on_all_ranks((contact.x + u)[:, :2], contact.reaction[:, 2], contact.reaction[:, :2] @ contact.frame[:2, :2])  # fmt: skip
 
 
 # %% [markdown]

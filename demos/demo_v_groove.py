@@ -44,7 +44,7 @@ from dolfinx_contact.compat import functionspace
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from helpers import COMM, everywhere, hooke, picture, picture_of_body, say
+from helpers import COMM, hooke, on_all_ranks, picture, picture_of_body, say
 
 E, NU, MU = 1e3, 0.3, 0.25
 RADIUS, WEIGHT, SLOPE = 10.0, 20.0, np.pi / 4
@@ -99,7 +99,7 @@ def limit() -> tuple[np.ndarray, float]:
 
 def moment(contact) -> float:
     """Moment of a contact's reactions about the axis of the cylinder."""
-    x, r = everywhere(contact.x, contact.reaction @ contact.frame)
+    x, r = on_all_ranks(contact.x, contact.reaction @ contact.frame)
     return float((x[:, 0] * r[:, 1] - x[:, 1] * r[:, 0]).sum())
 
 

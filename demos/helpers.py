@@ -43,7 +43,7 @@ def picture_of_body(problem) -> None:
         dc.plot(problem, Path(sys.argv[1]).with_name("body.png"))
 
 
-def everywhere(*arrays) -> list[np.ndarray]:
+def on_all_ranks(*arrays) -> list[np.ndarray]:
     """Rows of all ranks, on every rank."""
     return [np.concatenate(COMM.allgather(array)) for array in arrays]
 
@@ -100,7 +100,7 @@ def rounded_body(radius, contact, size, cells: int, half=False, crossed=False, o
 
 def along_face(contact, *arrays) -> list[np.ndarray]:
     """Positions x of all contact nodes, sorted, and the rows of ``arrays`` with them, on every rank."""
-    x, *arrays = everywhere(contact.x[:, 0], *arrays)
+    x, *arrays = on_all_ranks(contact.x[:, 0], *arrays)
     order = np.argsort(x, kind="stable")
     return [array[order] for array in (x, *arrays)]
 

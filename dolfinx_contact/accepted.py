@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.contact.contact_step import meet_supports
+from dolfinx_contact.contact.contact_step import exclude_fixed_directions
 from dolfinx_contact.solvers.base import KEPT_STARTS
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Accepted:
     starts: tuple
     problem: int
 
-    def but(self, **parts: Any) -> Accepted:
+    def replaced(self, **parts: Any) -> Accepted:
         """Return a copy of the state with some attributes replaced."""
         return replace(self, **parts)
 
@@ -105,9 +105,9 @@ def show(problem: ContactProblem, accepted: Accepted) -> Accepted:
     body.last_free_state = accepted.free_state
     put_surfaces(contacts, accepted.poses)
     for contact, history in zip(contacts, accepted.histories):
-        contact.go_back(history)
-        meet_supports(contact, body.fixed)
+        contact.set_history(history)
+        exclude_fixed_directions(contact, body.fixed)
     body.show(accepted.x)
     if problem.internal:
         problem.internal.put(accepted.variables)
-    return accepted.but(histories=tuple(contact.history for contact in contacts))
+    return accepted.replaced(histories=tuple(contact.history for contact in contacts))

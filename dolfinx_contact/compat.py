@@ -12,7 +12,7 @@ import ctypes
 from collections.abc import Callable, Iterable
 from inspect import signature
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -25,9 +25,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact.support.collective import raised_together
-
-if TYPE_CHECKING:
-    pass
 
 if np.issubdtype(PETSc.ScalarType, np.complexfloating):
     raise ImportError(

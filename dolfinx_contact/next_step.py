@@ -81,7 +81,7 @@ class StepMaker:
 
             holding = held_surfaces(body, contacts, start, b)
             contacts = [
-                c.where_it_stands() for c in contacts
+                c.with_present_surface() for c in contacts
             ]  # surfaces move with the nodes that hold them
         parts = self._contacts_and_options(body, contacts, holding)
         kind = LoadStep
@@ -138,7 +138,7 @@ class StepMaker:
         parts: dict[str, Any] = {"holding": holding}
         if holding is not None and holding.dragged:
             dragged = holding.dragged
-            contacts = [c.but(dragged=dragged.get(k)) for k, c in enumerate(contacts)]
+            contacts = [c.replaced(dragged=dragged.get(k)) for k, c in enumerate(contacts)]
         if any(contact.surface.motions for contact in contacts):
             from dolfinx_contact.surfaces.driven import DrivenSurfaces
 
@@ -148,16 +148,16 @@ class StepMaker:
             from dolfinx_contact.contact.shared import shared_nodes
 
             parts["shared"] = shared_nodes(contacts, body.fixed)
-        freedom = [*self._present_freedom(), holding is not None and sorted(holding.dragged)]
-        if freedom != self._freedom:
-            self._freedom = freedom
+        setup_key = [*self._present_freedom(), holding is not None and sorted(holding.dragged)]
+        if setup_key != self._freedom:
+            self._freedom = setup_key
             self._stamps = self._stamps._replace(parts=new_stamp())
         return parts | {"contacts": tuple(contacts)}
 
     def _present_freedom(self) -> list:
         """Return the free motions and springs of each contact's surface."""
         drivers = [contact.surface.driver for contact in self._contacts]
-        return [() if driver is None else driver.freedom for driver in drivers]
+        return [() if driver is None else driver.setup_key for driver in drivers]
 
 
 def _predicted_displacement(

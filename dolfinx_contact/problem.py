@@ -39,8 +39,8 @@ from dolfinx_contact.problem_input import (
     checked_solver,
     checked_tolerance,
     checked_undetermined,
-    crowded,
     hold,
+    multigrid_is_faster,
     support,
     take_contacts,
 )
@@ -51,10 +51,10 @@ from dolfinx_contact.results.record import (
     NotConverged,
     Step,
     converged,
-    counts_of,
+    count_statuses,
     named,
     record,
-    warn_of_contact,
+    warn_of_inaccurate_reactions,
     warn_of_rounding,
 )
 from dolfinx_contact.solution import ended, solution
@@ -156,7 +156,7 @@ class ContactProblem(Guarded):
         checks=checked_checks,
     )
     _settable = ("bcs", "monitor", *_checked)
-    _remedy = "bcs, monitor, solver, tol, geometry_tol and undetermined may be changed between steps; for anything else make a new ContactProblem."
+    _remedy = "bcs, monitor, solver, tol, geometry_tol, undetermined, lagged and checks may be changed between steps; for anything else make a new ContactProblem."
 
     def __init__(
         self,
@@ -203,7 +203,7 @@ class ContactProblem(Guarded):
         given = J, petsc_options, petsc_options_prefix, before, displacements, options
         self.body = body_of(F, u, bcs, *given)
         hold(self.contacts, self.body)
-        self.body.crowded = crowded(self.solver, self.body, self.contacts)
+        self.body.multigrid_is_faster = multigrid_is_faster(self.solver, self.body, self.contacts)
         check_surfaces(self.contacts, self.body)
         check_weights(F, self.contacts)
         self.checks, self._over = checks_of(self.body, self.contacts), frozenset()
@@ -291,7 +291,7 @@ class ContactProblem(Guarded):
                 with uninterrupted():
                     self._accept(advanced(self, found))
                     warn_of_rounding(done, self.tol)
-                    warn_of_contact(done, self.tol)
+                    warn_of_inaccurate_reactions(done, self.tol)
                     shown = self._maker.stiffness, self.u.x.array, done.counts
                     ended_in = CheckedStep(self.body, self.contacts, *shown, self._over)
                     self.checks, self._over = run_checks(self.checks, ended_in)
@@ -311,7 +311,7 @@ class ContactProblem(Guarded):
         """
         values = () if self.internal is None else self.internal.values()
         histories = tuple(contact.history for contact in self.contacts)
-        self._accepted = self._accepted.but(histories=histories, variables=values)
+        self._accepted = self._accepted.replaced(histories=histories, variables=values)
         return self._accepted, self._before, poses_of(self.contacts)
 
     def _check_converged(self, state: StepState, done: Step, refused: str) -> None:
@@ -523,4 +523,4 @@ class ContactProblem(Guarded):
 
         They refer to the last converged state.
         """
-        return counts_of(self.body, self.contacts)
+        return count_statuses(self.body, self.contacts)

@@ -17,7 +17,7 @@ from dolfinx_contact import compat
 from dolfinx_contact.bodies.elastic import ElasticBody
 from dolfinx_contact.bodies.input import check_meshes, derivative_of
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.contact_step import components, frames_of, meet_supports
+from dolfinx_contact.contact.contact_step import components, exclude_fixed_directions, frames_of
 from dolfinx_contact.petsc.linear_solver import CROWDED_SIZE, LARGE_SIZES
 from dolfinx_contact.solvers.base import Solver
 from dolfinx_contact.support.attributes import surfaces_of
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from dolfinx_contact.contact.geometry import Frames
     from dolfinx_contact.contact.interface import ContactPoints
     from dolfinx_contact.problem import ContactProblem
-    from dolfinx_contact.solvers.base import Solver
 
 
 # Treatments of a body held by contact alone if a motion of it is undetermined.
@@ -199,7 +198,7 @@ def body_of(
     )
 
 
-def crowded(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
+def multigrid_is_faster(solver: Solver, body: ElasticBody, contacts: Sequence[Contact]) -> bool:
     """Return whether multigrid is faster because of many contact nodes.  Collective.
 
     This applies to three-dimensional linear bodies with default PETSc options that are small enough
@@ -298,7 +297,7 @@ def hold(contacts: Sequence[Contact], body: ElasticBody, level: int = 3, told: f
             oblique to its surface.
     """
     for contact in contacts:
-        meet_supports(contact, body.fixed)
+        exclude_fixed_directions(contact, body.fixed)
     hold_points(contacts, [contact.points for contact in contacts], body, level + 1, told)
 
 

@@ -41,7 +41,7 @@ def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
     step, own = problem.load_step(), ()
     goal, levels = step.tol, _levels(problem, step)
     if _starts_with_rough_solutions(problem):
-        step = step.but(tol=max(goal, ROUGH_TOLERANCE * problem.geometry_tol))
+        step = step.replaced(tol=max(goal, ROUGH_TOLERANCE * problem.geometry_tol))
     starts = problem.accepted.starts
     if not levels:
         return find(problem, step, starts), {}, ""
@@ -72,7 +72,7 @@ def _levels(problem: ContactProblem, step: LoadStep) -> list:
         from dolfinx_contact.lagged.held import HeldPlanes
 
         levels.append([HeldPlanes(lambda step, holding: problem.load_step(None, step, holding))])
-    if any(contact.changes for contact in contacts) or step.may_land():
+    if any(contact.changes for contact in contacts) or step.may_close():
         from dolfinx_contact.lagged.end_geometry import EndGeometry
         from dolfinx_contact.lagged.landing import SlipBeforeLanding
 
@@ -106,14 +106,14 @@ def find(problem: ContactProblem, step: LoadStep, starts: Sequence[Any]) -> Solv
     if step.surfaces is not None:
         step.surfaces.check(step.contacts)
         last = [contact.last for contact in step.contacts]
-        if step.surfaces.beyond(step.contacts, last, step.no_motions, given=True):
+        if step.surfaces.beyond(step.contacts, last, step.first_motions, given=True):
             return unmoved(step)
     body, found, statics = problem.body, None, None
     if body.loose is not None:
         from dolfinx_contact.step.statics import Statics
 
         statics = Statics(step, problem.accepted.x)
-        step = step.but(statics=statics)
+        step = step.replaced(statics=statics)
         if statics.message:
             return unmoved(step, statics.reason)
         if not statics.loads.any():
@@ -156,7 +156,7 @@ def ended(state: StepState, geometry_tol: float) -> StepState:
 
 def without_reactions(step: LoadStep) -> SolverResult | None:
     """Return the contact-free solution if it is the solution of a step, else None.  Collective."""
-    body, c = step.body, step.no_motions
+    body, c = step.body, step.first_motions
     if step.surfaces is not None:
         if not step.surfaces.can_rest:
             return None

@@ -15,7 +15,7 @@ from dolfinx import fem
 from benchmarks.peers import by_calculix, by_getfem
 from benchmarks.peers.compare import absent, by_system, told
 from dolfinx_contact.compat import assemble_into
-from dolfinx_contact.law.dissipation import work_of_friction
+from dolfinx_contact.law.dissipation import frictional_work
 from mechanics.material import elasticity
 from studies.punch.limits import build, graded
 
@@ -101,7 +101,7 @@ def worth(punch, given: dict, u, element: str | None, points: int) -> dict:
         if short:
             work -= float(((force + before)[:, :2] / 2 * slip).sum())
         else:
-            work += float(work_of_friction(friction, before, slipped, force, slip)[0].sum())
+            work += float(frictional_work(friction, before, slipped, force, slip)[0].sum())
             slipped = np.linalg.norm(force[:, :2], axis=1) > 0.999 * given["mu"] * force[:, 2]
         if number == punch.parameters.loading:
             loaded = force

@@ -73,7 +73,7 @@ class Sampled(Solver):
 
     def solve(self, step, starts):
         self.samples, self._start = [], process_time()
-        found = self._bound.solve(step.but(monitor=self), starts)
+        found = self._bound.solve(step.replaced(monitor=self), starts)
         self.seconds = process_time() - self._start
         return found
 

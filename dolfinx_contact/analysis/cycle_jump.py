@@ -358,7 +358,7 @@ class _Run:
                 three parts.
         """
         plain = length <= SHORTEST_JUMP  # the fine run simulates all
-        coarse = self._simulate([length])
+        coarse = self._simulate([length], must=length == 1)
         fine = end = coarse
         if length > 1 and (plain or coarse):
             fine = end = self._simulate(_parts(length, 2), must=plain)
@@ -706,5 +706,5 @@ def _set_sums(contact: Contact, sums: dict[str, np.ndarray]) -> None:
         sums: New values by name, not negative.
     """
     sums = contact.history.sums | {name: frozen(values) for name, values in sums.items()}
-    worn = contact.geometry.everywhere(sums[OPPOSITE_WEAR]) if OPPOSITE_WEAR in sums else None
-    contact.go_back(contact.history.but(sums=sums, worn=worn))
+    worn = contact.geometry.on_all_ranks(sums[OPPOSITE_WEAR]) if OPPOSITE_WEAR in sums else None
+    contact.set_history(contact.history.replaced(sums=sums, worn=worn))

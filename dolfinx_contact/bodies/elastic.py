@@ -108,7 +108,7 @@ class ElasticBody(OverRanks):
     soft: np.ndarray  # rigid-body modes with little strain energy, (owned dofs, m)
     nonlinear = False  # whether F is nonlinear in u, see ``NonlinearBody``
     loose: LooseMotions | None = None  # rigid-body modes without strain energy, None without any
-    crowded = False  # whether multigrid is the default because of many contact nodes
+    multigrid_is_faster = False  # whether multigrid is the default because of many contact nodes
     scale: np.ndarray | None = None  # D, (owned dofs,); None if it is one, or before assembly
 
     def __init__(
@@ -147,7 +147,7 @@ class ElasticBody(OverRanks):
         self.assemblies = 0
         self.K, self._external, self._elastic, self._anchors = None, None, None, None
         self._coupling = self._lift = self._lifted = self._right = self._left = None
-        self.closed = self._message = False
+        self.closed = self._warned = False
         self.last_free_state: FreeState | None = None
         self.extent, self.thickness = rigid_motion.extents(self.displacements)
         self.parts = rigid_motion.connected_parts(self.displacements)
@@ -386,8 +386,8 @@ class ElasticBody(OverRanks):
     def _own_solver(self) -> LinearSolver:
         if self._elastic is None:
             self._elastic = self.anchors.solver if self.loose else self.solver(self.K)
-            if self.options is not None and not self._message:
-                self._message = True
+            if self.options is not None and not self._warned:
+                self._warned = True
                 warn_of_unread(self._elastic.unread)
         return self._elastic
 
@@ -451,7 +451,9 @@ class ElasticBody(OverRanks):
     @property
     def _solver_options(self) -> dict[str, Any] | None:
         """PETSc options for this body's linear systems; None means defaults by matrix size."""
-        return MULTIGRID_OPTIONS if self.options is None and self.crowded else self.options
+        return (
+            MULTIGRID_OPTIONS if self.options is None and self.multigrid_is_faster else self.options
+        )
 
     def solver(self, A: PETSc.Mat) -> LinearSolver:
         """Return a ``LinearSolver`` of another matrix on ``V``, with this body's PETSc options."""

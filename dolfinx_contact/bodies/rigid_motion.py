@@ -197,10 +197,10 @@ def connected_parts(displacements: Displacements) -> tuple[np.ndarray, int]:
     same = np.concatenate(comm.allgather(same))
     joined = _smallest_connected(same, same.max() + 1)
     numbers, part = np.unique(joined[mine], return_inverse=True)
-    everywhere = np.unique(np.concatenate(comm.allgather(numbers)))
-    return np.searchsorted(everywhere, numbers)[part.reshape(-1)][
+    on_all_ranks = np.unique(np.concatenate(comm.allgather(numbers)))
+    return np.searchsorted(on_all_ranks, numbers)[part.reshape(-1)][
         : displacements.count
-    ], everywhere.size
+    ], on_all_ranks.size
 
 
 def _smallest_connected(groups: np.ndarray, size: int) -> np.ndarray:

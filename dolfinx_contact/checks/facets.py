@@ -96,7 +96,7 @@ class _FacetCheck(Check):
             pushed = contact.comm.allreduce(float(lengths.max(initial=0.0)), op=MPI.MAX)
             worn = None
             if contact.wear is not None:
-                worn = contact.displacements.everywhere(contact.nodes, contact.wear_depth)
+                worn = contact.displacements.on_all_ranks(contact.nodes, contact.wear_depth)
             with raised_together(contact.comm):
                 missed = self._missed(contact, facets, step.u, pushed, worn)
             missed = max(contact.comm.allgather(missed))

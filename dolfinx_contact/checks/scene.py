@@ -102,7 +102,7 @@ def _largest_unloading(contact: Contact, stiffness: NodalStiffness) -> tuple[flo
         contact: The contact.
         stiffness: Nodal stiffness of the contact.
     """
-    depth, carried = contact.history.unloads
+    depth, carried = contact.history.worn_and_force
     taken = np.divide(stiffness.normal * depth, carried, np.zeros_like(depth), where=carried > 0)
     k = int(taken.argmax()) if taken.size else None
     mine = (

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from dolfinx_contact import compat
 from dolfinx_contact.contact import fields
-from dolfinx_contact.contact.contact_step import wanders
+from dolfinx_contact.contact.contact_step import depends_on_position
 from dolfinx_contact.contact.displacements import Displacements
 from dolfinx_contact.contact.fields import SurfaceMeasure, contact_nodes
 from dolfinx_contact.contact.input import (
@@ -258,15 +258,15 @@ class Contact(Guarded):
 
         The surface keeps its present position.
         """
-        frames, moves = self.history.frames, wanders(self)
+        frames, moves = self.history.frames, depends_on_position(self)
         if self.geometry.follows(moves, self.history):
             frames = self.geometry.standing(moves, frames)
         self._begin(frames)
 
     def _begin(self, frames: Frames) -> None:
-        self.go_back(History.of(self.geometry.at_rest(frames), frames))
+        self.set_history(History.of(self.geometry.at_rest(frames), frames))
 
-    def go_back(self, history: History) -> None:
+    def set_history(self, history: History) -> None:
         """Replace the history and the present state by a given history and its last state.
 
         If friction is given by fields, the nodal coefficients of that history are restored as well.
@@ -281,7 +281,7 @@ class Contact(Guarded):
         See ``ContactStep.ended``.
         """
         self.laws.take(self, history.friction)
-        self.go_back(history)
+        self.set_history(history)
         self.measure.renew(self)
 
     # -- results -------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from dolfinx_contact.contact.state import (
     Status,
     frozen_state,
 )
-from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
+from dolfinx_contact.law.dissipation import frictional_work, slipped_last
 from dolfinx_contact.law.friction import Friction
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.checks import UNIT_ROUNDOFF, place
@@ -85,19 +85,19 @@ class ContactStep:
     columns: np.ndarray | None = None
     begun: Friction | None = None
 
-    def but(self, **parts: Any) -> ContactStep:
+    def replaced(self, **parts: Any) -> ContactStep:
         """Return a copy in which the given attributes are replaced."""
         return replace(self, **parts)
 
-    def where_it_stands(self) -> ContactStep:
+    def with_present_surface(self) -> ContactStep:
         """Return a copy of the step with the present displacement of the surface."""
-        return self.but(moved=self.given.geometry.surface_moved(self.frames))
+        return self.replaced(moved=self.given.geometry.surface_moved(self.frames))
 
     def with_friction(self, friction: Friction) -> ContactStep:
         """Return a copy of the step with another friction law."""
         if friction is self.friction:
             return self
-        return self.but(friction=friction, law=friction.law(self.points.dim))
+        return self.replaced(friction=friction, law=friction.law(self.points.dim))
 
     # -- what does not depend on the step ------------------------------------------------------
 
@@ -173,7 +173,7 @@ class ContactStep:
             displacement, np.zeros((n, points.dim)), gap, slip, np.zeros(n, np.uint8), known
         )
 
-    def moved_by(self, axis: np.ndarray, turns: bool) -> np.ndarray:
+    def unit_motion(self, axis: np.ndarray, turns: bool) -> np.ndarray:
         """Return the surface's motion at each node for a unit rigid motion, ``shape=(n, gdim)``.
 
         The frame is local.
@@ -329,7 +329,7 @@ class ContactStep:
 
     # -- end -----------------------------------------------------------------------------------
 
-    def may_land(self, u: np.ndarray) -> bool:
+    def may_close(self, u: np.ndarray) -> bool:
         """Return whether open nodes of this rank may touch with friction in this step. Collective
         where points are not ``local``.
 
@@ -386,13 +386,13 @@ class ContactStep:
             turned = geometry.turned_past(state.displacement, frames)
             state = state._replace(displacement=turned)
         state = frozen_state(state)
-        sums, worn, doubtful, unloads = self._updated_sums(state)
+        sums, worn, doubtful, worn_and_force = self._updated_sums(state)
         bare = None
         if geometry.renews_rows and u is not None:
             bare = geometry.gap_at(u, frames)[1].alone
         ended = geometry.ended(frames)
         return History(
-            state, ended, sums, self.friction, worn, bare, self.before, doubtful, unloads
+            state, ended, sums, self.friction, worn, bare, self.before, doubtful, worn_and_force
         )
 
     def _updated_sums(self, state: State) -> tuple:
@@ -400,7 +400,7 @@ class ContactStep:
         if the opposite side wears.
 
         Returns:
-            The attributes ``sums``, ``worn``, ``doubtful_work`` and ``unloads`` of ``History``.
+            The attributes ``sums``, ``worn``, ``doubtful_work`` and ``worn_and_force`` of ``History``.
         """
         given, friction = self.given, self.friction
         history, repeats, covered = given.history, given.repeats, given.geometry.covered
@@ -424,7 +424,7 @@ class ContactStep:
             depth, added["wear_depth"], more = worn_by(self, work)
             if more is not None:
                 sums[OPPOSITE_WEAR] = sums.get(OPPOSITE_WEAR, 0.0) + more
-                worn = given.geometry.everywhere(sums[OPPOSITE_WEAR])
+                worn = given.geometry.on_all_ranks(sums[OPPOSITE_WEAR])
         sums |= {name: sums[name] + part for name, part in added.items()}
         turns = self.points.dim == 3 and (friction.mu.ndim > 1 or not friction.isotropic)
         doubtful = float(np.abs(turned.sum(axis=1)).sum()) if turns else None
@@ -475,7 +475,7 @@ class ContactStep:
             start, end, turned = self.works(slip, reaction)
             return start + end, turned
         before = self.last.reaction, self._slipped
-        return work_of_friction(self.friction, *before, reaction, slip, self._friction_before)
+        return frictional_work(self.friction, *before, reaction, slip, self._friction_before)
 
     def works(self, slip: np.ndarray, reaction: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the frictional work due to the forces at the start and at the end of the step.
@@ -486,8 +486,8 @@ class ContactStep:
         """
         none, before, slipped = np.zeros_like(reaction), self.last.reaction, self._slipped
         law = self.friction if self.begun is None else self.begun
-        start, turned = work_of_friction(law, before, slipped, none, slip, self._friction_before)
-        end = work_of_friction(self.friction, none, slipped, reaction, slip)[0]
+        start, turned = frictional_work(law, before, slipped, none, slip, self._friction_before)
+        end = frictional_work(self.friction, none, slipped, reaction, slip)[0]
         return start, end, turned
 
     @cached_property
@@ -543,7 +543,7 @@ def step_of(
     return ContactStep(contact, *given, geometry.clear, stiffness, begun=begun)
 
 
-def wanders(contact: Contact) -> bool:
+def depends_on_position(contact: Contact) -> bool:
     """Whether the contact geometry depends on the position of nodes on the surface.
 
     The value is the same on all ranks.
@@ -559,13 +559,13 @@ def frames_of(
     See ``Geometry.following``.
     """
     history, geometry = contact.history, contact.geometry
-    moves = wanders(contact)
+    moves = depends_on_position(contact)
     if not geometry.follows(moves, history):
         return history.frames
     return geometry.following(start, at, moves, history, before)
 
 
-def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
+def exclude_fixed_directions(contact: Contact, fixed: np.ndarray) -> None:
     """Exclude directions fixed by boundary conditions from averaged nodal normals.  Collective.
 
     The last state is expressed in the new frames.  Frames that are not averaged over facets stay.
@@ -578,7 +578,7 @@ def meet_supports(contact: Contact, fixed: np.ndarray) -> None:
     frames = geometry.met(fixed, history.frames)
     if frames is not history.frames:
         last = geometry.turned(frames, history, contact.opening)
-        contact.go_back(history.but(last=last, frames=frames))
+        contact.set_history(history.replaced(last=last, frames=frames))
 
 
 def nodal_stiffness(

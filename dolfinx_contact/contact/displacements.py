@@ -107,7 +107,7 @@ class Displacements:
         vectors[self._dofs[: self.count].ravel()] = flat
         return vectors
 
-    def everywhere(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def on_all_ranks(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values at all nodes of this rank, with ghosts, from values at owned nodes.  Collective.
 
         Args:

@@ -88,7 +88,7 @@ def guided(friction: Friction, count: int, nodes: np.ndarray, along: np.ndarray)
     return Friction(mu, np.where(mu > 0, p, 1.0), axes=axes)
 
 
-def directed(friction: Friction, gdim: int) -> bool:
+def has_spatial_axes(friction: Friction, gdim: int) -> bool:
     """Whether ``axes`` is a field in 3-D, so that the surface needs no axis of its own."""
     return friction.field and gdim == 3 and is_field(friction.given()["axes"])
 

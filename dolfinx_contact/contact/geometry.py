@@ -64,7 +64,7 @@ class Geometry(ABC):
     """
 
     @abstractmethod
-    def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
+    def standing(self, depends_on_position: bool, before: Frames | None = None) -> Frames:
         """Return frames and gaps for the undeformed body.  Collective.
 
         Args:
@@ -77,7 +77,7 @@ class Geometry(ABC):
         self,
         start: np.ndarray,
         at: np.ndarray | None,
-        wanders: bool,
+        depends_on_position: bool,
         history: History,
         before: Frames | None,
     ) -> Frames:
@@ -111,7 +111,7 @@ class Geometry(ABC):
         """
 
     @abstractmethod
-    def follows(self, wanders: bool, history: History) -> bool:
+    def follows(self, depends_on_position: bool, history: History) -> bool:
         """Return whether the next step needs new gaps or frames at its start.
 
         The value is the same on all ranks.
@@ -212,7 +212,7 @@ class NodalGeometry(Geometry):
         """
         return frames
 
-    def everywhere(self, worn: np.ndarray) -> np.ndarray:
+    def on_all_ranks(self, worn: np.ndarray) -> np.ndarray:
         """Return the worn depths of all nodes of a deformable surface on every rank.  Collective.
 
         Args:
@@ -300,7 +300,7 @@ class NodalGeometry(Geometry):
             worn: Gap opened by wear, ``shape=(n,)``, length.
         """
         before, last = history.frames, history.last
-        moved = times(frames.own, turned_back(before.own, last.displacement))
+        moved = times(frames.own, to_global(before.own, last.displacement))
         reaction = carried(last.reaction, before.frame, frames.frame)
         gap = frames.flat + worn + moved[:, -1]
         return last._replace(displacement=frozen(moved), reaction=frozen(reaction), gap=frozen(gap))
@@ -368,7 +368,7 @@ def times(frame: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return (frame @ vectors[:, :, None])[:, :, 0]
 
 
-def turned_back(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
+def to_global(frame: np.ndarray, components: np.ndarray) -> np.ndarray:
     """Return vectors from components in one frame or one frame per node, ``shape=(n, gdim)``."""
     return (components[:, None, :] @ frame)[:, 0]
 
@@ -381,7 +381,7 @@ def carried(reaction: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.n
     """
     found, tangential = reaction.copy(), reaction.copy()
     tangential[:, -1] = 0.0
-    along = times(after, turned_back(before, tangential))[:, :-1]
+    along = times(after, to_global(before, tangential))[:, :-1]
     length = np.linalg.norm(along, axis=1, keepdims=True)
     kept = np.linalg.norm(tangential, axis=1, keepdims=True)
     found[:, :-1] = np.divide(kept, length, np.zeros_like(length), where=length > 0) * along

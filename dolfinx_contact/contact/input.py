@@ -103,7 +103,7 @@ def checked_facets(facets: ArrayLike, index_map: Any, boundary: np.ndarray) -> n
 
 
 def check_law(
-    surface: object, friction: Friction | float, gdim: int, directed: bool = False
+    surface: object, friction: Friction | float, gdim: int, has_spatial_axes: bool = False
 ) -> None:
     """Raise a ``ValueError`` if surface, friction and dimension do not fit together.
 
@@ -127,7 +127,7 @@ def check_law(
     if friction.field:
         return  # the values of the field are checked later
     friction.law(gdim)  # refuses what has no meaning in two dimensions
-    if gdim == 3 and surface.axis is None and not friction.isotropic and not directed:
+    if gdim == 3 and surface.axis is None and not friction.isotropic and not has_spatial_axes:
         raise ValueError(
             f"plane.axis is None, but {friction} depends on the direction: give {type(surface).__name__} the "
             "first principal friction direction, axis=(...)."

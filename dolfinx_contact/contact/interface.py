@@ -208,7 +208,7 @@ class ContactPoints:
         """
         return self._product(blocks, self.B)
 
-    def of_reactions(self, blocks: np.ndarray) -> sparse.csr_matrix:
+    def reaction_stiffness(self, blocks: np.ndarray) -> sparse.csr_matrix:
         """Return ``B^T D S``, which maps nodal forces to new nodal forces by blocks ``D``.
 
         It has owned rows, and columns in global numbering.
@@ -326,7 +326,7 @@ def responses(K: PETSc.Mat, points: Sequence[ContactPoints], derivatives: Sequen
     """
     sums = [sparse.csr_matrix((K.getLocalSize()[0], K.getSize()[1]))] * 2
     for point_set, (R_r, R_u) in zip(points, derivatives):
-        sums = [sums[0] + point_set.of_reactions(R_r), sums[1] + point_set.matrix(R_u)]
+        sums = [sums[0] + point_set.reaction_stiffness(R_r), sums[1] + point_set.matrix(R_u)]
     return tuple(sums)
 
 

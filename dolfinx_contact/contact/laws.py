@@ -109,7 +109,9 @@ class Laws:
             state["pressure"] = pressure
         with raised_together(contact.comm):
             friction = _friction_field().on_nodes(contact, field, state, frames, axes)
-            check_law(contact.surface, friction, gdim, _friction_field().directed(field, gdim))
+            check_law(
+                contact.surface, friction, gdim, _friction_field().has_spatial_axes(field, gdim)
+            )
         return at_most_rough(friction)
 
     @property

@@ -30,7 +30,7 @@ from dolfinx_contact.contact.geometry import (
     NodalGeometry,
     carried,
     times,
-    turned_back,
+    to_global,
 )
 from dolfinx_contact.contact.interface import (
     FREE_PART,
@@ -92,7 +92,7 @@ class MortarGeometry(NodalGeometry):
         """See ``Geometry``."""
         return self.surface.sliding == "large"
 
-    def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
+    def standing(self, depends_on_position: bool, before: Frames | None = None) -> Frames:
         """See ``Geometry``: frames and gaps of the undeformed bodies.  Collective."""
         found = self.projected(np.zeros(self._owned[0]))
         self._undeformed = found.frame
@@ -230,7 +230,7 @@ class MortarGeometry(NodalGeometry):
         """
         mean, axis, angle = _between(*self._since(start, placed.points.turns))
         apart = self.x - placed.home
-        apart = apart + turned_back(placed.frame, placed.points.motion(start))
+        apart = apart + to_global(placed.frame, placed.points.motion(start))
         turned = apart @ mean.T
         along = (turned @ axis)[:, None] * axis
         arc = angle / 2 / np.sin(angle / 2) if angle > 0.0 else 1.0
@@ -240,7 +240,7 @@ class MortarGeometry(NodalGeometry):
         self,
         start: np.ndarray,
         at: np.ndarray | None,
-        wanders: bool,
+        depends_on_position: bool,
         history: History,
         before: Frames | None,
     ) -> Frames:
@@ -281,7 +281,7 @@ class MortarGeometry(NodalGeometry):
         before, alone = history.frames, frames.points.alone
         slip = before.points.motion(u - frames.start)
         slip[:, -1] = 0.0
-        slip = times(frames.frame, turned_back(before.frame, slip))[:, :-1]
+        slip = times(frames.frame, to_global(before.frame, slip))[:, :-1]
         frames.points.without_held(slip)
         return alone & ~before.points.alone, slip
 
@@ -304,7 +304,7 @@ class MortarGeometry(NodalGeometry):
         slip[:, :-1] += self._arc_correction(there, start)
         used[:, :-1] += 0.0 if frames.way is None else frames.way
         slip[:, -1] = used[:, -1] = 0.0
-        slip = times(frames.frame, turned_back(there.frame, slip)) - used
+        slip = times(frames.frame, to_global(there.frame, slip)) - used
         reaction = carried(state.reaction, frames.frame, there.frame)
         reaction[alone] = 0.0
         forces = np.zeros(self._owned[0])
@@ -324,9 +324,9 @@ class MortarGeometry(NodalGeometry):
             dragged(contact, state, slip[:, :-1]),
         )
 
-    def everywhere(self, worn: np.ndarray) -> np.ndarray:
+    def on_all_ranks(self, worn: np.ndarray) -> np.ndarray:
         """See ``Geometry``.  Collective."""
-        return self._master.everywhere(worn[:, None])[:, 0]
+        return self._master.on_all_ranks(worn[:, None])[:, 0]
 
     def opened(self, points: MortarPoints, worn: np.ndarray | None) -> np.ndarray | None:
         """See ``Geometry``."""
@@ -351,7 +351,7 @@ class MortarGeometry(NodalGeometry):
         )  # rows at the start: for nodes that have left in the step
         mine = now.m.T @ volume + before.m.T @ np.where(now.alone, volume, 0.0)
         volumes = self._comm.allreduce(mine)
-        area = self._master.everywhere(area[:, None])[:, 0]
+        area = self._master.on_all_ranks(area[:, None])[:, 0]
         bears = area > NO_AREA * area.max(initial=0.0)
         kept = np.where(bears, np.maximum(volumes, 0.0), 0.0)
         if kept.any():
@@ -463,7 +463,7 @@ class MortarGeometry(NodalGeometry):
             frames: Frames of the slave nodes.
         """
         master, found = self._master, np.zeros(len(self.x), dtype=bool)
-        held = master.everywhere(np.isin(master.own, fixed))
+        held = master.on_all_ranks(np.isin(master.own, fixed))
         size = CLEAR_GAP * self._extent
         for k, axis in enumerate(np.eye(self.x.shape[1])):
             along = np.linalg.norm(frames.frame[:, :-1] @ axis, axis=1) > FREE_PART
@@ -472,7 +472,7 @@ class MortarGeometry(NodalGeometry):
             found |= self._supported[:, k] & along & beside
         return found
 
-    def follows(self, wanders: bool, history: History) -> bool:
+    def follows(self, depends_on_position: bool, history: History) -> bool:
         """See ``Geometry``."""
         return self.renews_rows
 
@@ -562,10 +562,10 @@ class Skin:
         given = comm.allgather(_numbers(index_map, self.nodes))
         self._at = np.searchsorted(self.numbers, np.concatenate(given))
         self.mine = np.searchsorted(self.numbers, given[comm.rank])
-        self.dofs = self.everywhere(displacements.owned[1] + self.own)
+        self.dofs = self.on_all_ranks(displacements.owned[1] + self.own)
         self._compliance: tuple = (None, None, None)  # matrix, its state counter, inverse blocks
 
-    def everywhere(self, rows: np.ndarray) -> np.ndarray:
+    def on_all_ranks(self, rows: np.ndarray) -> np.ndarray:
         """Nodal values of all ``m`` nodes, gathered from the ``k`` nodes of each rank.  Collective.
 
         Args:
@@ -591,7 +591,7 @@ class Skin:
             fixed = alone & (np.einsum("nii->ni", blocks) == 1.0)  # rows of boundary conditions
             C = np.linalg.inv(blocks)
             C[fixed] = 0.0
-            C = self.everywhere(C)
+            C = self.on_all_ranks(C)
             self._compliance = K, K.stateGet(), C
         return C
 
@@ -599,7 +599,7 @@ class Skin:
         """Deformed facets and positions of all nodes, ``shape=(m, gdim)``, at displacement ``u``.
         Collective.
         """
-        there = self.x + self.everywhere(u[self.own])
+        there = self.x + self.on_all_ranks(u[self.own])
         sides = zip(self.sides, self._nodes, self._inside_out)
         return [side.moved(there[nodes], signs) for side, nodes, signs in sides], there
 
@@ -766,7 +766,7 @@ class MortarPoints(ContactPoints):
         """See ``ContactPoints``."""
         return self._product(blocks, self._B)
 
-    def of_reactions(self, blocks: np.ndarray) -> sparse.csr_matrix:
+    def reaction_stiffness(self, blocks: np.ndarray) -> sparse.csr_matrix:
         """See ``ContactPoints``."""
         return self._product(blocks, self._S)
 

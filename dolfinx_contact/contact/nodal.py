@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dolfinx_contact.contact.geometry import times
 from dolfinx_contact.law.maps import NodalLaw, ReturnMap
 from dolfinx_contact.support.checks import UNIT_ROUNDOFF
 
@@ -187,8 +188,3 @@ class NodalProblems:
             made, _ = ReturnMap(spring, spring)(law, asked, gap, slip)
             r.reshape(self._shape)[slots, k] = made
         return r
-
-
-def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Matrix-vector products, one per row, ``shape=(m, i)`` for ``(m, i, j)`` and ``(m, j)``."""
-    return (matrices @ vectors[:, :, None])[:, :, 0]

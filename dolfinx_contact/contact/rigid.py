@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfinx_contact.contact.geometry import Frames, NodalGeometry, carried, times, turned_back
+from dolfinx_contact.contact.geometry import Frames, NodalGeometry, carried, times, to_global
 from dolfinx_contact.contact.state import History, State
 from dolfinx_contact.support.attributes import frozen
 from dolfinx_contact.support.collective import raised_together
@@ -45,26 +45,26 @@ class RigidGeometry(NodalGeometry):
         super().__init__(*given)
         self._points_in = points_in
 
-    def standing(self, wanders: bool, before: Frames | None = None) -> Frames:
+    def standing(self, depends_on_position: bool, before: Frames | None = None) -> Frames:
         """See ``Geometry``."""
-        home = self.surface.relative(self.x) if wanders else self.x
+        home = self.surface.relative(self.x) if depends_on_position else self.x
         return self._placed(home, self.x, before)
 
     def following(
         self,
         start: np.ndarray,
         at: np.ndarray | None,
-        wanders: bool,
+        depends_on_position: bool,
         history: History,
         before: Frames | None,
     ) -> Frames:
         """See ``Geometry``."""
         there = self.x + (start if at is None else at)[self._dofs]
-        home = self.surface.relative(there) if wanders else history.frames.home
+        home = self.surface.relative(there) if depends_on_position else history.frames.home
         frames = self._placed(home, there, before or history.frames)
         if not self.changes(history):
             return frames
-        here = home if wanders else self.surface.relative(there)
+        here = home if depends_on_position else self.surface.relative(there)
         with raised_together(self._comm):
             distance = self.surface.distance(here)
             way = self.way(self.surface, here, frames.own, distance, history)
@@ -101,11 +101,11 @@ class RigidGeometry(NodalGeometry):
         turned = surface.rotation
         return Frames(home, turned, own, frame, flat, points, arms, None, turned)
 
-    def follows(self, wanders: bool, history: History) -> bool:
+    def follows(self, depends_on_position: bool, history: History) -> bool:
         """See ``Geometry``."""
         surface = self.surface
         turned = not np.array_equal(surface.rotation, history.frames.rotation)
-        return wanders or surface.spins or turned
+        return depends_on_position or surface.spins or turned
 
     def changes(self, history: History, textured: bool = False) -> bool:
         """See ``Geometry``."""
@@ -117,7 +117,7 @@ class RigidGeometry(NodalGeometry):
         """See ``Geometry``."""
         before, last = history.frames, history.last
         if self.surface.curved:
-            moved = turned_back(before.own, last.displacement)
+            moved = to_global(before.own, last.displacement)
             last = last._replace(displacement=frozen(times(frames.own, moved)))
         if frames.points is not before.points:
             turned = carried(last.reaction, before.frame, frames.frame)
@@ -131,7 +131,7 @@ class RigidGeometry(NodalGeometry):
         surface = self.surface
         if frames.arms is not None:
             return frames.arms
-        moved = turned_back(frames.frame, displacement) + self.of_surface(frames)
+        moved = to_global(frames.frame, displacement) + self.of_surface(frames)
         return self.x + moved - surface.point - surface.displacement
 
     def distances(self, x: np.ndarray) -> np.ndarray:
@@ -195,7 +195,7 @@ class RigidGeometry(NodalGeometry):
 
         They are given in axes that move with the surface.
         """
-        return self.x + turned_back(history.frames.own, history.last.displacement)
+        return self.x + to_global(history.frames.own, history.last.displacement)
 
     def ended_at(self, u: np.ndarray) -> tuple[Surface, np.ndarray]:
         """Return the surface with its rotation at the end of the step, and positions of the nodes.
@@ -220,7 +220,7 @@ class RigidGeometry(NodalGeometry):
         """
         ended = copy(self.surface)
         ended.end_step()
-        moved = turned_back(frames.frame, displacement) + self.of_surface(frames)
+        moved = to_global(frames.frame, displacement) + self.of_surface(frames)
         return times(frames.own, ended.moved_past(self.x, moved))
 
     def missed(self, contact: ContactStep, state: State, u: np.ndarray, fixed: np.ndarray) -> tuple:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.contact.contact_step import wanders
+from dolfinx_contact.contact.contact_step import depends_on_position
 from dolfinx_contact.contact.laws import rows
 from dolfinx_contact.contact.state import (
     OPPOSITE_WEAR,
@@ -78,7 +78,7 @@ def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     surface, geometry, frames = contact.surface, contact.geometry, contact.history.frames
     placed = frozen(np.array(arrays.get("placed_rotation_of_plane", surface.placed)))
     surface.place(arrays.get("rotation_of_plane", np.zeros_like(surface.rotation)), placed)
-    if geometry.follows(wanders(contact), contact.history):
+    if geometry.follows(depends_on_position(contact), contact.history):
         at = arrays["home"] if surface.varies else arrays.get("at")
         frames = geometry.saved_at(at, frames)
     surface.displacement = arrays["plane"]
@@ -88,7 +88,7 @@ def load_saved(contact: Contact, arrays: Mapping[str, np.ndarray]) -> None:
     sums = {name: frozen(np.array(arrays[name])) for name in (*SUM_NAMES, SLIP_KEPT)}
     if OPPOSITE_WEAR in arrays:
         sums[OPPOSITE_WEAR] = frozen(np.array(arrays[OPPOSITE_WEAR]))
-        worn = geometry.everywhere(sums[OPPOSITE_WEAR])
-    contact.go_back(History(last, frames, sums, worn=worn))
-    contact.go_back(contact.history.but(friction=contact.laws.load(contact, arrays)))
-    surface.turn_to(found)
+        worn = geometry.on_all_ranks(sums[OPPOSITE_WEAR])
+    contact.set_history(History(last, frames, sums, worn=worn))
+    contact.set_history(contact.history.replaced(friction=contact.laws.load(contact, arrays)))
+    surface.set_rotation(found)

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from dolfinx_contact.contact.nodal import SINGULAR_DIRECTION, NodalProblems, Part, times
+from dolfinx_contact.contact.geometry import times
+from dolfinx_contact.contact.nodal import SINGULAR_DIRECTION, NodalProblems, Part
 from dolfinx_contact.law.friction import Friction
 
 if TYPE_CHECKING:

@@ -44,7 +44,7 @@ class State(NamedTuple):
 
 
 def frozen_state(state: State) -> State:
-    """Return a copy of a state whose arrays are read-only."""
+    """Make the arrays of a state read-only, and return the state."""
     return State(*(None if array is None else frozen(array) for array in state))
 
 
@@ -88,7 +88,7 @@ class History:
     bare: np.ndarray | None = None
     landed_after: np.ndarray | None = None
     doubtful_work: float | None = None
-    unloads: tuple[np.ndarray, np.ndarray] | None = None
+    worn_and_force: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
     def of(state: State, frames: Frames) -> History:
@@ -107,6 +107,6 @@ class History:
         """Slip of sticking nodes since they last slipped, ``shape=(n, gdim - 1)``, length."""
         return self.sums[SLIP_KEPT]
 
-    def but(self, **parts: Any) -> History:
+    def replaced(self, **parts: Any) -> History:
         """Return a copy in which the given attributes are replaced."""
         return replace(self, **parts)

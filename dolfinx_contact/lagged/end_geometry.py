@@ -117,7 +117,7 @@ class Ends:
                 size, angles = surface.point.size, surface.rotation.size
                 pose, first = self._at[first : first + size + angles], first + size + angles
                 surface.displacement = pose[:size]
-                surface.turn_to(pose[size:] / self._arm)
+                surface.set_rotation(pose[size:] / self._arm)
         return self._at[: x.size]
 
 

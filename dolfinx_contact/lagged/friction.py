@@ -56,13 +56,13 @@ class LaggedFriction(Lagged):
         forward = change * rate / (1 - rate)
         settled = max(forward, found.forward_error) <= goal and state.errors.within(goal)
         if settled or state.errors.within(0.0):
-            return Change(True, state.of(state.step.but(tol=goal)), change, forward)
+            return Change(True, state.of(state.step.replaced(tol=goal)), change, forward)
         self._last = change
         tol = max(goal, min(ROUGH_TOL, PART_OF_CHANGE * change))
         return Change(False, state, change, forward, tol)
 
     def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
-        return step.but(starts=(state.x,), motions=state.c)
+        return step.replaced(starts=(state.x,), motions=state.c)
 
     def _with_laws_of(self, state: StepState) -> LoadStep:
         """Return the step with the friction laws evaluated at a state.  Collective."""

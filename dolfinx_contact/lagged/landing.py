@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dolfinx_contact.contact.geometry import times, turned_back
+from dolfinx_contact.contact.geometry import times, to_global
 from dolfinx_contact.step.staggered import Change, Lagged
 
 if TYPE_CHECKING:
@@ -71,8 +71,8 @@ class SlipBeforeLanding(Lagged):
                 before = self._more[k] if before is None else before + self._more[k]
             if before is not None:
                 tangential = np.column_stack((before, np.zeros(len(before))))
-                before = times(new.frames.own, turned_back(old.frames.own, tangential))[:, :-1]
-            contacts.append(new.but(before=before))
+                before = times(new.frames.own, to_global(old.frames.own, tangential))[:, :-1]
+            contacts.append(new.replaced(before=before))
         return step.with_contacts(contacts)
 
 

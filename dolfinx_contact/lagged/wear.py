@@ -109,7 +109,7 @@ class WearOfStep(Lagged):
         return Change(settled, state.of(self._with_depths(state.step)) if settled else state)
 
     def renewed(self, step: LoadStep, state: StepState) -> LoadStep:
-        return self._with_depths(step).but(starts=(state.x,), motions=state.c)
+        return self._with_depths(step).replaced(starts=(state.x,), motions=state.c)
 
     def not_settled(self, change: Change) -> str:
         return f"the depth that the step wears still changes after {self.limit} solutions"
@@ -186,7 +186,7 @@ class WearOfStep(Lagged):
         for k, contact in enumerate(contacts):
             if contact.given.laws.wears_within:
                 size = contact.nodes.size
-                contacts[k] = contact.but(depth=frozen(self._depth[first : first + size]))
+                contacts[k] = contact.replaced(depth=frozen(self._depth[first : first + size]))
                 first += size
         return step.with_contacts(contacts)
 

@@ -29,7 +29,7 @@ from dolfinx_contact.law.friction import Friction, split
 PAUSED_FORCE = 1e-3
 
 
-def work_of_friction(
+def frictional_work(
     friction: Friction,
     before: np.ndarray,
     slipped: np.ndarray,

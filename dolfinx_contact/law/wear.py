@@ -117,11 +117,11 @@ class Wear(Guarded):
         return np.clip(np.divide(beyond, work, np.ones_like(work), where=work > 0.0), 0.0, 1.0)
 
     def __repr__(self) -> str:
-        message = "field" if self.field else self.coefficient.tolist()
+        coefficient = "field" if self.field else self.coefficient.tolist()
         options = ", explicit=True" * self.explicit
         options += f", threshold={self.threshold:g}" * (self.threshold > 0.0)
         options += f", opposite={self.opposite.tolist()}" * bool(self.opposite.any())
-        return f"Wear({message}{options})"
+        return f"Wear({coefficient}{options})"
 
 
 def _volume(k: np.ndarray, work: np.ndarray) -> np.ndarray:

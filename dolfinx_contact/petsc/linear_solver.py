@@ -153,10 +153,10 @@ def _uses_gauss_seidel(options: dict, prefix: str) -> bool:
     """
     database = PETSc.Options(prefix)
     of_levels = {key for key in options if key.startswith("mg_levels_")}
-    message = any(
+    chosen = any(
         MULTIGRID_OPTIONS.get(key) != options[key] or database.hasName(key) for key in of_levels
     )
-    return bool(options.get(GAUSS_SEIDEL)) and not message
+    return bool(options.get(GAUSS_SEIDEL)) and not chosen
 
 
 def _process_signals(*_: object) -> None:

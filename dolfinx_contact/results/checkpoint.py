@@ -188,7 +188,7 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
     x, before = (
         _from_cell_rows(body, mine[f"mixed_{n}"]) if mixed else mine[n].ravel() for n in names
     )
-    return problem.accepted.but(
+    return problem.accepted.replaced(
         x=x,
         x_before=before,
         histories=tuple(contact.history for contact in contacts),

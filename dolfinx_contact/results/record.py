@@ -148,7 +148,7 @@ class NotConverged(RuntimeError):
         return type(self), (str(self), self.step, self.displacement, self.reactions)
 
 
-def counts_of(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
+def count_statuses(body: ElasticBody, nodes: Sequence[Any]) -> Counts:
     """Return the number of open, sticking and slipping contact nodes over all ranks.  Collective.
 
     Args:
@@ -224,7 +224,7 @@ def warn_of_rounding(step: Step, tol: float) -> None:
         )
 
 
-def warn_of_contact(step: Step, tol: float) -> None:
+def warn_of_inaccurate_reactions(step: Step, tol: float) -> None:
     """Warn if the reactions are much less accurate than the tolerance.
 
     There is no warning if rounding dominates the errors, since a smaller tolerance would not help.

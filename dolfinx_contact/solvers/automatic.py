@@ -140,7 +140,7 @@ class BoundAutomatic(BoundSolver):
         elif not enough:
             self._why = f"the condensed operator of {nodes} contact nodes does not fit into memory"
             self._solvers.reverse()
-        cheap = body.exact or body.crowded or self._components * nodes <= MOST_SOLVES
+        cheap = body.exact or body.multigrid_is_faster or self._components * nodes <= MOST_SOLVES
         if not (enough and cheap):
             self._solvers = self._solvers[:1]
 

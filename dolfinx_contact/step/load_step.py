@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dolfinx_contact.contact.state import State, Status
-from dolfinx_contact.results.record import WORSE_THAN_TOLERANCE, Counts, counts_of
+from dolfinx_contact.results.record import WORSE_THAN_TOLERANCE, Counts, count_statuses
 from dolfinx_contact.step.errors import Errors, as_errors, contact_defects, contact_rounding
 from dolfinx_contact.support.checks import ROUNDING_FACTOR, UNIT_ROUNDOFF
 from dolfinx_contact.support.collective import raised_together
@@ -126,13 +126,13 @@ class LoadStep:
     continues: bool = False
     motions: np.ndarray | None = None
 
-    def but(self, **parts: Any) -> LoadStep:
+    def replaced(self, **parts: Any) -> LoadStep:
         """Return a copy of the step with some attributes replaced."""
         return replace(self, **parts)
 
     def with_contacts(self, contacts: Sequence[ContactStep], **parts: Any) -> LoadStep:
         """Return a copy of the step with other contacts that have the same frames."""
-        return self.but(contacts=tuple(contacts), **parts)
+        return self.replaced(contacts=tuple(contacts), **parts)
 
     def with_laws(self, contacts: Sequence[ContactStep]) -> LoadStep:
         """Return a copy of the step with contacts that have other laws.  Call it on all ranks."""
@@ -143,9 +143,9 @@ class LoadStep:
         """Whether the body, or a surface driven by force, may have to be held by contact."""
         return self.surfaces is not None or self.statics is not None
 
-    def may_land(self) -> bool:
+    def may_close(self) -> bool:
         """Return whether open nodes with friction may close in this step.  Collective."""
-        may = [contact.may_land(self.last) for contact in self.contacts]
+        may = [contact.may_close(self.last) for contact in self.contacts]
         return bool(self.body.comm.allreduce(any(may)))
 
     @cached_property
@@ -162,7 +162,7 @@ class LoadStep:
         return [contact.measuring_map() for contact in self.contacts]
 
     @property
-    def no_motions(self) -> np.ndarray:
+    def first_motions(self) -> np.ndarray:
         """Initial values of the motions of surfaces, ``shape=(m,)``; zero by default."""
         if self.motions is not None:
             return self.motions
@@ -218,15 +218,15 @@ class LoadStep:
         With the return map, the direction of friction at large slip follows from the slip and is
         insensitive to rounding in the forces.  For arguments see ``evaluate``.
         """
-        given: dict[str, Any] = dict(forces=self.by_form(x), c=c, before=before, near=near)
+        given: dict[str, Any] = dict(forces=self.residual_forces(x), c=c, before=before, near=near)
         return self.evaluate(x, self.measuring_maps, exact=True, **given)
 
     def open(self, x: np.ndarray, c: np.ndarray | None = None) -> StepState:
         """Return the state at a displacement with zero reactions, with forces by F.  Collective."""
-        c = self.no_motions if c is None else c
+        c = self.first_motions if c is None else c
         nodes = tuple(contact.at(x, c) for contact in self.contacts)
         required = tuple(state.reaction for state in nodes)
-        return StepState(self, x, c, self.by_form(x), nodes, required, True)
+        return StepState(self, x, c, self.residual_forces(x), nodes, required, True)
 
     def derivatives(self, state: StepState, maps: Sequence[NodalMap]) -> list[tuple]:
         """Return the derivatives of the reactions of each contact.  Collective.
@@ -280,7 +280,7 @@ class LoadStep:
             ``c``, ``shape=(m,)``; the reactions required of each contact for equilibrium of the
             body, ``shape=(n, gdim)``; the ``Split`` of reactions at shared nodes, or None.
         """
-        c = c if c is not None else self.no_motions if before is None else before.c
+        c = c if c is not None else self.first_motions if before is None else before.c
         alone = tuple(contact.required(free) for contact in self.contacts)
         split = None if before is None else before.split
         if near is None and self.shared is not None:
@@ -320,7 +320,7 @@ class LoadStep:
         """Return the out-of-balance forces of the linear body, ``b - K x``."""
         return self.b - self.body.multiply(x)
 
-    def by_form(self, x: np.ndarray) -> np.ndarray:
+    def residual_forces(self, x: np.ndarray) -> np.ndarray:
         """Return the out-of-balance forces of the residual form, ``-F(x)``."""
         return -self.body.residual(x)
 
@@ -508,7 +508,7 @@ class LoadStep:
 
     def counts(self, state: StepState) -> Counts:
         """Return the numbers of open, sticking and slipping contact nodes.  Collective."""
-        return counts_of(self.body, state.nodes)
+        return count_statuses(self.body, state.nodes)
 
     def tell(self, state: StepState) -> None:
         """Pass a state to the user's ``monitor``, if there is one.  Collective."""
@@ -647,7 +647,7 @@ class StepState:
 
     @cached_property
     def _confirmed(self) -> StepState:
-        state = replace(self, forces=self.step.by_form(self.x), exact=True)
+        state = replace(self, forces=self.step.residual_forces(self.x), exact=True)
         vars(state)["contact_sums"] = self.contact_sums  # the nodal states are the same
         return state
 

@@ -41,7 +41,7 @@ class NonlinearStep(LoadStep):
 
     def forces(self, x: np.ndarray) -> np.ndarray:
         """Return ``-F(x)``; entries at fixed degrees of freedom are minus the support forces."""
-        return self.by_form(x)
+        return self.residual_forces(x)
 
     def errors_of(self, state: StepState, contacts: np.ndarray | None) -> Errors:
         """Return the errors of a state; infinite if boundary values are violated.  Collective."""
@@ -52,7 +52,7 @@ class NonlinearStep(LoadStep):
 class LinearisedStep(LoadStep):
     """``LoadStep`` of a linearised body; errors are also measured with its stiffness ``K``."""
 
-    def by_form(self, x: np.ndarray) -> np.ndarray:
+    def residual_forces(self, x: np.ndarray) -> np.ndarray:
         """See ``LoadStep``."""
         forces = self.forces(x)
         forces[self.body.fixed] = -self.body.support_forces(x)

@@ -103,7 +103,7 @@ def solve_staggered(
         search: Function that solves a step with fixed lagged quantities.
         goal: Tolerance of the final solution, to which the step is then solved.
     """
-    loop = _Loop(levels, step.tol, goal)
+    loop = _Loop(levels, step.tol)
     step = loop.begun(step, len(levels))
     while True:
         found = search(step)
@@ -116,7 +116,7 @@ def solve_staggered(
             if step.tol <= goal:
                 break
             loop.aim, start = goal, (found.state.x,)
-            finer = step.but(tol=goal, starts=start, motions=found.state.c, continues=True)
+            finer = step.replaced(tol=goal, starts=start, motions=found.state.c, continues=True)
             step = loop.begun(finer, late)
         elif loop.at_its_limit(late):
             break
@@ -129,10 +129,10 @@ def solve_staggered(
 class _Loop:
     """Updates and solutions of each level, total iterations, and forward error of the loops."""
 
-    def __init__(self, levels: Sequence[Level], aim: float, goal: float):
-        self._levels, self.aim, self._goal = levels, aim, goal
+    def __init__(self, levels: Sequence[Level], aim: float):
+        self._levels, self.aim = levels, aim
         self._renewals, self._solutions = [0] * len(levels), [0] * len(levels)
-        self._iterations, self._forward, self._tol = 0, 0.0, 0.0
+        self._iterations, self._forward = 0, 0.0
         self._changes: list[Change] = []
         self.sizes: dict[str, float] = {}
         self.refused = ""
@@ -150,7 +150,7 @@ class _Loop:
             step = quantity.restarted(step)
         self._renewals[:slower] = self._solutions[:slower] = [0] * slower
         tol = max([tol or self.aim, *(quantity.first_tol for quantity in quantities)])
-        return step.but(tol=tol)
+        return step.replaced(tol=tol)
 
     def count(self, found: SolverResult) -> None:
         """Add a solution to the counters."""

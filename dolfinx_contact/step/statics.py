@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from dolfinx_contact.bodies.loose import times_volume
-from dolfinx_contact.contact.nodal import times
+from dolfinx_contact.contact.geometry import times
 from dolfinx_contact.law.friction import principal_axes
 from dolfinx_contact.results.record import NO_SOLUTION, NOT_HELD
 from dolfinx_contact.step.errors import BLIND_ROUNDING, contact_rounding

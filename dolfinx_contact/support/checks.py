@@ -154,7 +154,7 @@ def free_memory() -> float:
     """Return available memory in bytes, file caches included; infinite if it is unknown."""
     try:
         with open("/proc/meminfo") as file:
-            message = dict(line.split(":") for line in file)
-        return 1024.0 * int(message["MemAvailable"].split()[0])  # in kB [proc(5)]
+            fields = dict(line.split(":") for line in file)
+        return 1024.0 * int(fields["MemAvailable"].split()[0])  # in kB [proc(5)]
     except (OSError, KeyError, ValueError):
         return np.inf

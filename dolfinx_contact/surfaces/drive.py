@@ -237,7 +237,7 @@ class Drive:
         ]
 
     @property
-    def freedom(self) -> tuple:
+    def setup_key(self) -> tuple:
         """Free motions and their springs, as a tuple to compare; empty if there are none.
 
         A solver must be set up again when this tuple changes.
@@ -251,7 +251,7 @@ class Drive:
         along = [motion.axis[0] for motion in self.motions if not motion.turns]
         return any(abs(part) > GUIDE_DEFECT for part in along)
 
-    def pulled_by(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
+    def prescribed_forces(self, motions: list[Motion], magnitudes: bool = False) -> np.ndarray:
         """Return the prescribed force or moment along each motion, springs included.
 
         Args:

@@ -104,7 +104,7 @@ class DrivenSurfaces:
 
     def with_columns(self, contacts: Sequence[ContactStep]) -> tuple[ContactStep, ...]:
         """Return copies of the contacts that store the nodal displacements by surface motions."""
-        return tuple(c.but(columns=D) for c, D in zip(contacts, self._columns))
+        return tuple(c.replaced(columns=D) for c, D in zip(contacts, self._columns))
 
     def _nodal_columns(self, contact: ContactStep) -> np.ndarray:
         """Surface displacement at each node by a unit of each motion, ``shape=(n, gdim, m)``."""
@@ -112,7 +112,7 @@ class DrivenSurfaces:
         for one, part, motions in zip(self.surfaces, self.parts, self._motions):
             if one is contact.surface:
                 for k, motion in enumerate(motions, start=part.start):
-                    columns[:, :, k] = contact.moved_by(motion.axis, motion.turns)
+                    columns[:, :, k] = contact.unit_motion(motion.axis, motion.turns)
         return columns
 
     def _initial_forces(self, sizes: bool) -> np.ndarray:
@@ -122,7 +122,7 @@ class DrivenSurfaces:
             sizes: Return the sums of the magnitudes of the terms instead.
         """
         both = zip(self.surfaces, self._motions)
-        pulled = [surface.driver.pulled_by(motions, sizes) for surface, motions in both]
+        pulled = [surface.driver.prescribed_forces(motions, sizes) for surface, motions in both]
         return np.concatenate([np.zeros(0), *pulled]) / self._lengths
 
     def _scale_rotations(self) -> np.ndarray:
@@ -239,7 +239,7 @@ class DrivenSurfaces:
             turned = [way * motion.axis for way, motion in zip(ways, motions) if motion.turns]
             along = [motion.axis for motion in motions if not motion.turns]
             if turned:
-                surface.spin_by(np.sum(turned, axis=0))
+                surface.set_spin(np.sum(turned, axis=0))
             if along:
                 surface.displacement = home + ways[len(turned) :] @ np.array(along)
 

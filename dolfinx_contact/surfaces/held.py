@@ -76,7 +76,7 @@ def _held_surface(
     """Return one surface with its motions that constrained nodes prevent, or None.  Collective."""
     motions = surface.motions
     on = [(k, c) for k, c in enumerate(contacts) if c.surface is surface]
-    moving = [np.stack([c.moved_by(m.axis, m.turns) for m in motions], axis=2) for _, c in on]
+    moving = [np.stack([c.unit_motion(m.axis, m.turns) for m in motions], axis=2) for _, c in on]
     held, resists = [], np.zeros(len(motions))
     for (_, contact), axes in zip(on, moving):
         rows = contact.points.supported
@@ -193,7 +193,7 @@ class HeldSurface:
                 [np.zeros(1)],
             )
             for k, rows, axes in self._holding:
-                contact = contacts[k].where_it_stands()
+                contact = contacts[k].with_present_surface()
                 state = contact.at(u)
                 slips.append(contact.known_slip(state)[rows].ravel())
                 columns.append(axes.reshape(-1, len(self._motions)))
@@ -249,10 +249,10 @@ class HeldSurface:
             sums[:, :m] += np.einsum("nti,ntj->ij", axes, part)
             sums[:, m] -= np.einsum("nt,nti->i", nodes[k].reaction[rows, :-1], axes)
         for k in self._contacts:
-            moved = [contacts[k].moved_by(motion.axis, False) for motion in self._motions]
+            moved = [contacts[k].unit_motion(motion.axis, False) for motion in self._motions]
             sums[:, m] += [np.sum(nodes[k].reaction * way) for way in moved]
         sums = self._body.total(sums)
-        asked = self._surface.driver.pulled_by(self._motions) - sums[:, m]
+        asked = self._surface.driver.prescribed_forces(self._motions) - sums[:, m]
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.linalg.lstsq(sums[:, :m], asked, rcond=HELD_ROUNDING)[0]
         if asked.any() and not np.allclose(sums[:, :m] @ part, asked):
@@ -288,7 +288,7 @@ class HeldSurface:
         most = sum((contact.friction.mu.max(axis=-1) * R).sum() for contact, R in pressed)
         most = float(self._body.total([most])[0])
         loose = [motion for motion in self._motions if motion.spring == 0.0]
-        return bool((np.abs(self._surface.driver.pulled_by(loose)) > most).any())
+        return bool((np.abs(self._surface.driver.prescribed_forces(loose)) > most).any())
 
     def slid(self, contacts: Sequence[ContactStep], nodes: Sequence[State]) -> HeldSurface | None:
         """Return the plane in the sliding state if its nodes cannot carry the force, or None.

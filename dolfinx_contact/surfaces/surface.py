@@ -183,7 +183,7 @@ class Surface(Guarded):
 
     @rotation.setter
     def rotation(self, value: ArrayLike) -> None:
-        self.turn_to(value)
+        self.set_rotation(value)
         self._placed = self._rotation
 
     @property
@@ -201,10 +201,10 @@ class Surface(Guarded):
             rotation: Rotation of the surface, as ``rotation``.
             placed: Rotation assigned last by the user, as ``placed``.
         """
-        self.turn_to(rotation)
+        self.set_rotation(rotation)
         self._placed = placed
 
-    def turn_to(self, value: ArrayLike) -> None:
+    def set_rotation(self, value: ArrayLike) -> None:
         """Set the rotation computed by a step, radians; the orientation of guides is unchanged."""
         size = self._rotation.size
         array = np.atleast_1d(finite("surface.rotation", value))
@@ -222,7 +222,7 @@ class Surface(Guarded):
         """
         return self._spin
 
-    def spin_by(self, angle: np.ndarray | None) -> None:
+    def set_spin(self, angle: np.ndarray | None) -> None:
         """Set the small rotation of the current step, radians, or None; frames are unchanged."""
         self._spin = angle
 
@@ -234,7 +234,7 @@ class Surface(Guarded):
     def end_step(self) -> None:
         """Add the small rotation of the step, ``spin``, to ``rotation``."""
         if self._spin is not None:
-            self.turn_to(composed(self._spin, self._rotation))
+            self.set_rotation(composed(self._spin, self._rotation))
 
     def motion(self, x: np.ndarray) -> np.ndarray:
         """Displacement of the surface's material points at ``x``, global frame, length units.

@@ -38,7 +38,7 @@ class EnergyBalance:
     with F the force on the platen (from the contact law), d its displacement, W the elastic energy (by UFL over the
     body) and ``D = - sum r_t.Delta u_t`` with forces of the end of the step. The last two terms are what the scheme
     adds; both are >= 0. With means of old and new forces the third term vanishes and the last is
-    ``half sum (r_n x_n(before) - r_n(before) x_n)``. Neither D is the work of friction, ``work_of_friction``, which
+    ``half sum (r_n x_n(before) - r_n(before) x_n)``. Neither D is the work of friction, ``frictional_work``, which
     stands beside them: docs/dissipation.md says why.
     """
 

@@ -287,6 +287,18 @@ def test_a_killed_programme_goes_on(tmp_path):
             dc.cycle_jump(again.problem, cycle, 104, path=path)
 
 
+@pytest.mark.parametrize("cycles", [1, 2])
+def test_a_cycle_that_does_not_converge_ends_the_run(cycles):
+    """Where no shorter jump is left, its NotConverged is raised; the same jump is not tried for ever."""
+    scene, _ = pad(1e-6, 0.2)
+
+    def cycle(done):
+        raise dc.NotConverged("not converged.", None, np.zeros(0), [])
+
+    with pytest.raises(dc.NotConverged):
+        dc.cycle_jump(scene.problem, cycle, cycles)
+
+
 def test_short_jumps_have_an_error_that_is_known():
     """Jumps of three cycles at most, whose last ones are of two: one of three is measured, whatever is left over, and the error is no infinite one."""
     for cycles in (10, 13, 16):

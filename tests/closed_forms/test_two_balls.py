@@ -72,7 +72,7 @@ def test_two_balls():
     forces, peaks = [], []
     for swapped in (False, True):
         contact = pressed(swapped)
-        normal, pressure, x = demo.everywhere(contact.reaction[:, 2], contact.pressure, contact.x)
+        normal, pressure, x = demo.on_all_ranks(contact.reaction[:, 2], contact.pressure, contact.x)
         forces.append(4 * abs(contact.force()[2]))
         peaks.append(pressure.max())
         a = (3 * forces[-1] * R / (4 * E_STAR)) ** (1 / 3)

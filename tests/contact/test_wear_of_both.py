@@ -104,7 +104,7 @@ def test_even_wear_is_even_on_the_other_side(cell, degree):
     worn = 0.25 * contact.whole_area
     taken = geometry.taken(worn, contact.opposite_area, history.frames, history)
     assert taken == pytest.approx(0.25, rel=1e-10)
-    worn = geometry.everywhere(taken)
+    worn = geometry.on_all_ranks(taken)
     assert geometry.opened(contact.points, worn) == pytest.approx(0.25, rel=1e-10)
 
 

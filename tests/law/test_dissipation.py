@@ -9,7 +9,7 @@ import pytest
 import scenes
 
 import dolfinx_contact as dc
-from dolfinx_contact.law.dissipation import slipped_last, work_of_friction
+from dolfinx_contact.law.dissipation import frictional_work, slipped_last
 
 COMM = scenes.COMM
 EPS = np.finfo(float).eps
@@ -37,7 +37,7 @@ def slide(friction, slips, normal, stuck_before=True):
     forces = [[*n * slid_along(s, mu, p), n] for s, n in zip(slips, normal[1:])]
     before = [[0.0, 0.0, normal[0]], *forces[:-1]]
     slipped = np.arange(len(slips)) > 0
-    return work_of_friction(friction, np.array(before), slipped, np.array(forces), slips)[0]
+    return frictional_work(friction, np.array(before), slipped, np.array(forces), slips)[0]
 
 
 def random_states(rng, n, tangents):
@@ -67,12 +67,12 @@ def test_never_negative(tangents):
         laws += [dc.Friction(mu, p, axes=np.column_stack((np.cos(turn), np.sin(turn))))]
     for law in laws:
         before, slipped, now, slips = random_states(rng, n, tangents)
-        work = work_of_friction(law, before, slipped, now, slips)[0]
+        work = frictional_work(law, before, slipped, now, slips)[0]
         assert work.shape == slips.shape and np.isfinite(work).all()
         assert (work >= 0).all()
         assert law.frictionless == (not work.any())
         if law.mu.ndim == 1:  # a rank may have no nodes
-            nothing = work_of_friction(law, *(a[:0] for a in (before, slipped, now, slips)))[0]
+            nothing = frictional_work(law, *(a[:0] for a in (before, slipped, now, slips)))[0]
             assert nothing.shape == (0, tangents)
 
 
@@ -116,9 +116,9 @@ def test_units_and_frames_do_not_matter():
     friction = dc.Friction(**LAWS["case C"])
     before, slipped, now, slips = (rng.normal(size=shape) for shape in ((n, 3), n, (n, 3), (n, 2)))
     slipped = slipped > 0
-    work = work_of_friction(friction, before, slipped, now, slips)[0]
+    work = frictional_work(friction, before, slipped, now, slips)[0]
     for force, length in ((1e-90, 1e60), (1e12, 1e-12), (1e100, 1e100)):
-        scaled = work_of_friction(friction, force * before, slipped, force * now, length * slips)[0]
+        scaled = frictional_work(friction, force * before, slipped, force * now, length * slips)[0]
         assert scaled == pytest.approx(force * length * work, rel=1e-12, abs=0)
     turn = rng.uniform(0, 2 * np.pi, n)
     cos, sin = np.cos(turn), np.sin(turn)
@@ -129,7 +129,7 @@ def test_units_and_frames_do_not_matter():
         return a
 
     grooves = dc.Friction(**LAWS["case C"], axes=np.column_stack((cos, sin)))
-    again = work_of_friction(grooves, turned(before), slipped, turned(now), turned(slips))[0]
+    again = frictional_work(grooves, turned(before), slipped, turned(now), turned(slips))[0]
     largest = work.max(axis=1, keepdims=True)
     assert (np.abs(again - work) <= 1e-9 * largest).all()
 
@@ -140,9 +140,9 @@ def test_opening_and_closing_nodes():
     r, none = np.array([[-0.6, -0.8, 5.0]]) * [0.2 * 5, 0.2 * 5, 1], np.zeros((1, 3))
     for before, after in ((r, none), (none, r)):
         for slipped in (False, True):
-            work = work_of_friction(friction, before, np.array([slipped]), after, slip)[0]
+            work = frictional_work(friction, before, np.array([slipped]), after, slip)[0]
             assert work.sum() == pytest.approx(0.5 * 5.0 * 0.2 * 5.0, rel=8 * EPS)
-    assert not work_of_friction(friction, none, np.array([False]), none, slip)[0].any()
+    assert not frictional_work(friction, none, np.array([False]), none, slip)[0].any()
 
 
 @pytest.mark.parametrize("law", ["isotropic", "associated", "case C"])
@@ -193,7 +193,7 @@ def circling(steps, radius, lag):
 def turn_work(steps, radius, lag):
     r, slips, own = circling(steps, radius, lag)
     slipped = np.full(steps, True)
-    return work_of_friction(dc.Friction(1.0), r[:-1], slipped, r[1:], slips[1:])[0].sum(), own
+    return frictional_work(dc.Friction(1.0), r[:-1], slipped, r[1:], slips[1:])[0].sum(), own
 
 
 def test_no_nodal_rule_is_of_second_order_behind_a_spring():

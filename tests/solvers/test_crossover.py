@@ -54,7 +54,7 @@ def test_many_contact_nodes_have_multigrid_and_factors_for_the_fallback(most, mo
     for scene in (expected, many):
         scene.move_top(0.002, 0.001, -0.005)
     step = many.problem.solve()
-    assert not expected.problem.body.crowded and many.problem.body.crowded
+    assert not expected.problem.body.multigrid_is_faster and many.problem.body.multigrid_is_faster
     assert many.problem.body.ksp.getPC().getType() == "mg"
     assert step.solver == (
         dc.SolverName.FIXED_POINT if most > 2 else dc.SolverName.CONDENSED_NEWTON
@@ -79,7 +79,7 @@ def test_what_the_user_chooses_and_plane_bodies_have_factors(options, cells, sol
     monkeypatch.setattr(problem_input, "CROWDED_SIZE", 100)
     monkeypatch.setattr(automatic, "most_nodes", lambda unknowns, friction: 5)
     scene = scenes.block(cells=cells, mu=0.3, p=None, petsc_options=options, solver=solver)
-    assert not scene.problem.body.crowded
+    assert not scene.problem.body.multigrid_is_faster
     scene.move_top(*[0.002, 0.001, -0.005][3 - len(cells) :])
     scene.problem.solve()
     assert scene.problem.body.exact
@@ -91,4 +91,4 @@ def test_a_body_without_contacts_is_not_crowded(monkeypatch):
     scene = scenes.block(cells=(8, 8, 4))
     problem = dc.ContactProblem(scene.F, scene.u, [], bcs=scene.bcs)
     problem.solve()
-    assert problem.body.exact and not problem.body.crowded
+    assert problem.body.exact and not problem.body.multigrid_is_faster

@@ -21,7 +21,7 @@ from dolfinx_contact.petsc.linear_solver import (
     SYMMETRIC_OPTIONS,
     LinearSolver,
 )
-from dolfinx_contact.solvers.fixed_point.fixed_point import half_way
+from dolfinx_contact.solvers.fixed_point.fixed_point import half_step
 
 pytestmark = pytest.mark.ranks
 COMM = MPI.COMM_WORLD
@@ -423,7 +423,7 @@ def test_half_the_way_of_a_step():
     scene.problem.solve()
     before = scene.u.x.array[: scene.problem.body.size].copy()
     scene.move_top(0.001, 0.0005, -0.008)
-    half = half_way(scene.problem.load_step())
+    half = half_step(scene.problem.load_step())
     scene.problem.solve()
     mean = 0.5 * (before + scene.u.x.array[: scene.problem.body.size])
     state = half.evaluate(mean, half.measuring_maps)

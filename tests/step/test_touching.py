@@ -119,5 +119,5 @@ def test_what_rounding_is_does_not_depend_on_whose_a_node_is():
     foot = mesh.locate_entities_boundary(square, 1, lambda x: np.isclose(x[1], 0))
     contact = dc.Contact(V, foot, dc.RigidPlane((0, 0), (0, 1)), MU)
     at_rest = np.zeros(2 * V.dofmap.index_map.size_local)
-    assert not any(COMM.allgather(step_of(contact).may_land(at_rest)))
+    assert not any(COMM.allgather(step_of(contact).may_close(at_rest)))
     assert len(set(COMM.allgather(step_of(contact).gap_rounding(at_rest)))) == 1

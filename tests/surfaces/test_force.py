@@ -469,6 +469,6 @@ def test_guides_stand_as_the_plane_was_placed(dim):
         plane.rotation = [angle] if dim == 2 else [angle, 0.0, 0.5 * angle]
         placed = plane.frame
         assert plane.drive_axes == pytest.approx(placed, abs=1e-15)
-        plane.turn_to(plane.rotation + 0.2)
+        plane.set_rotation(plane.rotation + 0.2)
         assert plane.drive_axes == pytest.approx(placed, abs=1e-15)
         assert np.abs(plane.frame - placed).max() > 0.1

@@ -173,7 +173,7 @@ class BoundCondensedNewton(BoundSolver):
 
     def _motions(self, step: LoadStep, force: np.ndarray) -> np.ndarray:
         """Motions of driven surfaces for given forces of all rows, ``shape=(m,)``."""
-        return step.no_motions if self._surfaces is None else self._surfaces.moved(force)
+        return step.first_motions if self._surfaces is None else self._surfaces.moved(force)
 
     def _driving(self, step: LoadStep, c: np.ndarray) -> np.ndarray:
         """Driving forces of the tied rows of surfaces, at surface motions ``c``."""
@@ -190,7 +190,7 @@ class BoundCondensedNewton(BoundSolver):
 
     def _factors(self) -> Any:
         """Return an object whose ``ksp`` solves for many right-hand sides.  Collective."""
-        if not self._body.crowded or self._body.exact:
+        if not self._body.multigrid_is_faster or self._body.exact:
             return self._held_by
         if self._own is None:
             A = self._body.anchors.A if self._body.anchors else self._body.K
@@ -221,7 +221,7 @@ class BoundCondensedNewton(BoundSolver):
         condensed problem is set up anew.
         """
         free = self._held_by.solve(step.b) if self._anchored else self._body.free_state(step.b)
-        c = step.no_motions if self._surfaces is None else self._surfaces.begun(step, free)
+        c = step.first_motions if self._surfaces is None else self._surfaces.begun(step, free)
         if self._guided:
             now = [moved_across(contact, contact.at(free, c)) for contact in step.contacts]
             if self.comm.allreduce(not all(map(np.array_equal, now, self._moved)), op=MPI.LOR):

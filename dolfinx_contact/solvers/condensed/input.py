@@ -106,7 +106,7 @@ def checked_compliance(W: Any) -> np.ndarray:
     return finite("W", W.toarray(), copy=False)
 
 
-def no_way_out(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
+def proved_infeasible(W: np.ndarray, q: np.ndarray, tol: float) -> bool:
     """Whether the condensed problem is proved infeasible: for all reactions, a gap is negative.
 
     This holds if there are pressures ``y >= 0`` with ``W^T y = 0`` and ``q . y < 0``: then

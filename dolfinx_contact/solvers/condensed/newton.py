@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dolfinx_contact.law.friction import Friction, principal_axes
 from dolfinx_contact.solvers.base import BoundSolver, Solver
-from dolfinx_contact.solvers.condensed.input import checked_problem, no_way_out
+from dolfinx_contact.solvers.condensed.input import checked_problem, proved_infeasible
 from dolfinx_contact.solvers.condensed.kernel import condensed_operator
 from dolfinx_contact.solvers.condensed.result import (
     Attempt,
@@ -48,12 +48,12 @@ PROVABLE_CONTACTS = 500
 
 # Refinement of a solution whose reactions are still uncertain: tolerances relative to tol; it
 # continues while the next Newton step falls below LEAST_GAIN of its last size, and stops if the
-# error is below NEAR_ROUNDING times the rounding error.  Up to ROUNDING_MULTIPLE unknowns, all
+# error is below NEAR_ROUNDING times the rounding error.  Up to EXHAUSTIVE_UNKNOWNS unknowns, all
 # methods may search again.
 NEARER_TOLERANCES = (1e-2, 1e-4)
 LEAST_GAIN = 0.1
 NEAR_ROUNDING = 10
-ROUNDING_MULTIPLE = 100
+EXHAUSTIVE_UNKNOWNS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -309,7 +309,7 @@ def _found(
         return replace(solver, max_iterations=min(FIRST_ITERATIONS, most)).solve_condensed(*problem)
     except CondensedNotConverged as failure:
         best, left = failure.best, solver.max_seconds - failure.best.seconds
-        if left > 0 and len(q) <= PROVABLE_CONTACTS and no_way_out(W, q, tol):
+        if left > 0 and len(q) <= PROVABLE_CONTACTS and proved_infeasible(W, q, tol):
             raise CondensedNotConverged(replace(best, branch="infeasible")) from None
         if (
             left <= 0 or best.iterations < FIRST_ITERATIONS or most <= FIRST_ITERATIONS
@@ -333,7 +333,7 @@ def _nearer(
     contacts differ much in stiffness or load, this may hold for some of them.  For large problems,
     only Newton's method is used: if ``W`` is rank-deficient, the reactions are not unique anyway.
     """
-    cheap = solver.fallbacks and q.size <= ROUNDING_MULTIPLE
+    cheap = solver.fallbacks and q.size <= EXHAUSTIVE_UNKNOWNS
     most = min(solver.max_iterations or UNLIMITED_ITERATIONS, 100 * solver.newton_iterations)
     finer = replace(solver, slip_tol=None, fallbacks=cheap, max_iterations=most)
 

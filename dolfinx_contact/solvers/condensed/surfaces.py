@@ -78,7 +78,7 @@ class CondensedSurfaces:
             step: The load step.
             free: Contact-free displacement of owned degrees of freedom.
         """
-        c = step.surfaces.at_rest(step.no_motions, self._stiffest)
+        c = step.surfaces.at_rest(step.first_motions, self._stiffest)
         self._at_first = step.surfaces.touched(step.contacts, free, c)
         return self._at_first
 

@@ -131,7 +131,7 @@ def _slides(state: StepState, tried: bool = False) -> bool:
     return step.slides(state) if tried else step.pushed_off(state)
 
 
-def half_way(step: LoadStep) -> LoadStep:
+def half_step(step: LoadStep) -> LoadStep:
     """Return the load step with half of the increment of its loads and boundary values.
 
     Its solution serves as a start for the full step.  The tolerance is zero, because errors
@@ -142,7 +142,7 @@ def half_way(step: LoadStep) -> LoadStep:
         contact.points.add_forces(contact.last.reaction, reactions)
     b = 0.5 * (step.b + step.body.multiply(last) - reactions)
     b[fixed] = 0.5 * (step.b + last)[fixed]
-    return step.but(b=b, tol=0.0, starts=(last,))
+    return step.replaced(b=b, tol=0.0, starts=(last,))
 
 
 class BoundFixedPoint(BoundSolver):
@@ -235,7 +235,7 @@ class BoundFixedPoint(BoundSolver):
         for factor in RHO_FACTORS[options.map] if options.rho is None else (options.rho,):
             begin(search.best)
             yield f"rho {factor:g}", factor, TANGENT_INTERVAL
-            if self.preconditioner.soften():
+            if self.preconditioner.add_soft_motions():
                 begin(search.best)
                 yield "soft motions", factor, TANGENT_INTERVAL
             for every, where in again:
@@ -254,7 +254,7 @@ class BoundFixedPoint(BoundSolver):
     def _half_way(self, search: Search, factor: float) -> StepState:
         """Approximate solution under half of the load increment, with full boundary values.
         Collective."""
-        step, half = search.step, half_way(search.step)
+        step, half = search.step, half_step(search.step)
         other = Search(half, half.start(), self._options.max_seconds)
         other.begin(
             other.best, min(2 * TANGENT_INTERVAL, self._options.max_iterations), HALVING_ITERATIONS

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from dolfinx_contact.contact.interface import like, structure
 from dolfinx_contact.petsc.linear_solver import stage
-from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, patch_motions
+from dolfinx_contact.solvers.fixed_point.rigid_balance import RigidBalance, contact_responses
 from dolfinx_contact.solvers.fixed_point.surface_layer import SurfaceLayer
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class ContactPreconditioner:
             self._border = Border(step, A, self.stiffened, self._spring_rates)
         S.destroy()
 
-    def soften(self) -> bool:
+    def add_soft_motions(self) -> bool:
         """Look for further soft motions; return whether any was added to ``rigid``.  Collective.
 
         The candidates are the displacements under forces on the contacts.  This is done once, in a
@@ -67,7 +67,7 @@ class ContactPreconditioner:
         if self._softened:
             return False
         self._softened, known = True, len(self.rigid)
-        modes = (self._body.rigid_modes(), patch_motions(self._body, self._points))
+        modes = (self._body.rigid_modes(), contact_responses(self._body, self._points))
         rigid = RigidBalance(self._body, self._A, np.concatenate(modes, axis=1))
         self.rigid = rigid if len(rigid) > known else self.rigid
         return len(rigid) > known

@@ -213,7 +213,7 @@ class RigidBalance:
         return sums[:n], slope, np.sqrt(sums[-1]), state
 
 
-def patch_motions(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
+def contact_responses(body: ElasticBody, points: Sequence[ContactPoints]) -> np.ndarray:
     """Displacements of the body under forces and moments on each contact.
 
     The result has ``shape=(owned dofs, m)``.  The displacements include the bending of a slender

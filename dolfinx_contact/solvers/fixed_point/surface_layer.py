@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.contact.interface import like, response, responses
 from dolfinx_contact.petsc.linear_solver import DIRECT_OPTIONS, LinearSolver
-from dolfinx_contact.solvers.newton.contact_tangent import change_of
+from dolfinx_contact.solvers.newton.contact_tangent import contact_contribution
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
@@ -86,7 +86,7 @@ class SurfaceLayer:
             like(self._body.K, part) for part in responses(self._body.K, self._points, derivatives)
         ]
         near = [part.createSubMatrix(self._layer, self._layer) for part in whole]
-        change, A = change_of(self._block, near), self._block.copy()
+        change, A = contact_contribution(self._block, near), self._block.copy()
         A.axpy(-1.0, change, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         for part in (*whole, change):
             part.destroy()

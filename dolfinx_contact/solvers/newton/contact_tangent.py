@@ -88,7 +88,7 @@ class ContactTangent:
             self._A.axpy(1.0, K, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             free = self._A.createVecLeft()
             free.array_w[:] = self._free
-            change = change_of(K, responses(K, self._points, derivatives), free)
+            change = contact_contribution(K, responses(K, self._points, derivatives), free)
             self._A.axpy(-1.0, change, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             change.destroy()
             free.destroy()
@@ -105,7 +105,7 @@ class ContactTangent:
             some = [
                 (np.tile(any_values, (point_set.count, 1, 1)),) * 2 for point_set in self._points
             ]
-            change = change_of(self._body.K, responses(self._body.K, self._points, some))
+            change = contact_contribution(self._body.K, responses(self._body.K, self._points, some))
             change.scale(0.0)
             A.axpy(1.0, change, how)
             change.destroy()
@@ -133,7 +133,7 @@ class ContactTangent:
         raise AssertionError
 
 
-def change_of(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> PETSc.Mat:
+def contact_contribution(K: PETSc.Mat, both: Sequence, free: np.ndarray | None = None) -> PETSc.Mat:
     """Contribution ``R_r K + R_u`` of the contacts to a stiffness ``K``, a PETSc matrix.
     Collective.
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DEFAULT_OPTIONS = {"snes_type": "newtonls", "snes_linesearch_type": "l2"}
 # Iteration limit of the search: far above ``snes_max_it``, so that SNES alone decides when to stop.
 MOST_ITERATIONS = 10_000
-DIVERGED_REASONS = {
+SNES_REASONS = {
     value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] in "CD"
 }
 
@@ -141,7 +141,7 @@ class BoundSNES(OnTangent):
             warn_of_unread([name for name in unread if name in given])
             equations.search.count(snes.getIterationNumber())
             reason = snes.getConvergedReason()
-            return f"{snes.getType()}, {DIVERGED_REASONS.get(reason, reason)}"
+            return f"{snes.getType()}, {SNES_REASONS.get(reason, reason)}"
         except PETSc.Error as failure:  # since PETSc 3.25, it hides the exception of a callback
             raise equations.failure or failure from None
         finally:

@@ -24,7 +24,6 @@ from dolfinx_contact.support.line_search import enough, halves
 if TYPE_CHECKING:
     from dolfinx_contact.step.load_step import LoadStep, StepState
 
-SOLVER_NAME = "SparseNewton"
 
 # Augmentation parameters relative to the nodal normal stiffness, for the normal and the tangential
 # reactions.  If the line search takes less than SHORT_STEP of a Newton step, the next tangential
