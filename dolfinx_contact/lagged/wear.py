@@ -50,7 +50,8 @@ MIXED_DEPTHS = 20
 LEAST_FALL = 0.7
 FALL_ROUNDS = 10
 
-# Relaxation factor of the iterations without Anderson's method, which prevents oscillation.
+# Without Anderson's method, depths change by this part of the change that is computed, and by this
+# part of it again the next time: the whole change may alternate for ever.
 CAUTIOUS_PART = 0.5
 
 # Largest fraction of the force on a node that wear due to the force at the start of the step
@@ -84,7 +85,7 @@ class WearOfStep(Lagged):
         contacts = _wearing(step)
         self._share = STIFFNESS_FACTOR * _area_fractions([contact.given for contact in contacts])
         self._anderson = Anderson(self._share.size, MIXED_DEPTHS, step.body.total)
-        self._best, self._stale = np.inf, 0
+        self._best, self._stale, self._part = np.inf, 0, 1.0
         forces = [contact.last.reaction[:, -1] for contact in contacts]
         kappa, nodes = self._stiffness(contacts), [contact.last for contact in contacts]
         self._depth = self._worn(contacts, kappa, nodes, None, forces)[0]
@@ -95,7 +96,7 @@ class WearOfStep(Lagged):
 
     def restarted(self, step: LoadStep) -> LoadStep:
         self._anderson.restart()
-        self._best, self._stale = np.inf, 0
+        self._best, self._stale, self._part = np.inf, 0, 1.0
         return self._with_depths(step)
 
     def change(self, found: SolverResult, goal: float) -> Change:
@@ -138,11 +139,13 @@ class WearOfStep(Lagged):
         self._stale += 1
         if off <= LEAST_FALL * self._best:
             self._best, self._stale = off, 0
+        if self._stale == FALL_ROUNDS:
+            self._part *= CAUTIOUS_PART
         if self._stale < FALL_ROUNDS:
             mixed, _ = self._anderson.step(kappa * depth, change)
             following = np.maximum(mixed, 0.0) / kappa
         else:
-            following = depth + CAUTIOUS_PART * (following - depth)
+            following = depth + self._part * (following - depth)
         if self._stale >= 3 * FALL_ROUNDS:  # after the iterations without Anderson's method
             self._anderson.restart()
             self._best, self._stale = off, 0

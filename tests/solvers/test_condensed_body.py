@@ -185,7 +185,7 @@ def test_operator_is_kept_while_the_matrix_stands():
     scene.problem.reset()
     scene.move_top(0, 0, -0.005)
     scene.problem.solve()
-    assert scene.problem.bound().operator is not kept
+    assert scene.problem.bound().operator is not kept or scenes.COMM.rank > 0  # which has none
     assert scenes.gathered(scene.contact)[1] == pytest.approx(2 * first, abs=1e-8 * first.max())
 
 
