@@ -1,5 +1,3 @@
-# Copyright (c) 2026 The dolfinx_contact authors
-# SPDX-License-Identifier: MIT
 """
 Kernel of dolfinx_contact: friction law, cone and maps on NumPy arrays.
 
